@@ -31,7 +31,7 @@ def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first shipped virtual one, if it names the instrument; else None."""
+    """Return the given bench, or the first shipped virtual bench; None if it does not name the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in named_in(rig)[kind] else None
@@ -71,7 +71,7 @@ def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
-    """Report an error of the command line once, before the first test."""
+    """Report an error in the options of the command line once, before the first test."""
     config.stash[_RIGS] = chosen_rigs(
         config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
     )
@@ -92,7 +92,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
 
 @pytest.fixture
 def bench(rig: Rig) -> Iterator[Bench]:
-    """Open the bench again for every test; the user has checked its knobs."""
+    """Open the bench anew for each test. Its manual settings (knobs) count as confirmed by the user."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
 
@@ -106,7 +106,7 @@ def refusal() -> Iterator[None]:
 
 
 def measured_v(bench: Bench, duration_s: float) -> Samples:
-    """Return the voltage at the generator's terminal over ``duration_s``, after settling [V]."""
+    """Return the voltage at the generator's terminal over ``duration_s`` [V], after settling."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)

@@ -30,8 +30,8 @@ class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
     `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
-    amplitude may change while it plays. Settings beyond its limits or the bench's ``amplitude_limit_vpp`` are
-    refused (`LimitExceeded`). During a change, the amplitude never exceeds the larger of both settings.
+    amplitude may change during the drive. Settings beyond its limits or the bench's ``amplitude_limit_vpp``
+    are refused (`LimitExceeded`). During a change, the amplitude never exceeds the larger of both settings.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
@@ -56,7 +56,7 @@ class AFG1022X(ScpiInstrument):
     identity: Identity
     """Reply to ``*IDN?``; stored completely, because its last field varies."""
     codes: ArbitraryCodes | None = None
-    """Waveform in the memory that the output plays; None: the output plays a sine."""
+    """Waveform in the memory that the output plays; None if the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
     """Settings that could neither be made nor read remotely: the operator must confirm them."""
     _is_known = False
@@ -99,7 +99,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def playing(self) -> Shape:
-        """Shape of the signal that is set up; raises InstrumentError after a failed change."""
+        """Shape of the current signal (sine or waveform); raises InstrumentError after a failed change."""
         _ = self.panel_vpp
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
@@ -143,7 +143,7 @@ class AFG1022X(ScpiInstrument):
             self.panel_vpp = panel_vpp
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse the sweep: its time can be set only on the panel."""
+        """Refuse the internal sweep: its duration can be set only on the panel of the generator."""
         del amplitude_vpp
         self.model.check_sweep(sweep)
 
@@ -162,13 +162,13 @@ class AFG1022X(ScpiInstrument):
             self.panel_vpp = panel_vpp
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each `trigger`; raises LimitExceeded on channel 2."""
+        """Play ``cycles`` periods at each call of `trigger`; raises LimitExceeded on channel 2."""
         if self.channel != _BURST_CHANNEL:
             raise LimitExceeded(f"a burst was requested on channel {self.channel}; use channel 1 for bursts")
         self._arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Fire an armed burst."""
+        """Start an armed burst."""
         with self._changing():
             self.command("*TRG")
 
@@ -179,13 +179,13 @@ class AFG1022X(ScpiInstrument):
                 self.burst = "OFF"
 
     def start(self) -> None:
-        """Turn the output on, and verify this by reading back."""
+        """Turn the output on, and read the state of the output back."""
         with self._changing():
             _ = self.playing  # with unknown settings it stays off
             self.output = "ON"
 
     def stop(self) -> None:
-        """Switch the output off. May be called at any time; tries again, also over a new session.
+        """Switch the output off. May be called at any time; repeated if it fails, also over a new session.
 
         Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
         must act.
@@ -276,7 +276,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def _panel_factor(self) -> float:
-        """Ratio of panel to requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
+        """Panel amplitude over requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
         return 1.0 if self.codes is None else self.codes.panel_factor
 
     def _mute(self) -> None:
@@ -295,7 +295,7 @@ class AFG1022X(ScpiInstrument):
             self._to_quiet_sine()
 
     def _to_quiet_sine(self) -> None:
-        """Set a sine of the smallest amplitude, without modes and offset, from any state."""
+        """Set a sine of the smallest amplitude, without modulation modes and offset, from any state."""
         # *RST is not used: its effect on the output of this model is not documented.
         self._end_modes()
         self.offset_v = 0.0  # the offset first, because this lowers every peak
@@ -305,7 +305,7 @@ class AFG1022X(ScpiInstrument):
         self._is_known = True
 
     def _forget(self) -> None:
-        """Treat all settings as unknown after an interrupted change."""
+        """Treat all settings as unknown, because a change was interrupted."""
         self.held.clear()
         self._is_known = False
 
@@ -325,9 +325,9 @@ class AFG1022X(ScpiInstrument):
     def _agree_on_load(self) -> tuple[Knob, ...]:
         """Set the load that the generator expects; return it as a setting to confirm if it cannot be read.
 
-        Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so it is
-        tried. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused when the
-        generator reports another load that cannot be changed.
+        Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so the
+        driver tries it. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused
+        when the generator reports another load that cannot be changed.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")

@@ -31,7 +31,7 @@ from ._overload import overload_ranges
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of calls after an unanswered call [s], so that a run ends in a bounded time."""
+"""Time limit of calls after a call without reply [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
@@ -41,7 +41,7 @@ _CHANNEL_OPTIONS = (
 
 
 class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Limits the time of every gRPC call, and adds the token; the DAQmx client does neither."""
+    """Limits the time of every gRPC call and adds the token; the DAQmx client does neither."""
 
     def __init__(self) -> None:
         self._is_lost = False
@@ -58,7 +58,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
 
 @dataclass(frozen=True)
 class DaqmxSession:
-    """Connection to a DAQmx driver; close it after everything that was opened through it."""
+    """Connection to a DAQmx driver; close it after all devices that were opened through it."""
 
     server: str | None
     """``"host:port"``; None for the driver on this computer."""
@@ -67,11 +67,11 @@ class DaqmxSession:
 
     @property
     def place(self) -> str:
-        """Location of the driver, for errors."""
+        """Location of the driver, as named in errors."""
         return "this computer" if self.server is None else f"the device server at {self.server}"
 
     def system(self) -> System:
-        """Return access to devices and driver version."""
+        """Return an object that lists the devices and the driver version."""
         return System.local() if self.options is None else System.remote(self.options)
 
     def close(self) -> None:
@@ -184,7 +184,7 @@ def _couple(made: AIChannel, channel: Channel) -> None:
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
     """Return the step of a converter [V]; None if volts are not multiples of one step.
 
-    A calibrated device may scale with an offset or a curve; its volts are then recorded as read.
+    A calibrated device may scale counts with an offset or a curve; then its volts are recorded as read.
     ``coefficients`` define the polynomial from counts to volts, constant term first.
     """
     if len(coefficients) < 2 or not coefficients[1] * _MOST_COUNTS > range_v:
@@ -268,7 +268,7 @@ class DaqmxDigitizer:
         return self._identity
 
     def start_trigger(self) -> str:
-        """Terminal of this task's start trigger; arm other tasks on it before `start`."""
+        """Terminal of this task's start trigger; arm other tasks with it before `start`."""
         with daqmx_call(f"reading the start trigger of {self._config.device}"):
             return str(self._open_task().triggers.start_trigger.term)
 
@@ -376,7 +376,7 @@ class DaqmxDigitizer:
         return self._task
 
     def _next_samples(self, samples: int) -> tuple[Samples, Counts | None]:
-        """Return the next volts, and their counts if the converter scales linearly."""
+        """Return the next volts; also their counts, if the converter scales linearly."""
         shape = len(self._channels), samples
         if isinstance(self._reader, AnalogUnscaledReader):
             counts = np.empty(shape, np.int32)

@@ -37,7 +37,7 @@ class DaqmxOutput:
         self._physical = physical
         self._config = config
         self.sample_rate_hz = config.sample_rate_hz
-        """The requested sample rate, which the device accepted."""
+        """Sample rate that was requested and that the device accepted."""
         self.ahead_samples = int(config.ahead_s * config.sample_rate_hz)
         """Largest number of samples that can be written ahead of the sample being played."""
         self._digitizer = digitizer
@@ -48,7 +48,7 @@ class DaqmxOutput:
         """Whether the output is at zero volts and nothing is reserved; if not, `stop` sets it to zero."""
         self._is_open = True
         self.idle = IdleOutput.HELD
-        """Voltage of the output when it runs out of samples, as read back: zero if the device can do this."""
+        """Voltage of the output once it runs out of samples, as read back: zero if the device can do so."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -97,7 +97,7 @@ class DaqmxOutput:
         self._written += volts.size
 
     def arm(self) -> None:
-        """Let the output start with the inputs; call this before the digitizer's ``start``."""
+        """Let the output start together with the inputs; call this before the digitizer's ``start``."""
         if self._task is None or self._written == 0:
             raise InstrumentError(f"{self._physical} has nothing to play; write the first samples, then arm")
         with daqmx_call(f"arming {self._physical}"):
@@ -106,7 +106,7 @@ class DaqmxOutput:
     def stop(self) -> None:
         """Stop playing and go to zero volts at once. May be called at any time.
 
-        Raises InstrumentLost when the device or its server is gone: the samples already written still play.
+        Raises InstrumentLost when the device or its server is gone: samples already written still play.
         """
         if self._is_zero:
             return
@@ -129,7 +129,7 @@ class DaqmxOutput:
             ) from error
 
     def close(self) -> None:
-        """Release the output, at zero volts. May be called at any time."""
+        """Set the output to zero volts and release it. May be called at any time."""
         self._is_open = False
         if self._task is not None:  # otherwise `stop` has succeeded, or raised its error
             self.stop()

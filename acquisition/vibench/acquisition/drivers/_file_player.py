@@ -17,12 +17,12 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` is its path. With the plan of the recording, check and segments have the same
-    sample numbers; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. If the plan of the recording is run, check and segments have the
+    same sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     waiting_samples = 0
-    """Zero: a recording is read at any speed."""
+    """Zero delay: a recording is read at any speed."""
 
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
         self._recording = recording
@@ -97,7 +97,7 @@ class FilePlayer:
     def read(self, samples: int) -> Block:
         """Return the next samples.
 
-        Raises InstrumentLost at the end of the recording, DataLost at samples that the recording has lost.
+        Raises InstrumentLost at the end of the recording, DataLost at a gap of the recording.
         """
         if not self._is_running or samples < 1:
             raise InstrumentError(

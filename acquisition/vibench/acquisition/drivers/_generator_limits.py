@@ -61,7 +61,7 @@ class GeneratorModel:
         )
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open a generator and return it; pyvisa is loaded only now."""
+        """Open a generator and return its driver; pyvisa is loaded only now."""
         driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
         return cast("GeneratorDriver", driver).open(config)
 
@@ -185,11 +185,11 @@ class NoGenerator:
 
     name: str
     silently: str = ""
-    """Reason why it accepts commands although it plays nothing; empty if it refuses them."""
+    """Reason why it accepts commands although it plays nothing; empty if it refuses commands."""
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return a description that allows nothing, or one that allows the plan of a recording."""
+        """Return a description that allows no signal, or one that allows the plan of a recording."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
@@ -200,17 +200,17 @@ class NoGenerator:
 
     @property
     def identity(self) -> Identity:
-        """Identity that contains only a name."""
+        """Identity that contains only the name of the placeholder."""
         return Identity("", self.name, "", "", f"{self.name}: {self.silently or 'it plays nothing'}")
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Return no settings to be confirmed."""
+        """Return no settings, because none must be confirmed."""
         return ()
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
-        """Smallest and largest amplitude that is accepted, peak to peak [V]."""
+        """Smallest and largest amplitude setting that is accepted, peak to peak [V]."""
         return _NOTHING_VPP, self.amplitude_limit_vpp
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:

@@ -1,7 +1,7 @@
 """The Keysight 33500B: sines, waveforms and bursts like any other generator, and internal sweeps.
 
-Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; not tested on
-an instrument.
+Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; the driver was not
+tested on an instrument.
 """
 
 import re
@@ -20,7 +20,7 @@ _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2
 _SPACINGS = {Spacing.LINEAR: "LIN", Spacing.LOGARITHMIC: "LOG"}
 _SAME_MEAN = 1e-4
 LONGEST_HOLD_S = 3600.0
-"""Holding time of the stop frequency after a sweep [s]."""
+"""Time for which the stop frequency is held after a sweep [s]."""
 
 
 class Keysight33500B(AFG1022X):
@@ -51,14 +51,14 @@ class Keysight33500B(AFG1022X):
     )
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output keeps its state."""
+        """Set up a sine. The output stays on or off as it was."""
         with self._changing():
             if self._is_known:
                 self.sweep = "OFF"
         super().load_sine(frequency_hz, amplitude_vpp)
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Set up a sweep that a trigger starts. The output keeps its state."""
+        """Set up a sweep that a trigger starts. The output stays on or off as it was."""
         self.model.check_sweep(sweep)
         self.load_sine(sweep.start_hz, amplitude_vpp)
         with self._changing():
@@ -71,7 +71,7 @@ class Keysight33500B(AFG1022X):
             self.sweep = "ON"
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each bus trigger."""
+        """Play ``cycles`` periods at each trigger command."""
         with self._changing():
             self.trigger_source = "BUS"
         self._arm_burst(cycles)
@@ -82,7 +82,7 @@ class Keysight33500B(AFG1022X):
             self.burst = "OFF"
 
     def _end_modes(self) -> None:
-        """End sweep, burst and modulation; set peak-to-peak amplitudes; switch the waveform filter off."""
+        """End sweep, burst and modulation; set amplitudes to peak to peak; switch the waveform filter off."""
         self.sweep = self.burst = self.am = self.fm = self.pm = self.fsk = self.pwm = "OFF"
         self.amplitude_unit = "VPP"
         self.output_filter = "OFF"
@@ -100,7 +100,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Write the memory, and compare number and mean of its points, which cannot be read back."""
+        """Write the memory; compare number and mean of its points, because points cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

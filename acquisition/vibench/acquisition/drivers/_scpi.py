@@ -80,7 +80,7 @@ class ScpiInstrument:
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
         """Send a command, then any 16-bit codes as a big-endian block; return the entries of the error queue.
 
-        The entries may be older than the command.
+        The queue may contain entries from earlier commands.
         """
         with self._dialogue(message):
             if codes is None:
@@ -99,7 +99,7 @@ class ScpiInstrument:
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
-        """Return the reply to a query; repeat it once if empty, as the first reply after ``*CLS`` may be."""
+        """Return the reply to a query. An empty reply, as it may follow ``*CLS``, repeats the query once."""
         return self.query(message) or self.query(message)
 
     def query_number(self, message: str) -> float:
@@ -156,7 +156,7 @@ class ScpiInstrument:
         return self.held[header]
 
     def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
-        """End a mode. An empty reply means that the firmware does not have the mode, so it cannot be on."""
+        """End a mode. An empty reply means that the firmware lacks the mode, so the mode cannot be on."""
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
@@ -173,7 +173,7 @@ class ScpiInstrument:
             self._link.close()
 
     def reconnect(self) -> None:
-        """Open a new session, whatever the state of the old session."""
+        """Open a new session, even if the old session still exists or has failed."""
         try:
             self.disconnect()
         except InstrumentError as error:
@@ -200,7 +200,7 @@ class ScpiInstrument:
 
     @contextmanager
     def _dialogue(self, message: str) -> Iterator[None]:
-        """Exchange messages, after discarding the reply to an interrupted query."""
+        """Exchange messages; first discard the reply to an interrupted query."""
         with self._lock:
             if self._reply_due:
                 self._reply_due = False
@@ -251,7 +251,7 @@ def _block(reply: bytes) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Number:
-    """Numeric setting, sent as ``form``; an error if it does not read back within the given tolerances."""
+    """Numeric setting, sent as ``form``. A value read back outside the given tolerances is an error."""
 
     header: str
     """SCPI header of the setting; ``{c}`` stands for the channel."""

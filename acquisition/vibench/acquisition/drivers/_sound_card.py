@@ -21,7 +21,7 @@ from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges, require_playable
 
 _LATEST_S = 10.0
-"""If samples are later than this, the card counts as lost [s]."""
+"""Delay of samples after which the card counts as lost [s]."""
 _SAME_RATE = 1e-6
 
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
@@ -119,7 +119,7 @@ class SoundCardDigitizer:
         self.roles = tuple(channel.role.value for channel in channels)
         """Roles of the channels, in the order of the rows of a block."""
         self.volts_per_count = (None,) * len(channels)
-        """None for each channel: PortAudio returns numbers, not counts."""
+        """None for each channel, because PortAudio returns numbers without converter counts."""
         self._full_scale_v = float(rig.daq.options["input_full_scale_v"])
         self._next_sample = 0
         self._is_running = False

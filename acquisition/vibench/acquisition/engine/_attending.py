@@ -1,7 +1,7 @@
 """``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which imports little.
 
 Its standard input is a line with the engine's address, then one byte each time the parent program shows that
-it is responsive. The process ends with that program.
+it is responsive. The process ends when the parent program ends.
 """
 
 import json
@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """Letters in ``/proc`` for the state of a process that is suspended or dead (Linux)."""
 LEAST_OWN = 0.25
-"""Fraction of the time without an input byte that always counts; the rest may be waits for a processor."""
+"""Smallest fraction of the time without an input byte that counts; the rest may be waits for a processor."""
 
 
 class _Program:
@@ -35,7 +35,7 @@ class _Program:
     def still_s(self) -> float:
         """Return how long the program has sent no byte [s], excluding its waits for a processor.
 
-        While it can run (state R), only its processor time counts: Linux reports a wait only after its end.
+        In state R (runnable), only its processor time counts: Linux reports a wait only after its end.
         """
         lived_s = self._lived_s  # read before the clock, because a byte may arrive in between
         now_s, worked_s = monotonic(), self._worked_s
@@ -72,7 +72,7 @@ class _Program:
 
 
 def main() -> None:
-    """Send heartbeats until the engine or the program has ended."""
+    """Send heartbeats until the engine or the parent program has ended."""
     message = json.loads(sys.stdin.buffer.readline())
     program, clock = _Program(), Event()
     with suppress(OSError), socket.create_connection(message["address"]) as connection:

@@ -48,7 +48,7 @@ class EngineAddress(FrozenModel):
 
 
 REFUSAL_S = 0.2
-"""Time limit of a connection attempt [s]; on the same computer a refusal comes at once."""
+"""Time limit of a connection attempt [s]; on the same computer, a refused connection returns at once."""
 
 
 class Announcement(Program):
@@ -83,7 +83,7 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Return bench programs without an engine, and engines that refuse connections; oldest first."""
+    """Return programs that drive a bench without an engine, and engines that refuse connections."""
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
@@ -110,7 +110,7 @@ def the_engine(pid: int | None) -> Announcement:
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
-    Programs in other containers of this computer are included, since they read the same state folder, and
+    Programs in other containers of this computer are included, since they read the same state folder. So are
     programs that ended without confirming silence. Raises EngineError when there is none. ``pid`` selects one
     program; None: all of this computer.
     """
@@ -120,7 +120,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Return a sentence on programs of other computers that use the same state folder; empty without them."""
+    """Return a sentence on programs of other computers that use the same state folder, or empty text."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return (
@@ -148,7 +148,7 @@ def _named(programs: Sequence[Program]) -> str:
 
 
 def _refuses(address: EngineAddress) -> bool:
-    """Whether the connection is refused; a slow or busy engine does not refuse."""
+    """Whether the engine refuses the connection; a slow or busy engine does not refuse."""
     try:
         socket.create_connection((address.host, address.port), REFUSAL_S).close()
     except ConnectionRefusedError:
@@ -159,11 +159,11 @@ def _refuses(address: EngineAddress) -> bool:
 
 
 PATIENCE_S = 5.0
-"""Longest wait for an answer, which usually takes milliseconds [s]."""
+"""Longest wait for an answer of the engine, which usually takes milliseconds [s]."""
 
 
 class Hello(FrozenModel):
-    """The first message on every connection."""
+    """The first message from a client on every connection."""
 
     ask: Literal["hello"] = "hello"
     token: str
@@ -238,7 +238,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Return the engine's error as an instance of its class; EngineError if that class is unknown."""
+    """Return an engine's error as an instance of its class, or as EngineError if this class is unknown."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)
@@ -271,7 +271,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         """Connect to a running engine, to watch or to attend its run.
 
         Raises EngineSilent when no answer comes within ``patience_s`` [s], now or later, and EngineGone when
-        no engine listens there.
+        no engine listens at the address.
         """
         return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 
@@ -314,8 +314,8 @@ class Attendant:
 
     On a busy computer, a thread of a window can wait a second or more for Python's lock. A process that
     mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It sends
-    nothing while the system has stopped that program (Linux). Each heartbeat reports how long `live` has not
-    been called.
+    no heartbeat while the system has stopped that program (Linux). Each heartbeat reports how long `live` has
+    not been called.
     """
 
     def __init__(self, address: EngineAddress) -> None:
@@ -331,7 +331,7 @@ class Attendant:
         return self._process.pid
 
     def live(self) -> None:
-        """Report that the program is responsive; takes microseconds and never waits."""
+        """Report that the program is responsive. The call takes microseconds and never waits."""
         now_s = monotonic()
         if now_s - self._beat_s < BEAT_EVERY_S:
             return
@@ -346,7 +346,7 @@ class Attendant:
                 self._begin()
 
     def close(self) -> None:
-        """Stop attending. May be called at any time."""
+        """Stop attending the engine. May be called at any time."""
         self._beat_s = inf  # `live` sends nothing from now on
         self._end()
 

@@ -58,8 +58,8 @@ def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
 class Engine:
     """A bench and its jobs. One thread calls the methods; only this thread uses the instruments.
 
-    Other threads read `published` and use `switch`. A method publishes an error and then raises it. Call
-    `close` at the end: the bench is then silent and closed.
+    Other threads read `published` and use `switch`. If a method fails, it publishes the error and then raises
+    it. Call `close` at the end: the bench is then silent and closed.
     """
 
     def __init__(self, supervision: Supervision) -> None:
@@ -111,7 +111,7 @@ class Engine:
     def close(self) -> None:
         """Silence the bench and close it. May be called at any time.
 
-        Raises AcquisitionError, after publishing it, when an instrument fails.
+        When an instrument fails, the error is published, then raised as AcquisitionError.
         """
         failure = self._release()
         self.published.enter(EngineState.CLOSED)
@@ -204,7 +204,7 @@ class Engine:
         self.published.twin(TwinStatus() if self._twin.is_on else None)
 
     def look_after_twin(self) -> None:
-        """Warn if the live twin has ended by itself, because changes of the specimen are then not noticed."""
+        """Warn if the live twin has ended by itself: changes of the specimen are then no longer noticed."""
         if (words := self._twin.last_words()) is not None:
             self.published.twin(None)
             self.published.messages.warn(

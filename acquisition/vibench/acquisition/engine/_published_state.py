@@ -33,7 +33,7 @@ from ._status import (
 )
 
 HELD_S = 10.0
-"""Length of the samples kept for viewers [s]."""
+"""Length of the newest samples that are kept for viewers [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class SampleSlice:
 
 
 class SampleBuffer:
-    """The newest samples: written by the run, read by any thread, bounded in memory."""
+    """The newest samples, with bounded memory: written by the run, read by any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -63,7 +63,7 @@ class SampleBuffer:
         """Number of places at which samples are missing."""
 
     def begin(self, channels: int, sample_rate_hz: float) -> None:
-        """Start a new run, and drop the samples of the last run."""
+        """Start a new run, and discard the samples of the last run."""
         with self._lock:
             self._blocks.clear()
             self.run_id += 1
@@ -71,7 +71,7 @@ class SampleBuffer:
             self.samples = self.gaps = 0
 
     def add(self, block: Block) -> None:
-        """Add a block, and drop samples older than `HELD_S`."""
+        """Add a block of samples, and discard samples older than `HELD_S`."""
         volts = block.volts.astype(np.float32)
         with self._lock:
             if block.first_sample != self.samples:
@@ -84,7 +84,7 @@ class SampleBuffer:
                 self._blocks.popleft()
 
     def since(self, sample: int, most: int) -> SampleSlice:
-        """Return the samples from ``sample`` on, at most the newest ``most``."""
+        """Return the samples from number ``sample`` on, but at most the newest ``most`` samples."""
         with self._lock:
             blocks = tuple(self._blocks)
             end, run_id, rate_hz, channels = self.samples, self.run_id, self._rate_hz, self._channels
@@ -112,11 +112,11 @@ class Messages:
         return tuple(self._kept)
 
     def info(self, what: str) -> None:
-        """Add a message that needs no action."""
+        """Add a message that requires no action of the operator."""
         self._add(MessageKind.INFO, what, "", "", "")
 
     def warn(self, what: str, done: str = "", next_step: str = "") -> None:
-        """Add a warning."""
+        """Add a warning to the messages."""
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
@@ -144,7 +144,7 @@ class Messages:
 
 
 def message_parts(text: str) -> tuple[str, str, str]:
-    """Split "What happened. What was done; what to do next" into its parts; missing parts are empty."""
+    """Split "What happened. What was done; what to do next" into its three parts; missing parts are empty."""
     what, _, rest = text.partition(". ")
     done, _, next_step = rest.partition("; ")
     return (f"{what.rstrip('.')}.", _sentence(done), _sentence(next_step))
@@ -156,12 +156,12 @@ def _sentence(clause: str) -> str:
 
 
 DISK_INTERVAL_S = 2.0
-"""How often the free space of the disk is read [s]."""
+"""Interval between two readings of the free disk space [s]."""
 _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.RAMPING_DOWN}
 
 
 class PublishedState:
-    """Newest status of an engine, always replaced as a whole, so that no reader sees half a change."""
+    """Newest status of an engine. It is always replaced as a whole, so that readers see no partial change."""
 
     def __init__(self, supervision: Supervision) -> None:
         self.sample_buffer = SampleBuffer()
@@ -202,7 +202,7 @@ class PublishedState:
         )
 
     def enter(self, state: EngineState) -> None:
-        """Change the state; a state without a run or an armed plan clears both."""
+        """Change the state; a state without a run or an armed plan clears the run and the plan."""
         keeps_plan = state is EngineState.ARMED or state in _STATES.values() or state is EngineState.RUNNING
         forgotten = {} if keeps_plan else {"armed": None, "run": None, "levels": ()}
         self._put(state=state, **forgotten)
@@ -213,11 +213,11 @@ class PublishedState:
         self._put_rows(())
 
     def checked(self, report: BenchReport, utc: str) -> None:
-        """Set the report of the check."""
+        """Set the report of the bench check."""
         self._put(check=report, checked_utc=utc)
 
     def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
-        """Set the plan that will start."""
+        """Set the armed plan, which will start next."""
         self._armed_until_s = monotonic() + plan.expires_in_s
         self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.ARMED, armed=plan)
@@ -235,7 +235,7 @@ class PublishedState:
         self._put(state=EngineState.RUNNING, armed=None, run=None)
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
-        """Update the status after a block."""
+        """Update the status after a block of samples."""
         run = progress.run
         if progress.path != self._file:  # each attempt at a point is a new recording
             self._begin(progress, bench)
@@ -258,12 +258,12 @@ class PublishedState:
         self._put(twin=status)
 
     def note_pause(self, rest_s: float, text: str) -> None:
-        """Count a pause between two recordings as done time [s], and publish ``text``."""
+        """Add a pause between two recordings to the completed time [s], and publish ``text``."""
         self._done_s += rest_s
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Publish the result of a recording; a recording kept from before counts with its planned time."""
+        """Publish the result of a recording; a kept earlier recording counts with its planned time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:
@@ -336,7 +336,7 @@ def _queue_rows(campaign: Campaign) -> tuple[RowStatus, ...]:
 
 
 def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:
-    """Return the level of each channel, relative to its full scale."""
+    """Return peak and rms of each channel during a block, relative to its full scale."""
     peaks = np.max(np.abs(block.volts), axis=1)
     rms = np.sqrt(np.mean(block.volts**2, axis=1))
     return tuple(

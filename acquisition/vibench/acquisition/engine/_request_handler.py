@@ -1,4 +1,4 @@
-"""The engine's request handler: answers at once, from any thread, and uses no instrument."""
+"""The engine's request handler: it answers at once, in any thread, and uses no instrument itself."""
 
 from collections.abc import Callable, Mapping
 from datetime import timedelta
@@ -42,7 +42,7 @@ ARMED_S = 60.0
 
 
 def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision) -> ArmedPlan:
-    """Check a campaign for this bench and folder, and return its plan; nothing is played or written.
+    """Check a campaign for this bench and folder, and return its plan; no signal is played, no file written.
 
     Raises AcquisitionError with every reason why the campaign cannot be run.
     """
@@ -93,7 +93,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 def confirm_from(sheet: KnobSheet | None) -> Confirm:
-    """Return a function that confirms the settings on a sheet, and refuses all others."""
+    """Return a function that confirms the settings listed on a sheet, and refuses all other settings."""
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
         seen = () if sheet is None else sheet.knobs
@@ -109,9 +109,9 @@ def confirm_from(sheet: KnobSheet | None) -> Confirm:
 
 
 STALL_S = 0.2
-"""A longer interval between two checks of the viewers shows that this process was stalled [s]."""
+"""Interval between two checks of the viewers above which this process counts as stalled [s]."""
 LATE_FACTOR = 4.0
-"""Factor on this process's own delay, which extends the time allowed without requests (same computer)."""
+"""Factor on this process's own delay, by which the time allowed without requests grows (same computer)."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995
@@ -121,9 +121,9 @@ FORGETTING = 0.995
 class RequestHandler:
     """Handles the requests to an engine.
 
-    It answers from the published state, puts a job into the engine's queue, or sets its stop switch.
-    `carry_out` takes requests: it raises `EngineError` with one sentence when the engine's state does not
-    permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
+    The handler answers from the published state, queues a job for the engine, or sets the engine's stop
+    switch. `carry_out` takes requests: it raises `EngineError` with one sentence when the engine's state does
+    not permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
 
     def __init__(self, engine: Engine, jobs: JobQueue) -> None:
@@ -162,7 +162,7 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that a viewer is present; a check, arming and a start count as presence, too."""
+        """Note that a viewer is present; requests to check, arm or start count as presence, too."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
@@ -170,13 +170,13 @@ class RequestHandler:
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
-        """Return the state of the engine."""
+        """Return the status of the engine."""
         status = self._engine.published.status()
         is_left_alone = self._is_orphan and not self._is_looked_after
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the state of the engine, without the rows if the viewer has them."""
+        """Return the status of the engine; without the rows if the viewer already has them."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 
@@ -239,7 +239,7 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.measure(request))
 
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Pause or end the run, and disarm an armed campaign; refuse a pause that the drive cannot keep."""
+        """Pause or end the run, and disarm an armed campaign; refuse a pause in which the drive would end."""
         if level is StopLevel.HOLD and (refusal := self._engine.switch.refusal_to_hold()):
             raise EngineError(f"{refusal}. The run continues; stop it with ramp, abort or off")
         self._stop(StopRequest(Cause.OPERATOR, level, reason))
@@ -249,11 +249,11 @@ class RequestHandler:
         self._engine.switch.resume()
 
     def mark(self, text: str) -> None:
-        """Note an event at the next sample of the recording."""
+        """Write an event at the next sample of the recording."""
         self._engine.switch.mark(text)
 
     def tell_change(self, text: str) -> None:
-        """Note that the specimen has changed."""
+        """Write into the recording that the specimen has changed."""
         self._engine.published.messages.warn(text)
         self._engine.switch.tell_change(text)
 
@@ -282,13 +282,13 @@ class RequestHandler:
         self._engine.published.twin(told)
 
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "a request ended the engine") -> None:
-        """End the run, silence everything, and let the engine end. Allowed in every state."""
+        """End the run, silence everything, and let the engine end. Allowed in every engine state."""
         self._stop(StopRequest.by(cause, reason))
         self._is_ending = True
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
-        """Apply the time limits: disarm a campaign that nobody starts, abort a run that nobody attends."""
+        """Apply the time limits: disarm a campaign that nobody starts, and abort a run without a viewer."""
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
@@ -318,7 +318,7 @@ class RequestHandler:
     def outlives_its_parent(self) -> bool:
         """Whether work remains after the parent program has ended.
 
-        The work is an unattended campaign; after it, the engine continues while a viewer attends it.
+        The work is an unattended campaign; afterwards the engine continues while a viewer attends it.
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
@@ -330,7 +330,7 @@ class RequestHandler:
         return monotonic() - self._last_request_s < TAKEN_OVER_S
 
     def is_forgotten(self, after_s: float) -> bool:
-        """Whether the engine is idle, has started no recording, and got no request for ``after_s`` [s]."""
+        """Whether the engine is idle, has started no recording, and had no request for ``after_s`` [s]."""
         status = self.status()
         is_idle = status.state in (EngineState.CLOSED, EngineState.READY)
         return (

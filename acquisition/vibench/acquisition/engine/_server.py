@@ -37,7 +37,7 @@ WAITING_MOST = 64
 GREETING_S = 2.0
 """A connection that has not shown the token after this time is closed [s]."""
 YOUNG_S = 0.01
-"""Every connection has at least this time to show the token, however many there are [s]."""
+"""Every connection has at least this time to show the token, even if there are many connections [s]."""
 _NO_ROOM = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 Admitted = Callable[[socket.socket, ConnectionRole], None]
@@ -55,7 +55,7 @@ class Admission:
     def __init__(
         self, listening: socket.socket, token: str, admitted: Admitted, make_room: Callable[[], None]
     ) -> None:
-        """Accept connections; ``make_room`` closes an admitted connection when no file can be opened."""
+        """Accept connections; when no file can be opened, ``make_room`` closes an admitted connection."""
         self._listening = listening
         self._token = token.encode()
         self._admitted = admitted
@@ -184,7 +184,7 @@ class Admission:
 
 
 def answer_to(handler: RequestHandler, message: Message) -> Message:
-    """Carry out the request in a message; a refusal is returned as one sentence."""
+    """Carry out the request in a message. If the engine refuses it, one sentence is returned."""
     try:
         arguments = dict(REQUEST.validate_json(message.text))
         verb = VERBS[arguments.pop("ask")]
@@ -199,7 +199,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Most viewers (20 MB each if they do not read); one more disconnects the one with the oldest request."""
+"""Maximum number of viewers (20 MB each if they do not read). Beyond it, the least active is disconnected."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 

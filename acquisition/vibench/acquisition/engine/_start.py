@@ -40,7 +40,7 @@ class AdoptedEngine(ClosedOnLeaving):
         self.client.close()
 
     def close(self) -> None:
-        """Let the engine ramp down and end, and wait for that. May be called at any time."""
+        """Let the engine ramp down and end, and wait until it has ended. May be called at any time."""
         with suppress(EngineGone):
             self.client.shutdown()
         self.client.close()
@@ -48,7 +48,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def left_alone() -> Announcement | None:
-    """Return an engine that runs a campaign although its parent program has ended; None without one."""
+    """Return an engine that runs a campaign although its parent program has ended; None if there is none."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
@@ -78,7 +78,7 @@ class EngineProcess(ClosedOnLeaving):
         self._close_pipes()
 
     def close(self) -> None:
-        """Let the engine ramp down and end, and wait for that. May be called at any time."""
+        """Let the engine ramp down and end, and wait until it has ended. May be called at any time."""
         if self.is_alive:
             try:
                 self.client.shutdown()
@@ -122,7 +122,7 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
 
 
 PATIENCE_S = 1.0
-"""Longest wait for an answer, which usually takes milliseconds [s]."""
+"""Longest wait for an answer of the engine, which usually takes milliseconds [s]."""
 
 
 class StopDelivery(StrEnum):
@@ -204,7 +204,7 @@ def stop_engine(
 
 
 def _runs(engine: Program) -> bool:
-    """Whether the process runs now; called again and again, because the answer changes during a stop."""
+    """Whether the process runs now; asked repeatedly, because the answer changes during a stop."""
     return engine.is_alive
 
 

@@ -42,7 +42,7 @@ SOUNDING = DRIVING | {EngineState.CHECKING}
 
 
 class Supervision(StrEnum):
-    """Whether a run needs a viewer."""
+    """Whether a run needs the presence of a viewer."""
 
     ATTENDED = "attended"
     """The run is aborted when no request comes for longer than `patience_s`."""
@@ -54,7 +54,7 @@ class ConnectionRole(StrEnum):
     """Purpose of a connection."""
 
     ATTENDING = "attending"
-    """The client in charge of the run, which stops when this client sends no more requests."""
+    """The client in charge of the run: if it sends no more requests, the run stops."""
     VISITING = "visiting"
     """A viewer that does not keep the run alive."""
 
@@ -62,13 +62,13 @@ class ConnectionRole(StrEnum):
 VIEWER_PATIENCE_S = 0.5
 """Time that an attended run at a limit of the rig continues without requests [s]."""
 LONGEST_PATIENCE_S = 10.0
-"""Longest patience that can be granted [s]."""
+"""Longest time without requests that an attended run can be granted [s]."""
 HUNG_FACTOR = 4.0
-"""Factor on the patience for a viewer that reports that its window is blocked."""
+"""Factor on the allowed time without requests for a viewer that reports a blocked window."""
 
 
 def hung_patience_s(granted_s: float) -> float:
-    """Return how long [s] a drive may continue with a blocked window; ``granted_s``: without requests."""
+    """Return how long a drive may continue with a blocked window [s]; ``granted_s`` [s]: without requests."""
     return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
 
 
@@ -95,7 +95,7 @@ class BenchFacts(FrozenModel):
     rig_name: str
     is_simulated: bool
     identities: Mapping[str, str]
-    """Identification that each instrument replied, by its part in the bench."""
+    """Identification reported by each instrument, by its role on the bench, such as ``"generator"``."""
     channels: tuple[ChannelFacts, ...]
     sample_rate_hz: float
 
@@ -110,7 +110,7 @@ class ArmedPlan(FrozenModel):
     expires_in_s: float
     """The engine disarms itself after this time."""
     attendance: Supervision
-    """Whether the run needs a viewer."""
+    """Whether the run needs the presence of a viewer."""
     patience_s: float
     """Time that the run continues without requests, if it needs a viewer [s]."""
 
@@ -139,7 +139,7 @@ class RunStatus(FrozenModel):
 
 
 class ChannelLevel(FrozenModel):
-    """Level of a channel during the last block, relative to its full scale."""
+    """Peak and rms of a channel during the last block, relative to its full scale."""
 
     role: str
     peak_share: float
@@ -151,7 +151,7 @@ class RowStatus(FrozenModel):
 
     name: str
     state: str
-    """``"queued"``, ``"running"``, or how it ended."""
+    """State of the recording: ``"queued"``, ``"running"``, or how the recording ended."""
     reason: str
     file: str
 
@@ -175,16 +175,16 @@ class EngineMessage(FrozenModel):
     done: str = ""
     next_step: str = ""
     code: str = ""
-    """Class name of the error, for searches."""
+    """Class name of the error, by which it can be looked up."""
 
 
 class TwinStatus(FrozenModel):
     """The live twin's last report: motion of m1 between its stops, estimated parameters, and delay."""
 
     pid: int = 0
-    """Process number of the twin; 0 before its first report."""
+    """Process number of the twin; 0 until its first report."""
     state: str = "starting"
-    """``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
+    """State of the twin: ``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
     sentence: str = ""
     run_id: int = 0
     end_sample: int = 0
@@ -206,11 +206,11 @@ class TwinStatus(FrozenModel):
     limit: float | None = None
     """Level above which a change of the specimen is suspected; None while the usual level is being learnt."""
     busy_share: float = 0.0
-    """Processor time of the twin's process, divided by the time since the run began."""
+    """Processor time of the twin's process relative to the time since the run began."""
     missed_s: float = 0.0
     """Duration of motion that the twin skipped because it was too slow [s]; the recording contains it."""
     behind_s: float = 0.0
-    """Delay of the newest sample at the last report [s]."""
+    """Delay of the twin behind the newest sample, at its last report [s]."""
 
 
 class EngineStatus(FrozenModel):
@@ -226,7 +226,7 @@ class EngineStatus(FrozenModel):
     levels: tuple[ChannelLevel, ...] = ()
     rows: tuple[RowStatus, ...] = ()
     rows_number: int = 0
-    """Number that changes with every change of a row, so that unchanged rows need not be sent again."""
+    """Number that changes with every change of a row; viewers need not fetch unchanged rows again."""
     overloads: int = 0
     """Number of sample ranges beyond a channel's full scale in this run."""
     lost_blocks: int = 0
@@ -266,11 +266,11 @@ class TwinProcess:
 
     @property
     def is_on(self) -> bool:
-        """Whether the twin was started; it may have ended since."""
+        """Whether the twin was started; it may have ended by itself since."""
         return self._process is not None
 
     def turn(self, switch: TwinSwitch) -> None:
-        """Start or end the twin. Allowed in every state."""
+        """Start or end the twin. Allowed in every engine state."""
         match switch:
             case TwinSwitch.ON if self._process is None:
                 self._process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
@@ -294,7 +294,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return, only once, why the twin ended by itself; None while it runs or is off."""
+        """Return why the twin ended by itself, only once; None while it runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

@@ -53,7 +53,7 @@ class CampaignRequest(FrozenModel):
 
     campaign: Campaign
     folder: Path
-    """Folder for its recordings."""
+    """Folder for the recordings of the campaign."""
     twin: TwinSwitch = TwinSwitch.OFF
     """Whether the live twin runs with the campaign; it always runs for a plan with ``on_changed_specimen =
     "stop"``."""
@@ -62,7 +62,7 @@ class CampaignRequest(FrozenModel):
     changed_bench: ChangedBench = ChangedBench.REFUSE
     check: CheckRule = CheckRule.FRESH
     attendance: Supervision | None = None
-    """Whether the run needs a viewer; None: as set at the start of the engine."""
+    """Whether the run needs the presence of a viewer; None: as set at the start of the engine."""
     longest_patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)] = (
         VIEWER_PATIENCE_S
     )
@@ -80,7 +80,7 @@ class Answer(Generic[A]):
 
     written: Callable[[A], Message]
     read: Callable[[Any, bytes], A]
-    """Returns the answer for the parsed JSON text and the bytes after it."""
+    """Returns the value of an answer from its parsed JSON text and the bytes after that text."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Verb(Generic[A]):
     """One kind of request to an engine."""
 
     word: str
-    """Value of ``ask`` in the message."""
+    """Value of the key ``ask`` in the message."""
     method: str
     """Name of the method of request handler and client."""
     request: type[FrozenModel]
@@ -96,7 +96,7 @@ class Verb(Generic[A]):
     states: tuple[EngineState, ...]
     """Engine states that permit the request; empty: allowed in every state, and never delayed."""
     work_s: float
-    """Longest time to compute the answer [s]; 0 if it is ready at once."""
+    """Longest time to compute the answer [s]; 0 if the answer is ready at once."""
 
     def message(self, **arguments: object) -> Message:
         """Return the message of a request."""
@@ -105,9 +105,9 @@ class Verb(Generic[A]):
 
 
 ARMING_S = 300.0
-"""Longest time for arming [s]: checking 100 sweeps takes seconds, or a minute on a busy computer."""
+"""Longest time for arming [s]. Checking 100 sweeps takes seconds, or a minute on a busy computer."""
 VERBS: dict[str, Verb[Any]] = {}
-"""Every verb, by its word."""
+"""All verbs, by the word in the message."""
 
 
 def verb(
@@ -220,7 +220,7 @@ class EngineVerbs:
 
     @verb("stop", DONE)
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Pause or end the run, and disarm an armed campaign; only a pause may be refused."""
+        """Pause or end the run, and disarm an armed campaign; only a pause can be refused."""
 
     @verb("resume", DONE)
     def resume(self) -> None:
@@ -259,7 +259,7 @@ class EngineVerbs:
 
     @verb("beat", DONE)
     def beat(self, still_s: NonNegativeFloat = 0.0) -> None:
-        """Report that the viewer is present, and for how long its window was blocked (``still_s`` [s])."""
+        """Report that the viewer is present, and how long its window was blocked (``still_s`` [s])."""
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:
@@ -273,4 +273,4 @@ class EngineVerbs:
 
 _REQUESTS: Any = reduce(or_, (row.request for row in VERBS.values()))
 REQUEST: TypeAdapter[FrozenModel] = TypeAdapter(Annotated[_REQUESTS, Field(discriminator="ask")])
-"""Validates a request in JSON."""
+"""Validates the JSON text of a request."""

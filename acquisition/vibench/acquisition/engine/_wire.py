@@ -16,7 +16,7 @@ from ..errors import AcquisitionError
 HEAD = struct.Struct("!4sII")
 MAGIC = b"VBE1"
 PIECE_BYTES = 1 << 18
-"""Largest number of bytes in one read."""
+"""Largest number of bytes read at once."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,12 @@ class Bounds:
 HELLO = Bounds(1_000)
 """Limit for the first message of a connection, which contains the token."""
 REQUESTS = Bounds(32_000_000)
-"""Limit for requests: a campaign may have thousands of measurements; no request contains samples."""
+"""Limit for requests: a campaign may have thousands of measurements, but no request contains samples."""
 ANSWERS = Bounds(32_000_000, 64_000_000)
 
 
 class WireError(ConnectionError):
-    """The other side has disconnected, or does not use this protocol."""
+    """The other side of the connection has disconnected, or does not use this protocol."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Message:
 
 
 class IncomingMessage:
-    """A message that arrives in pieces."""
+    """A message that is received in pieces."""
 
     def __init__(self, bounds: Bounds) -> None:
         self._bounds = bounds
@@ -61,7 +61,7 @@ class IncomingMessage:
         return self._end - len(self._came)
 
     def take(self, piece: bytes) -> None:
-        """Add received bytes, at most `missing`; raises WireError for data that are not a message."""
+        """Add received bytes, at most `missing`; raises WireError if they are not a message."""
         if not piece:
             raise WireError("the other side closed the connection")
         self._came += piece

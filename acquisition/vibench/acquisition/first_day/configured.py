@@ -36,9 +36,9 @@ class Found(Enum):
     """Kinds of instruments that the computer can find."""
 
     GENERATORS = auto()
-    """VISA resources, which include generators."""
+    """VISA resources, among which generators are found."""
     CONVERTERS = auto()
-    """Devices of the DAQ driver, which include converters."""
+    """Devices of the DAQ driver, among which converters are found."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ QUESTIONS = (
 
 
 def questions_for(text: str) -> tuple[Question, ...]:
-    """Return the questions for a template; questions on further sensors come before the last question."""
+    """Return the questions for a template; it includes questions on each further sensor."""
     roles = tomllib.loads(text).get("sensors", {})
     others = [
         Question(key, words.format(role.replace("_", " ")))
@@ -232,7 +232,7 @@ Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer, because the question cannot be asked again."""
+    """Raise the error of an answer, for input in which a question cannot be repeated."""
     raise error
 
 
@@ -295,7 +295,7 @@ def configure(
 def _valid_answer(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
-    """Ask until an answer has the right type and is within its bounds; return the changed text."""
+    """Ask until an answer has the right type and is within its bounds; return the changed configuration."""
     while answer := ask(question, choices, _default_answer(text, question.key)):
         try:
             _require_text(answer, question.key)
@@ -314,7 +314,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value as the default answer; if it has a source, only its number."""
+    """Return the template's value as the default answer; only the number if the value states a source."""
     written = value_in(text, key)
     match tomllib.loads(f"held = {written}")["held"] if written else None:
         case {"value": number}:
@@ -384,23 +384,23 @@ _FROM = {
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, at the shaker",
 }
 Confirmed = Callable[[str], str]
-"""Asks whether a wire connects two ends. The page shows the answer; an empty answer ends the procedure."""
+"""Asks whether a wire connects two ends; an empty answer ends the procedure. The page shows the answer."""
 
 
 @dataclass(frozen=True)
 class DayPage:
-    """Page that records a first day."""
+    """Page that documents the first day at a bench."""
 
     text: str
-    """Text in Markdown."""
+    """Text of the page in Markdown."""
     verdict: Verdict
-    """Worst verdict of the checks."""
+    """Worst verdict of the bench checks."""
 
 
 def first_day(
     bench: Bench, config: Path, operator: str, confirmed: Confirmed, switch: StopSwitch | None = None
 ) -> DayPage:
-    """Confirm wires, measure the noise floor, play a first 5 mVpp, check the bench; return the page.
+    """Confirm wires, measure the noise floor, play a first 5 mVpp sine, check the bench; return the page.
 
     The check at its usual level is made and stored only if the check at 5 mVpp has no FAIL.
 

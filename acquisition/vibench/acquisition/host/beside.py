@@ -13,13 +13,13 @@ from ..stopping.stop import MEMORY_RESERVE
 class Beside:
     """Thread that runs jobs in order; it is started before anything is driven.
 
-    A later start could hang: if memory runs out while a thread starts, CPython waits for it forever.
+    A later start could hang: if memory runs out while a thread starts, CPython waits for that thread forever.
     """
 
     def __init__(self, name: str) -> None:
         self._jobs: deque[Callable[[], None]] = deque()
         self.is_busy = self._is_closing = False
-        """Whether a job is running or queued."""
+        """Whether a job is running or queued in the helper thread."""
         self._changed = Condition()
         with suppress(RuntimeError):  # if the system gives no thread, jobs are not done
             Thread(target=self._run, name=name, daemon=True).start()

@@ -27,10 +27,10 @@ def need_extra(extra: str) -> None:
 
 
 def need_space(megabytes: int, advice: str = "") -> None:
-    """Require address space for the libraries and their threads: without it they hang or abort.
+    """Require address space for the libraries and their threads: with too little, they hang or abort.
 
     ``megabytes`` is the space [MB]. Raises ConfigurationError if the process has a lower limit; ``advice`` is
-    the last sentence of the error.
+    the last sentence of that error.
     """
     if sys.platform != "win32" and find_spec("resource") is not None:
         import resource  # noqa: PLC0415 - POSIX only

@@ -3,7 +3,7 @@
 from unicodedata import category
 
 LONGEST_CLAUSE = 400
-"""Largest number of characters of a value in an error; otherwise an error could be as long as a file."""
+"""Largest number of characters of a value quoted in an error; a quoted file could be very long."""
 
 
 def printable(text: str) -> str:

@@ -19,7 +19,7 @@ from ._protocols import Digitizer
 
 
 class PlugInKind(StrEnum):
-    """Kind of a plug-in; the value is the group of its entry point."""
+    """Kind of a plug-in; its value is the group of its entry point."""
 
     GENERATOR = "vibench.generators"
     DIGITIZER = "vibench.digitizers"
@@ -35,7 +35,7 @@ class PlugInKind(StrEnum):
     DRIVE = "vibench.drives"
     """Source that plays instead of the generator, named after its table in the hardware configuration."""
     VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
-    """Simulation of such a source, named after the same table."""
+    """Simulation of such a source, named after the same table of the hardware configuration."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
@@ -151,10 +151,10 @@ _ADVICE = (
 
 
 class Guarded:
-    """Wrapper of an instrument or driver that returns only values that its protocol allows."""
+    """Wrapper of an instrument or driver that passes on only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
-        """Wrap ``held``; errors contain ``name``: ``"'plain_scpi' of vibench.generators"``."""
+        """Wrap ``held``; errors name it as ``name``: ``"'plain_scpi' of vibench.generators"``."""
         self._held = held
         self._promise = promise
         self._name = name

@@ -27,7 +27,7 @@ class Identity:
     serial: str
     firmware: str
     reply: str
-    """The whole reply, unchanged."""
+    """The instrument's whole reply, unchanged."""
     origin: str = ""
     """``"simulated"`` or ``"imported"`` if the instrument reports such samples; otherwise empty."""
 
@@ -56,7 +56,7 @@ class FoundDevice:
 
 @dataclass(frozen=True)
 class Overload:
-    """Range of samples in which an input reaches 95 % of its full scale."""
+    """Range of samples in which an input reaches 95 % of its full scale or more."""
 
     channel: str
     """Role of the channel, ``"m0_velocity"`` for example."""
@@ -99,7 +99,7 @@ class SensorFacts:
     name: str
     serial: str = ""
     delay_s: Annotated[float, Field(ge=0)] = 0.0
-    """Delay of the output voltage behind the quantity [s]."""
+    """Delay from the quantity to the output voltage [s]."""
     calibrated: date | None = None
 
 
@@ -125,7 +125,7 @@ class Sweep:
     spacing: Spacing = Spacing.LINEAR
 
     def cycles(self, time_s: Time) -> Time:
-        """Return the number of cycles since the sweep began, at one or several times."""
+        """Return the number of cycles since the sweep began, at one or several times [s]."""
         match self.spacing:
             case Spacing.LINEAR:
                 rate = (self.stop_hz - self.start_hz) / self.duration_s
@@ -172,10 +172,10 @@ class FunctionGenerator(Protocol):
         """Smallest and largest amplitude that this bench allows, peak to peak [V]."""
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output keeps its state."""
+        """Set up a sine. The output stays on or off as it was."""
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Load one period of values and select it; -1 to 1 is the full range ``amplitude_vpp``."""
+        """Load one period of values and select it; values of -1 and 1 are the ends of ``amplitude_vpp``."""
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Set up a sweep: a sine at the start frequency, which `trigger` sweeps to the stop frequency.
@@ -191,10 +191,10 @@ class FunctionGenerator(Protocol):
         """Change the peak-to-peak amplitude during the drive."""
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each `trigger`, with 0 V before and after."""
+        """Play ``cycles`` periods at each call of `trigger`, with 0 V before and after them."""
 
     def trigger(self) -> None:
-        """Fire an armed burst, or begin a sweep."""
+        """Start an armed burst or sweep."""
 
     def end_burst(self) -> None:
         """Play continuously, without triggers."""
@@ -243,7 +243,7 @@ class Digitizer(Protocol):
 
     @property
     def waiting_samples(self) -> int:
-        """Number of converted samples of every channel that can be read without waiting."""
+        """Number of samples per channel that can be read without waiting."""
 
     def stop(self) -> None:
         """End sampling. May be called at any time."""
@@ -253,7 +253,7 @@ class Digitizer(Protocol):
 
 
 class IdleOutput(StrEnum):
-    """Voltage of an output that receives no further samples."""
+    """Voltage of an output that receives no more samples."""
 
     ZERO = "goes to zero volts"
     HELD = "holds its last value"
@@ -290,7 +290,7 @@ class AnalogOutput(Protocol):
         """
 
     def arm(self) -> None:
-        """Prepare to start with the digitizer, once the first samples are written; both begin at sample 0."""
+        """Prepare to start with the digitizer, after the first samples are written. Sample 0 is common."""
 
     def stop(self) -> None:
         """Go to zero volts at once. May be called at any time; the next `write` begins a new stream."""
@@ -300,14 +300,14 @@ class AnalogOutput(Protocol):
 
 
 class RealTimeController(Protocol):
-    """Instrument with its own feedback loop, which plays instead of the generator."""
+    """Instrument with its own feedback loop, which drives the amplifier instead of the generator."""
 
     @property
     def identity(self) -> Identity:
         """Identity of the controller."""
 
     def close(self) -> None:
-        """Silence the drive and close the connection. May be called at any time."""
+        """Silence the drive and close the connection to the controller. May be called at any time."""
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
