@@ -26,7 +26,7 @@ class Dwell(FixedSine):
     wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
     kind: Literal["dwell"] = "dwell"
     settle_s: NonNegativeFloat = 3.0
-    """Waiting time for the transient to die out [s]."""
+    """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
@@ -35,7 +35,7 @@ class Dwell(FixedSine):
     """Duration of each tone of ``lead_in`` [s]."""
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
-        """Return a dwell at another frequency or setting, with this dwell's tone added to its lead-in."""
+        """Return a dwell at another frequency or setting; this dwell's tone extends its lead-in."""
         changed = {
             "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,
@@ -44,7 +44,7 @@ class Dwell(FixedSine):
         return type(self).model_validate(self.model_dump() | changed)
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn]:
-        """Return this dwell with the lead-in ``way``, and its tone for the lead-in of the next dwell."""
+        """Return this dwell with the lead-in ``way``, and this dwell's tone for the next dwell's lead-in."""
         return self.model_copy(update={"lead_in": way, "lead_s": lead_s}), self._tone
 
     @property
@@ -58,7 +58,7 @@ class Dwell(FixedSine):
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The highest frequency of lead-in and dwell [Hz]."""
+        """The highest frequency among the tones of lead-in and dwell [Hz]."""
         return max(self.frequency_hz, *(tone.frequency_hz for tone in self.lead_in), 0.0)
 
     @property

@@ -12,7 +12,7 @@ Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
 """Displacement to be held [m]. The bounds only catch wrong units: no sensor or shaker reaches them."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
-"""Acceleration to be held [m/s2]. The bounds only catch wrong units: no shaker reaches 10 000 g."""
+"""Acceleration to be held [m/s2]. The bounds only catch wrong units, as no shaker reaches 10 000 g."""
 
 
 class Settling(FrozenModel):
@@ -30,11 +30,11 @@ class Settling(FrozenModel):
     longest_period: int = Field(default=8, ge=1, le=32)
     """Longest period of the motion that is searched for, in drive periods."""
     aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
-    """Number of drive periods over which a motion that does not repeat must have constant statistics."""
+    """Number of drive periods over which a non-repeating motion must have constant statistics."""
     shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
-    """Shortest wait at every frequency [s]."""
+    """Shortest wait for settling at every frequency [s]."""
     longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
-    """Longest wait at every frequency [s]; the motion is then recorded as not settled."""
+    """Longest wait at every frequency [s]; after this wait, the motion is recorded as not settled."""
 
     @model_validator(mode="after")
     def _waits_in_order(self) -> Self:
@@ -58,9 +58,9 @@ class BaseLevel(FrozenModel):
     displacement_m: HeldMetres | None = None
     """Peak displacement of the fundamental at every frequency [m]; or give ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
-    """Allowed relative deviation of the measured level from the level to be held."""
+    """Allowed deviation of the measured level from the level to be held, relative to that level."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """Largest factor by which the setting changes at once."""
+    """Largest factor by which one correction changes the amplitude setting."""
 
     @model_validator(mode="after")
     def _one_motion(self) -> Self:
@@ -75,7 +75,7 @@ class BaseLevel(FrozenModel):
 
     @property
     def text(self) -> str:
-        """The level with its unit."""
+        """The held level as text with its unit."""
         if self.displacement_m is not None:
             return f"{1e6 * self.displacement_m:g} µm"
         return f"{self.acceleration_m_per_s2:g} m/s²"
@@ -92,7 +92,7 @@ class JumpSearch(FrozenModel):
     """Criteria by which a change between two steps counts as a jump, and the accuracy of its location."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
-    """A change of Response II (fundamental of m0 over that of the base) by a larger factor is a jump."""
+    """Change of Response II (fundamental of m0 over base) above this factor counts as a jump."""
     resolution_hz: PositiveFloat = 0.25
     """Largest allowed distance between the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)

@@ -17,7 +17,7 @@ Decibels = Annotated[float, Field(gt=0, le=40)]
 
 
 class SpectrumPoint(FrozenModel):
-    """One corner of a spectrum, which is a straight line in log-log axes between corners."""
+    """One corner of a spectrum. Between corners, the spectrum is a straight line in log-log axes."""
 
     frequency_hz: FrequencyHz
     density: Annotated[float, Field(ge=1e-30, le=1e10)]
@@ -28,7 +28,7 @@ Spectrum = Annotated[tuple[SpectrumPoint, ...], Field(min_length=1, max_length=1
 
 
 def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Samples:
-    """Return the densities of ``spectrum`` at ``frequency_hz``; constant beyond the first and last corner."""
+    """Return the power densities of ``spectrum`` at ``frequency_hz``; constant beyond its end corners."""
     corners_hz, densities = zip(*((each.frequency_hz, each.density) for each in spectrum), strict=True)
     return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(corners_hz), np.log(densities))))
 
@@ -54,7 +54,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     """Largest power spectral density of m0's velocity, at its corners [(m/s)2/Hz]. The base spectrum is
     lowered (notched) where m0 would exceed it; if empty, there is no limit."""
     resolution_hz: PositiveFloat = 4.0
-    """Bandwidth over which densities and gains are averaged [Hz]."""
+    """Bandwidth over which spectral densities and gains are averaged [Hz]."""
     equalisations: int = Field(default=4, ge=1, le=100)
     """Number of realisations that only equalise the drive, before the first realisation with results."""
     start_db: float = Field(default=-12.0, ge=-60, le=0)
@@ -79,7 +79,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def density(self) -> Samples:
-        """Density of the spectrum at each spectral line [(m/s2)2/Hz]."""
+        """Power spectral density of the spectrum at each spectral line [(m/s2)2/Hz]."""
         return density_at(self.spectrum, self.lines * self.repetition_hz)
 
     @property
@@ -94,7 +94,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """Description of the rms level held and the largest setting, for display."""
+        """Text on the held rms level and the largest setting, for display."""
         return f"base held at {self.rms_m_per_s2:.3g} m/s² rms, at most {self.amplitude_vpp:g} Vpp"
 
     @property

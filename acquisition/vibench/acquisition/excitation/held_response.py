@@ -27,9 +27,9 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     response_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 that is held: relative to the base, or absolute."""
     tolerance: Share = 0.01
-    """Allowed relative deviation from ``response_m``; two measurements in a row must meet it."""
+    """Allowed relative deviation from ``response_m``, which two measurements in a row must meet."""
     most_change: float = Field(default=1.25, gt=1, le=4)
-    """Largest factor by which the setting changes at once."""
+    """Largest factor by which one correction changes the amplitude setting."""
     start_share: Share = 0.02
     """First setting at the first frequency, as a fraction of ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
@@ -44,7 +44,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """Description of the held response and the largest setting, for display."""
+        """Text on the held response and the largest setting, for display."""
         words = f"{self.response_of.value} motion of m0 held at {1e6 * self.response_m:g} µm"
         return f"{words}, at most {self.amplitude_vpp:g} Vpp"
 

@@ -22,13 +22,13 @@ class HeldSweep(MovingSine, AbstractFeedback):
     base_level: BaseLevel
     """Level of the base to be held."""
     average_s: PositiveFloat = 0.5
-    """Averaging time against random errors and for the check of the level [s]; trends are followed faster."""
+    """Averaging time of the level against random errors [s]; steady changes are followed faster."""
     settling: Settling = Settling()
     """Criteria for settled motion before the sweep."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry: the level of the base to be held."""
+        """One entry: the base level that feedback holds."""
         return (self.base_level,)
 
     @property

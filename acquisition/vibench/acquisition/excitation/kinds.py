@@ -45,7 +45,7 @@ _LACKING: dict[str, str] = {}
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:
-    """Yield the plan classes that installed packages add; note those that fail to load in `_LACKING`."""
+    """Yield the plan classes that installed packages add; note in `_LACKING` those that fail to load."""
     taken = {word for plan in get_args(_Ours) for word in _words(plan)}
     for name in plug_in_names(PlugInKind.EXCITATION):
         try:
@@ -122,7 +122,7 @@ class ExcitationKind:
 
     @property
     def is_feedback(self) -> bool:
-        """Whether the next step depends on measured values."""
+        """Whether the next step of the excitation depends on measured values."""
         return issubclass(self.plan, AbstractFeedback)
 
 

@@ -11,7 +11,7 @@ from .steps import Samples
 USUAL_POINTS = 8192
 """Default number of points in one period."""
 FEWEST_POINTS, MOST_POINTS = 64, 65_536
-"""Bounds on the number of points in a plan; the generator's memory may set narrower ones."""
+"""Bounds on the number of points in a plan; the generator's memory may set narrower bounds."""
 CANDIDATES = 20
 """Number of sets of random phases that are tried; the set with the lowest crest factor is played. 20 sets
 lower the crest factor of 1000 lines from about 3.8 to about 3.3; more sets hardly lower it further.
@@ -62,7 +62,7 @@ def flat_periods(
 
     Every line is divided by the droop of the hold, so that the played spectrum is flat. Each realisation uses
     the best of ``CANDIDATES`` sets of phases, by crest factor. All have the same rms value, because a
-    nonlinear specimen needs the same level in each; only the one with the highest peak reaches 1.
+    nonlinear specimen needs the same level in each; only the waveform with the highest peak reaches 1.
 
     Returns
     -------
@@ -85,8 +85,8 @@ def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: 
 
 
 def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisation: int) -> Samples:
-    """Return one period whose lines, after the hold, have the peak amplitudes ``peaks``.
-    Its phases are the set with the lowest crest factor of those tried.
+    """Return one period whose lines, after the hold, have the peak amplitudes ``peaks``. Of several random
+    sets of phases, the set with the lowest crest factor is used.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None
 
 
 def require_lines(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
-    """Refuse a band without lines; raises ConfigurationError."""
+    """Refuse a band without spectral lines; raises ConfigurationError."""
     if len(lines) == 0:
         raise ConfigurationError(
             f"no harmonic of {repetition_hz:g} Hz is in the band up to {stop_hz:g} Hz; "

@@ -53,7 +53,7 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Largest number of realisations in one measurement; all are computed together, for a common rms."""
+"""Largest number of realisations in one measurement, which are computed together for a common rms."""
 
 
 class PeriodicNoise(BandNoise):
@@ -125,6 +125,6 @@ class PeriodicNoise(BandNoise):
             )
 
     def shown_steps(self) -> Iterator[Step]:
-        """Yield one step: one period of the first realisation."""
+        """Yield one step for a preview: one period of the first realisation."""
         first = next(self.steps())
         yield Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)

@@ -41,7 +41,7 @@ class SignalPreview:
     frequency_hz: Samples
     """Frequencies of the spectrum, shape (samples // 2 + 1,) [Hz]."""
     spectrum_v: Samples
-    """Peak amplitude of the sine at each frequency of ``frequency_hz``, same shape [V]."""
+    """Peak amplitude of the spectral line at each frequency of ``frequency_hz``, same shape [V]."""
     rms_v: float
     peak_v: float
     duration_s: float
@@ -137,15 +137,15 @@ class AbstractExcitation(FrozenModel, ABC):
     """Results whose uncertainty can end the recording, see `vibench.acquisition.plan.Until`."""
 
     amplitude_vpp: AmplitudeVpp
-    """Amplitude setting as shown on the generator's panel, peak to peak [V]."""
+    """Amplitude setting as shown on the generator's panel [Vpp]."""
 
     @abstractmethod
     def steps(self) -> Iterator[Step]:
         """Yield the steps that the generator plays, in chronological order."""
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield the steps with which limits are checked.
-        These are the planned steps, or larger signals that feedback may play.
+        """Yield the steps with which limits are checked. These are the planned steps, or larger signals that
+        feedback may reach.
         """
         return self.steps()
 
@@ -166,11 +166,11 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def level_text(self) -> str:
-        """Description of the level of the drive or of the base, for display."""
+        """Text on the level of the drive or of the base, for display."""
         return f"{self.amplitude_vpp:g} Vpp"
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return how the level at a frequency of the band is specified: here, by the amplitude setting."""
+        """Return how the level at a frequency of the band is specified; here by the amplitude setting."""
         del frequency_hz
         return RelativeSetting(1.0)
 
@@ -191,12 +191,12 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def approach(self) -> Approach:
-        """Start of the motion: at the neighbouring frequency if the frequency moves, otherwise at rest."""
+        """Start of the motion: the neighbouring frequency's motion if the frequency moves, else rest."""
         return Approach.REST
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at each frequency of a drive that moves on without a pause [s]; otherwise None."""
+        """Time at each frequency, for a drive that changes frequency without a pause [s]; otherwise None."""
         return None
 
     @property
@@ -210,19 +210,19 @@ class AbstractExcitation(FrozenModel, ABC):
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
-        """Return the same excitation in ``direction``; None if its kind does not offer that direction."""
+        """Return the same excitation in ``direction``; None if its kind has no such direction."""
         del direction
         return None
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Return this excitation with the lead-in ``way``, and its own tone; None without lead-ins."""
+        """Return this excitation with the lead-in ``way``, and its tone; None if it has no lead-in."""
         del way, lead_s
         return None
 
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Duration of all steps, including settling but not ramps [s]; with feedback the maximum."""
+        """Duration of all steps, including settling but not ramps [s]; the maximum if feedback decides."""
 
     @property
     def stretches(self) -> int:
@@ -231,7 +231,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def highest_frequency_hz(self) -> float:
-        """Highest frequency of the plan, which the converter must be able to sample [Hz]."""
+        """Highest frequency of the plan, which the converter's sample rate must allow [Hz]."""
         return self.band_hz[1]
 
     def shown_steps(self) -> Iterator[Step]:
@@ -273,7 +273,7 @@ class FixedSine(AbstractExcitation):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """From an octave below the sine to an octave above it [Hz]."""
+        """Band from an octave below the sine to an octave above it [Hz]."""
         return around(self.frequency_hz)
 
     @property
@@ -292,17 +292,17 @@ class AbstractFeedback(AbstractExcitation):
     @property
     @abstractmethod
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; if empty, ``amplitude_vpp`` stays constant."""
+        """Levels of the base to be held, in the order played; if empty, the setting is constant."""
 
     @property
     def level_text(self) -> str:
-        """Description of the levels held and the largest setting, for display."""
+        """Text on the held levels and the largest setting, for display."""
         most = super().level_text
         words = [level.text for level in self.held_levels]
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return the highest level that is held; if no level is held, the amplitude setting."""
+        """Return the highest base level that is held; if none is held, the amplitude setting."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 

@@ -13,7 +13,7 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor by which the setting changes at once; large, as the loop has only 150 periods per level."""
+"""Largest factor per change of the setting; large, as the loop has only 150 periods per level."""
 
 
 class ResonanceTracking(AbstractFeedback):
@@ -66,13 +66,13 @@ class ResonanceTracking(AbstractFeedback):
     accelerations_m_per_s2: tuple[HeldMetresPerS2, ...] = Field(min_length=1, max_length=100)
     """Peak accelerations of the fundamental of the base motion, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
-    """Allowed relative deviation of the measured level."""
+    """Allowed deviation of the measured base level, relative to the planned level."""
     settling: Settling = Settling()
     """Criteria for settled motion."""
     widest_step_hz: PositiveFloat = 1.0
     """Largest frequency step of the search; smaller than the distance to the next antiresonance [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
-    """Largest number of frequencies tried for one level."""
+    """Largest number of frequencies at which one level's search may measure."""
     most_periods: int = Field(default=150, ge=30, le=MOST_PERIODS)
     """Largest number of drive periods of the phase-locked loop for one level."""
     flank_pairs: int = Field(default=3, ge=0, le=10)
@@ -100,7 +100,7 @@ class ResonanceTracking(AbstractFeedback):
 
     @property
     def is_fundamental(self) -> bool:
-        """Whether m0 resonates at the frequency of the drive."""
+        """Whether the tracked resonance of m0 is at the frequency of the drive."""
         return self.harmonic == self.subharmonic == 1
 
     def motion(self, harmonics: Sequence[complex]) -> complex:

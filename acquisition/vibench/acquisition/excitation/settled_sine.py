@@ -32,11 +32,11 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
-    """Longest search for one jump [s]; the frequency interval reached by then is kept."""
+    """Longest search for one jump [s]; after it, the last frequency interval counts as the result."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry, the level of the base to be held; empty if the setting is constant."""
+        """One entry, the level of the base to be held; empty if the amplitude setting is constant."""
         return () if self.base_level is None else (self.base_level,)
 
     @property

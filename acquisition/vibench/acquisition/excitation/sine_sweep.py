@@ -37,13 +37,13 @@ class SweptBy(StrEnum):
     """Device that changes the frequency during a sweep."""
 
     COMPUTER = "computer"
-    """The computer changes it in steps; possible with any generator."""
+    """The computer changes the frequency in steps; possible with any generator."""
     GENERATOR = "generator"
-    """The generator changes it without steps, if it has a sweep function; a trigger starts the sweep."""
+    """The generator changes the frequency without steps, if it has a sweep function; a trigger starts it."""
 
 
 MOST_SWEEP_STEPS = 1_000_000
-"""Largest number of steps in one sweep: 28 hours at the usual 0.1 s."""
+"""Largest number of steps in one sweep: 28 hours at the usual 0.1 s per step."""
 
 
 class MovingSine(AbstractExcitation):
@@ -64,7 +64,7 @@ class MovingSine(AbstractExcitation):
     spacing: Spacing = Spacing.LINEAR
     """Course of the frequency over time."""
     step_s: PositiveFloat = 0.1
-    """Time at one frequency [s]; the last step may be shorter."""
+    """Time at one frequency [s]. The last step may be shorter."""
 
     @model_validator(mode="after")
     def _sweep_moves(self) -> Self:
@@ -98,7 +98,7 @@ class MovingSine(AbstractExcitation):
 
     @property
     def approach(self) -> Approach:
-        """Direction from which the motion reaches each frequency: that of the sweep."""
+        """Direction from which the motion reaches each frequency: the direction of the sweep."""
         return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
 
     def turned(self, direction: Direction) -> Self | None:
@@ -186,7 +186,7 @@ class SineSweep(MovingSine):
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """Return one step per ``step_s``, all in one segment; the generator's own sweep is a single step."""
+        """Return one step per ``step_s``, all in one segment; the generator's own sweep is one step."""
         if self.swept_by is SweptBy.GENERATOR:
             segment = self.segment_with(self.hold.value)
             return iter((Step(self.course, self.settle_s, self.duration_s, segment),))

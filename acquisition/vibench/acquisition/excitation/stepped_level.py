@@ -15,8 +15,8 @@ from .steps import Direction, Segment, Step, Tone
 class SteppedLevel(FixedSine):
     """A sine whose level rises and falls in steps; each step is recorded after it has settled.
 
-    The phase is continuous from one level to the next, so that the specimen stays on its branch. It jumps up
-    at one level and falls back at a lower one; between these levels both motions are possible.
+    The phase is continuous from one level to the next, so that the specimen stays on its branch. The motion
+    jumps up at one level and falls back at a lower one; between these levels both motions exist.
     ``amplitude_vpp`` is the highest level.
     """
 
@@ -24,7 +24,7 @@ class SteppedLevel(FixedSine):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["stepped_level"] = "stepped_level"
     lowest_vpp: AmplitudeVpp
-    """Lower bound of the levels, reached only by whole steps down from ``amplitude_vpp`` [Vpp]."""
+    """Lower bound of the levels. Only whole steps down from ``amplitude_vpp`` reach it [Vpp]."""
     step_vpp: PositiveFloat
     """Difference of neighbouring levels [Vpp]; keep it small, because each change disturbs the motion."""
     direction: Direction = Direction.UP_THEN_DOWN

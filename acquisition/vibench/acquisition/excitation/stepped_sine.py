@@ -13,7 +13,7 @@ from .plan import AbstractExcitation, Family, FrequencyHz, around
 from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
-"""Largest number of steps in one recording; its table of segments also lists ramps and check."""
+"""Largest number of steps in one recording; the recording's table of segments also lists ramps and check."""
 
 
 class FrequencyGrid(FrozenModel):
@@ -87,7 +87,7 @@ class FrequencySteps(AbstractExcitation):
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency; for a single one, an octave below and above it [Hz]."""
+        """Lowest and highest frequency; for a single frequency, an octave below and above it [Hz]."""
         low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
         return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
 
@@ -112,11 +112,11 @@ class FrequencySteps(AbstractExcitation):
 
     @property
     def planned_wait_s(self) -> float:
-        """Planned wait before the recording of each step [s]; 0 if feedback decides when the wait ends."""
+        """Planned wait before the recording of each step [s]; 0 if feedback decides how long to wait."""
         return 0.0
 
     def segment(self, frequency_hz: float, direction: str) -> Segment:
-        """Return the segment of a step; ``direction`` distinguishes the two steps at a turning point."""
+        """Return the segment of a step; ``direction`` distinguishes two steps at the same frequency."""
         return Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
 
     def steps(self) -> Iterator[Step]:
@@ -147,5 +147,5 @@ class SteppedSine(FrequencySteps):
 
     @property
     def planned_wait_s(self) -> float:
-        """The settling time [s]."""
+        """The settling time before each recording [s]."""
         return self.settle_s

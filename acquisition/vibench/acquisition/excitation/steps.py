@@ -33,8 +33,8 @@ class Waveform:
     """One period, repeated, as in a generator's memory; each value is held until the next."""
 
     values: Samples
-    """Values from -1 to 1; the full range is the amplitude setting. The largest magnitude may be below 1:
-    realisations of a noise have the same rms value, and only the one with the highest peak reaches 1."""
+    """Values from -1 to 1; the full range is the amplitude setting. The peak may be below 1: realisations of
+    a noise have the same rms value, and only the realisation with the highest peak reaches 1."""
     repetition_hz: float
 
 
@@ -95,7 +95,7 @@ class Step:
 
     @property
     def duration_s(self) -> float:
-        """Time for settling and recording together [s]."""
+        """Total time for settling and recording [s]."""
         return self.settle_s + self.record_s
 
 
@@ -125,7 +125,7 @@ class Direction(StrEnum):
 
 
 class Approach(StrEnum):
-    """Start of the motion at each frequency; where several motions exist, it selects one."""
+    """Start of the motion at each frequency, which selects one of several possible motions."""
 
     REST = "from rest"
     UP = "swept upwards"

@@ -17,7 +17,7 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per seed: a small number starts faster at any sample, a large one draws faster."""
+"""Number of random values per seed: few values make any sample quick to reach, many draw faster."""
 TRANSITION_WIDTH = 0.5
 """Transition width of the filter divided by the band's lower edge; the edges are its -6 dB points."""
 HAMMING_WIDTH = 3.3
@@ -77,13 +77,13 @@ def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> S
 class StreamedNoise(BandNoise):
     """Band-limited Gaussian noise of any length, on an analogue output.
 
-    The rms value is half the amplitude setting over the crest factor of 4.5. Edges are -6 dB points.
+    The rms value is half the amplitude setting over the crest factor of 4.5. The band edges are -6 dB points.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.NOISE,)
     kind: Literal["streamed_noise"] = "streamed_noise"
     settle_s: NonNegativeFloat = 3.0
-    """Waiting time for the transient to die out [s]."""
+    """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
     seed: int = Field(default=1, ge=0)

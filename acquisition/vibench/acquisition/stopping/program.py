@@ -59,9 +59,9 @@ class KeptStops:
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
-        """Stops that are being carried out, under their first names."""
+        """Stops that are being carried out, by the names that their files had first."""
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Reserved file descriptor; it is closed so that a reason can be read even if no more are free."""
+        """Reserved file descriptor; closing it lets a reason be read even if no more are free."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
@@ -90,7 +90,7 @@ class KeptStops:
     def confirm(self) -> None:
         """Rename obeyed stop files once no drive is on; until then, update their times as a sign of life.
 
-        Files that somebody has removed are made again.
+        If somebody has removed such a file, write it again.
         """
         is_advancing = DRIVES_ON.take_advance()
         for path in tuple(self._taken):
@@ -180,18 +180,18 @@ class Program(BaseModel):
     process_start: str = ""
     """Start time of the process, from the system. Process numbers are reused; number and start are unique."""
     computer: str = ""
-    """Name of the computer; a state folder may be in a home folder that several computers share."""
+    """Name of the computer; several computers may share a home folder with the state folder."""
     rigs: tuple[str, ...] = ()
     """Generators of the rigs whose benches the process has opened."""
 
     @property
     def place(self) -> Place:
-        """Where the program runs: here, or in another container or computer that shares the state folder."""
+        """Place of the program: here, or another container or computer that shares the state folder."""
         return place_of(self.process_start)
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process is alive, whether it responds or not."""
+        """Whether the process is alive, even if it does not respond."""
         if self.place is Place.HERE:
             return is_process(self.pid, self.process_start)
         try:
@@ -252,7 +252,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced the generator ``rig``: earlier programs left nothing on there."""
+    """Note that this process has silenced the generator ``rig``, also after earlier programs."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():
@@ -351,7 +351,7 @@ class _Reached:
             withdraw(entry[1])
 
     def announce_again(self) -> None:
-        """Announce the rigs that this process has opened since its announcement; ignore a failure."""
+        """Announce rigs that this process opened after its announcement; ignore a failure."""
         with self._changing, suppress(OSError):
             if self._inside:
                 self._announce(self._inside[0][1])
@@ -415,7 +415,7 @@ def _path(program: Program) -> Path:
 
 
 def _lock(path: Path) -> OpenFile | None:
-    """Return a file locked for as long as this process lives; None if that is impossible."""
+    """Return a file locked for as long as this process lives; None if the file cannot be locked."""
     try:
         file = OpenFile(path)
     except OSError:
@@ -470,7 +470,7 @@ LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SI
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """Signals that by default neither end nor suspend a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
-"""Signals that suspend a process, as Ctrl-Z does; a terminal sends the last two repeatedly."""
+"""Signals that suspend a process, as Ctrl-Z does; a terminal may send the last two repeatedly."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
 """Signals that are always handled; others are handled only if the program does not handle them itself."""
 
@@ -528,7 +528,7 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal, or its number for a real-time signal, which has no name."""
+    """Return the name of a signal, or its number for a real-time signal, real-time signals have no name."""
     known = {each.value: each.name for each in signal.Signals}
     return known.get(number, f"signal {number}")
 

@@ -19,7 +19,7 @@ class StopLevel(StrEnum):
     RAMP = "ramp"
     """Ramp down with the half-cosine ramp of the plan."""
     ABORT = "abort"
-    """Ramp down in three periods of the loaded shaker on its suspension: the shortest ramp without shock."""
+    """Ramp down in three periods of the loaded shaker on its suspension, the shortest ramp without shock."""
     OFF = "off"
     """Switch the output off at once, with a step."""
 
@@ -40,9 +40,9 @@ class Cause(StrEnum):
     """The Esc key, or the large stop button of the window."""
     KEYBOARD = "ctrl-c"
     TERMINATED = "terminated"
-    """The system ended the process."""
+    """The operating system ended the process."""
     VIEWER_GONE = "viewer gone"
-    """No request for too long in an attended run: the window froze, was closed or was killed."""
+    """No request for too long in an attended run: its window froze, was closed or was killed."""
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
@@ -51,7 +51,7 @@ class Cause(StrEnum):
     INSTRUMENT = "instrument"
     DISK = "disk"
     FAULT = "fault"
-    """Anything else that went wrong."""
+    """Any other fault."""
 
 
 LEVELS: Mapping[Cause, StopLevel] = {
@@ -112,7 +112,7 @@ class StopSwitch:
 
     @property
     def is_holding(self) -> bool:
-        """Whether the run is held; a stop ends a hold."""
+        """Whether the run is held (paused); a stop ends a hold."""
         return self._holding and not self._requests
 
     def ask(self, request: StopRequest) -> None:
@@ -123,11 +123,11 @@ class StopSwitch:
             self._requests.setdefault(request.level, request)
 
     def hold(self) -> None:
-        """Hold the run."""
+        """Hold (pause) the run."""
         self._holding = True
 
     def resume(self) -> None:
-        """End a hold."""
+        """End a hold, so that the run continues."""
         self._holding = False
 
     def mark(self, text: str) -> None:
@@ -135,7 +135,7 @@ class StopSwitch:
         self._marks.append(text)
 
     def take_marks(self) -> Iterator[str]:
-        """Yield each mark once, oldest first."""
+        """Yield each requested event once, oldest first."""
         while self._marks:
             yield self._marks.popleft()
 
@@ -144,7 +144,7 @@ class StopSwitch:
         self._changes.append(text)
 
     def take_changes(self) -> Iterator[str]:
-        """Yield each change once, oldest first."""
+        """Yield each reported change of the specimen once, oldest first."""
         while self._changes:
             yield self._changes.popleft()
 
@@ -177,7 +177,7 @@ class DrivesOn:
         self._has_advanced = True
 
     def take_advance(self) -> bool:
-        """Return whether a run has read blocks since the last call."""
+        """Return whether a run has read blocks since the last call of this method."""
         advanced, self._has_advanced = self._has_advanced, False
         return advanced
 
