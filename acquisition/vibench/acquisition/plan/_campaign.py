@@ -45,15 +45,15 @@ class RetryPolicy(FrozenModel):
 
 
 BYTES_PER_SAMPLE = 4
-"""A growing recording stores the converter's counts as 32-bit integers; the finished file is smaller."""
+"""Size of one sample in a growing recording: a 32-bit count of the converter [bytes]; less when finished."""
 
 
 class Campaign(FrozenModel):
     """Measurements to be made one after another, and sweeps after them.
 
     In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` values for all
-    excitations of one kind. Values given in a measurement or sweep have priority. The loaded campaign has all
-    values filled in. A file contains only values, nothing that could be executed.
+    excitations of one kind. Values given in a measurement or sweep override these defaults. The loaded
+    campaign has all values filled in. A file contains only values, nothing that could be executed.
     """
 
     name: Name
@@ -126,7 +126,7 @@ class Campaign(FrozenModel):
         return self
 
     def points(self) -> tuple[Point, ...]:
-        """Return all planned recordings: measurements, then sweeps; a scan repeats both at each point."""
+        """Return all planned recordings: measurements, then sweeps; a scan repeats them at each point."""
         listed = (Point(name, each) for each in self.measurements for name in _names(each))
         alone = (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
         return tuple(_at(place, each) for place in self._numbered_scan() for each in alone) or alone
@@ -143,7 +143,7 @@ class Campaign(FrozenModel):
 
     @property
     def places(self) -> int:
-        """Number of places at which each measurement is made: the points of a scan, or one."""
+        """Number of places at which each measurement is made: the number of scan points, or one."""
         return max(1, len(self.scan))
 
     def recording_names(self) -> tuple[str, ...]:
@@ -162,7 +162,7 @@ class Campaign(FrozenModel):
 
 
 def _at(place: ScanPoint, point: Point) -> Point:
-    """Return a point of a campaign, measured at the scan point ``place``."""
+    """Return a campaign's measurement as it is made at the scan point ``place``."""
     measurement = point.measurement.model_copy(update={"point": place})
     chain = f"{point.chain}-{place.name}" if point.chain else ""
     return Point(f"{point.name}-{place.name}", measurement, chain)

@@ -46,7 +46,7 @@ from ._schedule import (
 )
 
 _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
-"""Fields of a plan that determine the recorded signals."""
+"""Fields of a plan that determine which signals are recorded."""
 
 
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
@@ -76,7 +76,7 @@ USABLE_BANDWIDTH = 0.45
 
 
 class LimitSide(StrEnum):
-    """Side of a limit on which values are allowed."""
+    """Whether a limit is an upper or a lower bound of the allowed values."""
 
     AT_MOST = "at most"
     AT_LEAST = "at least"
@@ -88,7 +88,7 @@ class Consequence(StrEnum):
     REFUSED = "refused"
     """The plan is not played."""
     TOLD = "told"
-    """The plan is played. The excess is reported beforehand and, if it occurs, marked in the recording."""
+    """The plan is played. The excess is reported beforehand. If it occurs, the recording marks it."""
 
 
 _DIGITS = 6
@@ -97,7 +97,7 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """One predicted value and its limit."""
+    """A predicted value and its limit."""
 
     what: str
     value: float
@@ -106,7 +106,7 @@ class LimitCheck:
     source: str
     """Source of the limit."""
     remedy: str
-    """What to change when the limit is exceeded."""
+    """Advice on what to change when the limit is exceeded."""
     side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
     load: BaseQuantity | None = None
@@ -128,7 +128,7 @@ class LimitCheck:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the value is within the limit, apart from rounding errors."""
+        """Whether the value is within the limit, except for rounding errors."""
         return self.use <= 1 + 1e-9
 
     def complaint(self) -> str:
@@ -168,7 +168,7 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
 
 
 def shortest_ramp_s(rig: Rig) -> float:
-    """Return the shortest allowed ramp: three periods of the loaded shaker on its suspension [s]."""
+    """Return the shortest allowed ramp duration: three periods of the loaded shaker on its suspension [s]."""
     shaker = rig.shaker
     resonance = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     return float(RAMP_PERIODS / resonance)
@@ -380,7 +380,7 @@ def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck
 TOUCH_SHARE = 0.25
 """Largest p in a check, over the gap: a sine without a ramp overshoots, and impacts could then persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Frequencies within 3 % of the check's sine [Hz]: the model's resonances may be 3 % off (decision 0072)."""
+"""Frequencies within 3 % of the check's sine [Hz], because the model's resonances may be 3 % off (0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
@@ -389,7 +389,7 @@ def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
     Parameters
     ----------
     wanted_vpp
-        Setting that would be used without stops; never exceeded [Vpp].
+        Upper limit of the result, used if the gap were infinite [Vpp].
     rig
         Rig whose model includes the specimen on the table.
     """
@@ -424,8 +424,8 @@ def expected_under_check(
 ) -> ComplexArray:
     """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
-    Each phasor assumes resonances of the specimen shifted by up to 3 %. If p may come near a stop, phasors
-    for m1 bound to m2 are added.
+    Each phasor assumes another shift of the specimen's resonances, up to 3 %. If p may come near a stop,
+    phasors for m1 bound to m2 are added.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Predict the peak loads of a plan on the rig, with the rig's model.
 
 The prediction is exact while p stays inside the gap. Otherwise it gives the fundamental of a motion with p
-limited to the gap. Impacts add to this (amounts: tests/acquisition/plan/test_specimen_loads.py). The real
-motion is monitored during the run.
+limited to the gap. Impacts add to this fundamental (by how much:
+tests/acquisition/plan/test_specimen_loads.py). The real motion is monitored during the run.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -36,7 +36,7 @@ PASSED_LEVELS = np.arange(1, 17) / 16
 level may cause a larger motion.
 """
 BAND_POINTS = 2000
-"""Number of frequencies at which the mean square of streamed noise is computed."""
+"""Number of frequencies at which the power of streamed noise is computed."""
 
 Floats: TypeAlias = NDArray[np.float64]
 Transfer: TypeAlias = Callable[[Floats], ComplexArray]
@@ -194,7 +194,7 @@ class BaseMotion:
 
     amplitude_m: NDArray[np.float64]
     basis: str
-    """Source of the prediction."""
+    """Text on how the amplitude is predicted: level held, linear model, or sine of equal rms."""
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:

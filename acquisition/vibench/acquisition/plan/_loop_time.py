@@ -6,7 +6,7 @@ LOOK_S = 0.2
 """Averaging time of one measurement by the feedback loop [s]; longer if ten periods take longer."""
 LOOK_PERIODS = 10
 _COMMANDS = 2
-"""Number of commands that change the drive: amplitude and frequency."""
+"""Number of generator commands per change of the drive: amplitude and frequency."""
 
 
 def look_s(frequency_hz: float) -> float:

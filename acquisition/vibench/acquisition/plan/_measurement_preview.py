@@ -16,10 +16,10 @@ from ._loop_time import loop_time_s
 from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
-"""Largest number of samples of the displayed signal; a long sweep is displayed at a lower rate."""
+"""Largest number of displayed samples of the signal; a long sweep is displayed at a lower sample rate."""
 SPECTRUM_POINTS = 4000
 _LOWEST_RATE = 2.1
-"""Smallest number of samples per period at the highest frequency."""
+"""Smallest number of displayed samples per period at the highest frequency."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class MeasurementPreview:
     checks: tuple[LimitCheck, ...]
     """Limit checks, sorted by the used fraction of the limit, the largest first."""
     duration_s: float
-    """Duration from the first ramp to the last [s]."""
+    """Duration from the start of the first ramp to the end of the last ramp [s]."""
     size_bytes: int
     """Size of the recording while it grows [bytes]."""
     least_growth_time_s: float | None
@@ -47,7 +47,7 @@ class MeasurementPreview:
 
     @property
     def is_allowed(self) -> bool:
-        """Whether the measurement may be played."""
+        """Whether the limits of the rig allow the measurement."""
         return not any(check.forbids for check in self.checks)
 
     @property
@@ -91,7 +91,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
 
 
 def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:
-    """Return the strongest spectral line of each logarithmic frequency interval: frequencies, amplitudes."""
+    """Return frequency and amplitude of the strongest spectral line of each logarithmic interval."""
     frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
     if len(frequency_hz) <= SPECTRUM_POINTS:
         return frequency_hz, amplitude_v

@@ -43,7 +43,7 @@ FEWEST_STAIRS = 4
 
 
 class OnOverload(StrEnum):
-    """What the run does when an input or the vibrometer exceeds 95 % of its range."""
+    """What the run does when an input or the vibrometer reaches 95 % of its range."""
 
     FLAG = "flag"
     """Mark the samples in the recording and continue; nothing is damaged, and the analysis omits them."""
@@ -122,7 +122,7 @@ class Measurement(FrozenModel):
     ramp_step_s: PositiveFloat = 0.05
     """Duration of one step of a ramp, which is a staircase of amplitude settings [s]."""
     repeats: PositiveInt = Field(default=1, le=1000)
-    """Number of recordings of this measurement in a campaign."""
+    """Number of recordings that a campaign makes of this measurement."""
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None
@@ -213,12 +213,12 @@ CHECK_FREQUENCY_HZ = 160.0
 CHECK_FRACTION = 0.02
 """Amplitude of the bench check over the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Smallest setting of a check, to exceed hum; a plan with a lower setting reduces it further [Vpp]."""
+"""Smallest setting of a check, to exceed hum [Vpp]. If the plan's setting is lower, the check uses that."""
 CHECK_QUIET_S = 0.1
-"""Duration of the silence that a check measures before anything plays [s]."""
+"""Duration of the silence that a check measures before the first signal [s]."""
 CHECK_SETTLE_S = 0.2
 CHECK_LISTEN_S = 0.3
-"""Measuring time of the check: 48 periods [s]."""
+"""Measuring time of the check's sine: 48 periods [s]."""
 HUSH_S = 1.0
 """Silence before the first ramp of a measurement with feedback, to measure noise [s]."""
 CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
@@ -226,7 +226,7 @@ CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
 
 @dataclass(frozen=True)
 class Phase:
-    """Part of a run with one state and one signal."""
+    """Part of a run with a single state and a single signal."""
 
     state: RunState
     play: Play | None
@@ -262,7 +262,7 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
 
 
 def known_phases(measurement: Measurement) -> Iterator[Phase]:
-    """Yield the phases known before the measurement: all phases; none for a measurement with feedback."""
+    """Yield the phases known before the measurement: all phases, or none for a measurement with feedback."""
     return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
 
 
@@ -347,7 +347,7 @@ def half_cosine(progress: float) -> float:
 
 
 class DriveSource(StrEnum):
-    """Source of the signal at the amplifier."""
+    """Source of the signal at the amplifier: generator, analogue output or real-time controller."""
 
     GENERATOR = "function generator"
     OUTPUT = "analogue output"
@@ -363,7 +363,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; raises ConfigurationError if the rig does not have it."""
+    """Return the source that plays a measurement; raises ConfigurationError if the rig lacks this source."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:

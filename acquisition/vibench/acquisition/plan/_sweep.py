@@ -17,7 +17,7 @@ from ..host.toml_file import FrozenModel, complaints
 from ._schedule import Measurement, Name, Point
 
 MOST_VALUES = 10_000
-"""Largest number of values on one axis."""
+"""Largest number of values on one axis of a sweep."""
 
 
 class RangeSpacing(StrEnum):
@@ -26,7 +26,7 @@ class RangeSpacing(StrEnum):
     LINEAR = "linear"
     """Equal differences between values."""
     LOGARITHMIC = "logarithmic"
-    """Equal ratios between values; needs ``count``."""
+    """Equal ratios between values; requires ``count``."""
 
 
 class Range(FrozenModel):
@@ -83,7 +83,7 @@ def values_of(given: Values) -> tuple[float, ...]:
 
 
 MOST_POINTS = 10_000
-"""Largest number of points in one sweep; a larger number is taken for an error."""
+"""Largest number of points in one sweep; a larger number counts as a mistake."""
 LONGEST_NAME = 64
 
 
@@ -114,13 +114,13 @@ class _Place:
 
     values: Mapping[SweepAxis, Any]
     words: Mapping[SweepAxis, str]
-    """Each value as part of the point's name, in the order of the axes."""
+    """Part of the point's name for each value, in the order of the axes."""
 
     def name(self, sweep: str) -> str:
         return "-".join([sweep, *self.words.values()])
 
     def with_words(self, **words: str) -> "_Place":
-        """Return the same position with other name parts for some of its values."""
+        """Return the same position with other parts of the name for some of its values."""
         return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
@@ -151,7 +151,7 @@ class Sweep(FrozenModel):
 
     lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
     """Largest number of earlier points in a lead-in, counted from the nearest; if absent, the whole chain. A
-    shorter lead-in saves time, but reaches the wrong branch if it starts behind the jump."""
+    shorter lead-in saves time. If it starts behind the jump, it reaches the wrong branch."""
 
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:
@@ -283,7 +283,7 @@ class Sweep(FrozenModel):
 
 
 def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Yield the values of a chain in the order of ``way``, each with the name of its direction."""
+    """Yield the values of a chain in the order ``way``, each with the name of its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
     match way:

@@ -11,13 +11,13 @@ from ..host.toml_file import FrozenModel
 FEWEST_REALISATIONS = 4
 """Number of realisations before the first analysis; fewer do not suffice to estimate the scatter."""
 SHORTEST_S = 2.0
-"""Default time before the first analysis [s]; a shorter plan is analysed at its end."""
+"""Default time before the first analysis [s]; a shorter recording is analysed only at its end."""
 LOOK_FACTOR = 2.0**0.5
-"""Ratio of the recorded times at two successive analyses."""
+"""Factor from the recorded time of one analysis to that of the next."""
 
 
 Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
-"""Required accuracy of a result: half width of its 95 % interval over its value."""
+"""Required accuracy of a result: half the width of its 95 % interval, relative to its value."""
 
 
 class Until(FrozenModel):
@@ -37,7 +37,7 @@ class Until(FrozenModel):
     """Required bound on Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = SHORTEST_S
     """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; the planned time if
-    that is shorter."""
+    this is shorter."""
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":

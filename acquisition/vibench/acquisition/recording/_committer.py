@@ -23,16 +23,16 @@ from ._layout import Column, encode, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
-"""Commit interval [s]: half of the one second that a crash may lose; the other half is for a slow disk."""
+"""Commit interval [s]: half of the one second that a crash may lose. A slow disk has the other half."""
 CLOSING_PATIENCE_S = 30.0
-"""Time limit of the last commit [s]; writes to a disconnected network folder never return."""
+"""Time limit of the last commit [s]; writes to a disconnected network folder may hang forever."""
 QUEUE_PATIENCE_S = 2.0
-"""Time to wait for a full queue before the disk counts as too slow [s]."""
+"""Time to wait while the queue is full, before the disk counts as too slow [s]."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes that belong together, and the counters that mark them as valid afterwards."""
+    """Writes that belong together, and counters that are written afterwards to mark the data as valid."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """Offset in the file and data of each write."""
@@ -41,7 +41,7 @@ class Batch:
     reservations: tuple[tuple[int, int], ...] = ()
     """Offset and size of each range to reserve before the writes [bytes]."""
     samples: int = 0
-    """Samples per channel in this batch; they count towards the limit of the queue."""
+    """Samples per channel in this batch; the queue has a limit for their sum."""
 
 
 class Committer:
@@ -63,7 +63,7 @@ class Committer:
         self._counters: dict[int, int] = {}
         self._written_samples = 0
         self.committed_samples = 0
-        """Samples per channel that would survive a power cut now."""
+        """Samples per channel that would survive a power cut at this moment."""
         self._commit_due_s = time.monotonic() + interval_s
         self._thread = threading.Thread(target=self._run, name="recording committer", daemon=True)
         self._thread.start()
@@ -83,7 +83,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. May be called at any time.
 
-        Raises RecordingError when the disk does not respond; the disk must then not be accessed.
+        Raises RecordingError when the disk does not respond; then no further access to the disk is allowed.
         """
         with self._changed:
             self._is_closing = True
@@ -150,7 +150,7 @@ class Committer:
         return not is_last
 
     def _next(self) -> tuple[Batch | None, bool]:
-        """Return the next batch (None if a commit is due or none is left), and whether all is written."""
+        """Return the next batch (None if a commit is due, or none is left), and whether all is written."""
         with self._changed:
             # With nothing to commit, wait for the next batch without a time limit.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
@@ -212,7 +212,7 @@ class TableWriter:
         return self.replace(self.rows - 1, cells)
 
     def replace(self, row: int, cells: Sequence[Cell]) -> Batch:
-        """Return the writes that replace a row."""
+        """Return the writes that replace an existing row."""
         columns = self._places.table.columns
         writes = [
             (offset + row * np.dtype(column.dtype).itemsize, _raw(column, cell))
@@ -241,7 +241,7 @@ class OpenSegment:
     numbers_json: str
 
     def cells(self, last_sample: int, is_complete: int) -> tuple[Cell, ...]:
-        """Return the values of the segment's row in the table."""
+        """Return the values of the segment's row in the table of segments."""
         return (self.first_sample, last_sample, is_complete, self.label, self.numbers_json)
 
 
@@ -294,7 +294,7 @@ class Journal:
         return batch
 
     def gap(self, first_sample: int, last_sample: int) -> Batch:
-        """Add a range of lost samples."""
+        """Add a range of lost samples to the table of gaps."""
         return self._gaps.append((first_sample, last_sample))
 
     def overload(self, overload: Overload) -> Batch:

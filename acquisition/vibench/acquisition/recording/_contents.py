@@ -120,7 +120,7 @@ class ConfigurationFacts(_AbstractFacts):
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Return the file's validated attributes; ``found`` adds values that a growing file keeps in datasets."""
+    """Return the file's validated attributes; a growing file keeps some of them in datasets: ``found``."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 

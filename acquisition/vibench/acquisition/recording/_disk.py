@@ -15,7 +15,7 @@ from ..errors import RecordingError
 
 
 class Disk(Protocol):
-    """File operations of the committer."""
+    """File operations with which the committer writes a recording."""
 
     def write(self, offset: int, data: Buffer) -> None:
         """Write ``data`` at ``offset``, at least into the cache of the operating system."""
@@ -24,14 +24,14 @@ class Disk(Protocol):
         """Return when everything written so far would survive a power cut."""
 
     def reserve(self, offset: int, size: int) -> None:
-        """Reserve space, so that later writes there do not fail on a full disk."""
+        """Reserve space in the file, so that later writes to this range do not fail on a full disk."""
 
     def close(self) -> None:
         """Release the file."""
 
 
 class PositionedFile(OpenFile):
-    """File on a real disk; while open, a lock marks it as being recorded, but other programs may read it."""
+    """File on a real disk. A lock marks it as being recorded; other programs may still read it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -138,7 +138,7 @@ class TroubledDisk:
         self._disk.sync()
 
     def reserve(self, offset: int, size: int) -> None:
-        """Reserve space."""
+        """Reserve space at this range of the file."""
         self._trouble.meet()
         self._disk.reserve(offset, size)
 

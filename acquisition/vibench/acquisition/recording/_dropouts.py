@@ -22,16 +22,16 @@ Places = NDArray[np.int64]
 LONGEST_S = 4e-3
 """Longest drop-out that can be bridged [s]."""
 LOWEST_RATE_HZ = 20_000.0
-"""Lowest sample rate [Hz]; below it, an impact may take only a few samples, like a drop-out."""
+"""Lowest sample rate [Hz]; at lower rates, an impact may take as few samples as a drop-out."""
 _FAR = 60.0
-"""Smallest fourth difference at the edge of a drop-out, relative to the median."""
+"""Smallest fourth difference at the edge of a drop-out, relative to the median fourth difference."""
 _DETECTED = 6.0
-"""Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
+"""Smallest fourth difference in the ringing of the converter's filter, relative to the median one."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
 """Largest spacing of sharp corners that form one group (run) [s]."""
 _MOST_RUNS = 12
-"""Largest number of neighbouring runs that can be explained by drop-outs; more indicate motion."""
+"""Largest number of neighbouring runs that drop-outs can explain; more runs indicate real motion."""
 _FLANK_S = 1e-3
 """Length of the motion on each side with which a drop-out is compared [s]."""
 _LEAST_HELD = 8
@@ -45,11 +45,11 @@ DROPOUT_DELAY_S = LONGEST_S + 2.0 * _FLANK_S
 _OUTSTANDING = 8.0
 """Least distance of a drop-out from a smooth fit, relative to the rms residual of the fit in the flanks."""
 _JUMP = 4.0
-"""Smallest change between samples at the edge of a drop-out, relative to the largest in the flanks."""
+"""Smallest change between samples at the edge of a drop-out, relative to the largest change in the flanks."""
 _STEEP = 0.2
-"""Smallest change at the edge, over the largest distance from the fit; clipped peaks change more slowly."""
+"""Smallest change at the edge, relative to the largest distance from the fit; clipped peaks have less."""
 _MOST_PER_S = 400.0
-"""Largest number of drop-outs per second; more indicate motion."""
+"""Largest number of drop-outs per second; a larger number indicates real motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
 """Number of samples on each side that the linear prediction uses."""
@@ -59,7 +59,7 @@ _BLOCK_S = 1.0
 
 
 class Dropout(NamedTuple):
-    """Samples of a drop-out, including the ringing of the converter's filter."""
+    """Range of samples of a drop-out, including the ringing of the converter's filter."""
 
     first: int
     stop: int
@@ -104,7 +104,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
 
 
 def _held(velocity: Samples, longest: float) -> list[Dropout]:
-    """Return drop-outs in which the decoder holds one value; noise may hide the corners at their edges."""
+    """Return drop-outs in which the decoder repeats one value; noise may hide the corners at their edges."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
@@ -117,7 +117,7 @@ def _held(velocity: Samples, longest: float) -> list[Dropout]:
 
 
 def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
-    """Return the drop-outs; those less than a flank apart are joined."""
+    """Return the drop-outs; drop-outs less than a flank apart are joined."""
     joined: list[Dropout] = []
     for each in found:
         if joined and each.first - joined[-1].stop < flank:
@@ -166,8 +166,8 @@ def _apart(places: Places, distance: float) -> list[Places]:
 def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
     """Return drop-outs that together explain all of these runs of sharp corners; empty if impossible.
 
-    The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the two
-    edges of one drop-out could be taken for two drop-outs, with its constant level as motion between them.
+    The fewest drop-outs are chosen, then those with the smoothest motion around them. Otherwise the two edges
+    of one drop-out could be taken for two drop-outs, with the constant level between them as motion.
     """
     ends = [0, *(each.stop for each in runs)]
     begins = [*(each.first for each in runs), velocity.size]
@@ -257,7 +257,7 @@ def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int
 
 
 def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
-    """Return samples with the unknown ones filled by linear prediction; unchanged if too few are known."""
+    """Return samples with unknown samples filled by linear prediction; unchanged if too few are known."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
     windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))

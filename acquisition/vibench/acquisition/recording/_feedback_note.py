@@ -22,7 +22,7 @@ class Steadiness(StrEnum):
 
     PERIODIC = "periodic"
     APERIODIC = "aperiodic"
-    """Stationary without a short period: quasi-periodic or chaotic."""
+    """Statistically stationary without a short period: quasi-periodic or chaotic motion."""
     UNSETTLED = "unsettled"
 
 
@@ -62,7 +62,7 @@ class LockResult(StrEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> "LockResult | None":
-        """Return the member for a value of an older recording."""
+        """Return the member for a value written by an older version."""
         return cls.LOST if value == "not met within the tries" else None
 
 
@@ -90,14 +90,14 @@ class AbstractNote(BaseModel):
 
 
 class SettledNote(AbstractNote):
-    """Settled motion at a frequency."""
+    """Settled motion at a frequency, as recorded in a note."""
 
     kind: Literal["settled"] = "settled"
     frequency_hz: float
     """Commanded frequency [Hz]."""
     motion: Steadiness
     period: int
-    """Period of the motion in drive periods; 0 if it has none."""
+    """Period of the motion in drive periods; 0 if the motion is not periodic."""
     waited_s: float
     scatter: SixFigures
     noise: SixFigures
@@ -154,13 +154,13 @@ class LevelNote(AbstractNote):
 
 
 class ExcursionNote(AbstractNote):
-    """Part of a sweep in which the level was outside tolerance."""
+    """Part of a sweep in which the base level was outside tolerance."""
 
     kind: Literal["level"] = "level"
     from_hz: SixFigures
     to_hz: SixFigures
     worst: SixFigures
-    """Largest relative deviation, with sign."""
+    """Largest relative deviation of the level, with its sign."""
     level: Held
 
 
@@ -188,7 +188,7 @@ class ResonanceNote(AbstractNote):
     """Number of the level in the order played, from 0."""
     asked_m_per_s2: float
     frequency_hz: SixFigures | None
-    """Frequency of the phase resonance; None where it was not found."""
+    """Frequency of the phase resonance; None where no resonance was found."""
     frequency_u_hz: SixFigures | None
     at_hz: SixFigures
     """Frequency of the recorded segment."""
@@ -272,11 +272,11 @@ class BranchPointNote(AbstractNote):
     phase_deg: SixFigures
     """Phase of the displacement of m0 relative to the base displacement [deg]."""
     residue: SixFigures
-    """Rms of the harmonics from the second on of the base displacement, relative to its fundamental."""
+    """Rms of the second and higher harmonics of base displacement, relative to its fundamental."""
     residue_acceleration: SixFigures
-    """Rms of the harmonics from the second on of the base acceleration, relative to its fundamental."""
+    """Rms of the second and higher harmonics of base acceleration, relative to its fundamental."""
     reference_v: SixFigures
-    """First coefficient of the controller's target [V]."""
+    """First Fourier coefficient of the controller's target [V]."""
     tries: int
 
 
@@ -286,7 +286,7 @@ class Stability(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """Not determined: the bounds of the multiplier include 1, or the motion changed."""
+    """The bounds of the multiplier include 1, or the motion changed: stability is not determined."""
 
 
 class BranchStabilityNote(AbstractNote):
@@ -299,9 +299,9 @@ class BranchStabilityNote(AbstractNote):
     multiplier: SixFigures | None
     """Magnitude of the largest Floquet multiplier under prescribed base motion; None if unknown."""
     multiplier_u: SixFigures | None
-    """Standard uncertainty; 95 % bounds are at 2.1 times this."""
+    """Standard uncertainty of this magnitude; 95 % bounds are at 2.1 times this uncertainty."""
     perturbation: SixFigures
-    """Requested relative rms change of the fundamentals of base and m0; the larger of the two."""
+    """Requested relative rms change of the fundamentals of base and m0; it applies to the larger change."""
     moved: SixFigures
     """Relative change of the fundamental of m0 between before and after the perturbations."""
 
@@ -315,34 +315,34 @@ class BranchEndNote(AbstractNote):
 
 
 class UntilNote(AbstractNote):
-    """Error bounds of results, for a stretch that is recorded until the requested bounds are met."""
+    """Error bounds of results, for a step or dwell that is recorded until these are small enough."""
 
     kind: Literal["until"] = "until"
     stretch: int
-    """Number of the step; 1 without steps."""
+    """Number of the recorded step; 1 for an excitation without steps."""
     wishes: dict[str, SixFigures]
-    """Requested relative 95 % bounds, by result."""
+    """Requested relative 95 % bounds, by name of the result."""
     longest_s: SixFigures
-    """Longest time that may be recorded [s]."""
+    """Longest time for which the stretch may be recorded [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
-    """95 % bounds at the last analysis; None if not determined, empty before the first analysis."""
+    """Relative 95 % bounds at the last analysis; None: not determined. Empty before the first analysis."""
     looked_s: SixFigures = 0.0
-    """Recorded time at the last analysis [s]."""
+    """Recorded time of the stretch at the last analysis [s]."""
     looks: int = 0
     hindrance: str = ""
-    """Reason if no bounds could be determined; empty otherwise."""
+    """Reason why no bounds could be determined; empty if they were."""
     recorded_s: SixFigures | None = None
-    """Total recorded time [s]; None while it is recorded."""
+    """Total recorded time of the stretch [s]; None while it is still being recorded."""
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Bound relative to the requested one for each result; infinite if unknown."""
+        """Error bound relative to the requested bound, for each result; infinite if unknown."""
         found = {name: inf if bound is None else bound for name, bound in self.bounds.items()}
         return tuple(found.get(name, inf) / wish for name, wish in self.wishes.items())
 
     @property
     def is_reached(self) -> bool:
-        """Whether all requested bounds are met."""
+        """Whether all error bounds are as small as requested."""
         return max(self.shares) <= 1.0
 
     @property

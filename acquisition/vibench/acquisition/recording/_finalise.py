@@ -46,11 +46,11 @@ from ._tables import Columns
 
 SIGNAL = "values"
 FIRST_CHOICE = "m0_"
-"""Prefix of the channels plotted by default; if there is none, the first channel is plotted."""
+"""Prefix of the channels plotted by default; without such a channel, the first channel is plotted."""
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
-    """Add a channel's labelled curve; the attributes ``default`` select the curve shown first."""
+    """Add a labelled curve of a channel; the attributes ``default`` select the curve that is shown first."""
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
@@ -89,7 +89,7 @@ IN_FLIGHT_PER_WORKER = 4
 
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:
-    """Create a compressed one-dimensional dataset of counts; an empty one is contiguous."""
+    """Create a compressed one-dimensional dataset of counts; an empty dataset is contiguous instead."""
     if samples == 0:
         return file.create_dataset(name, shape=(0,), dtype=COUNT_DTYPE)
     return file.create_dataset(
@@ -145,7 +145,7 @@ def _chunk(counts: Counts, length: int) -> bytes:
 INTERRUPTED_KIND = "interrupted"
 INTERRUPTED_REASON = "the recording program ended before it could record how the run ended"
 INT32_SAMPLES = 2**31
-"""From this length (11 h at 51.2 kS/s), sample numbers are stored with 64 bits."""
+"""Length from which sample numbers are stored with 64 bits (11 h at 51.2 kS/s)."""
 
 
 def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None = None) -> Path:
@@ -153,7 +153,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
     The caller must have locked the ``.part``, which is not changed. ``written`` has the checksum of each
     channel's recorded samples (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
-    fails (the disk may be full), or the copy reads back differently than it was written.
+    fails (the disk may be full), or the copy reads back with other content than was written.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
@@ -312,7 +312,7 @@ def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
 
 
 def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype[np.generic]:
-    """Return the type of a stored column; text is as wide as its longest value."""
+    """Return the type of a stored column; a text column is as wide as its longest value."""
     if values.dtype.kind != "S":
         return values.dtype
     longest = max((len(value) for value in values.tolist()), default=0)

@@ -102,7 +102,7 @@ _AC_CUT_HZ = 0.5
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
-"""``expected_samples`` in the file for a recording without a planned end."""
+"""Value of ``expected_samples`` in the file for a recording without a planned end."""
 
 FINE_STEP = 2.0**-30
 """Step of stored counts if the converter's step is unknown, as a fraction of the range.
@@ -139,7 +139,7 @@ class ChannelHeader:
     range_v: float
     """Full scale of the input, symmetric about zero [V]."""
     volts_per_count: float | None = None
-    """Step of the converter [V]; None if unknown: the stored step is then 2^-30 of the range."""
+    """Step of the converter [V]; None if unknown. Then the stored step is 2^-30 of the range."""
     volts_at_zero_count: float = 0.0
     """Voltage at count zero, from the converter's calibration [V]."""
     physical_offset: float = 0.0
@@ -226,16 +226,16 @@ class RecordingHeader:
     channels: tuple[ChannelHeader, ...]
     """Recorded channels, in the order of the rows of a block."""
     sample_rate_hz: float
-    """Actual sample rate of the hardware."""
+    """Actual sample rate of the hardware [samples/s]."""
     expected_samples: int | None
-    """Planned number of samples per channel; None for a recording without a planned end."""
+    """Planned number of samples per channel; None if the recording has no planned end."""
     origin: Origin
     plan_json: str = "{}"
     """Complete plan of the measurement, as JSON."""
     bench_json: str = "{}"
     """Complete bench configuration, as JSON."""
     requested_sample_rate_hz: float | None = None
-    """Requested sample rate; None if it equals the actual one."""
+    """Requested sample rate [samples/s]; None if it equals the actual rate."""
     instruments: Mapping[str, Identity] = field(default_factory=dict)
     """Identities of the instruments by their role (``"generator"``, ``"digitizer"``)."""
     confirmations: Mapping[str, str | float] = field(default_factory=dict)
@@ -293,7 +293,7 @@ class RecordingHeader:
 
 
 def require_different(channels: Iterable[ChannelHeader]) -> tuple[ChannelHeader, ...]:
-    """Return the channels; raises RecordingError if there are none, or two have the same name."""
+    """Return the channels; raises RecordingError if there is no channel, or two have the same name."""
     given = tuple(channels)
     roles = [channel.role for channel in given]
     if not roles or len(set(roles)) != len(roles):

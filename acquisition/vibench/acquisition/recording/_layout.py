@@ -30,7 +30,7 @@ TMP_SUFFIX = ".tmp"
 CHUNK_SAMPLES = 51_200
 """Samples in one compressed chunk: one second at the rig's usual rate, 200 kB."""
 DEFLATE_LEVEL = 1
-"""Compression level; a higher level makes files 4 % smaller but a third slower to write."""
+"""Compression level. A higher level makes files 4 % smaller, but writing takes a third longer."""
 
 COUNT_DTYPE = "<i4"
 COUNTER_DTYPE = "<i8"
@@ -79,7 +79,7 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table: a one-dimensional dataset of numbers or of fixed-length text."""
+    """One column of a table, stored as a one-dimensional dataset of numbers or of fixed-length text."""
 
     name: str
     dtype: str
@@ -174,7 +174,7 @@ def decode(raw: bytes) -> str:
 Attribute = str | int | float
 
 ATTRIBUTE_BYTES = 60_000
-"""Largest text of an attribute; HDF5 limits an object's header to 64 KiB."""
+"""Largest text of an attribute, because HDF5 limits an object's header to 64 KiB."""
 
 
 def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> None:
@@ -210,7 +210,7 @@ def write_text_dataset(group: h5py.Group, name: str, text: str) -> None:
 
 
 def read_text_dataset(group: h5py.Group, name: str) -> str:
-    """Return the text of a scalar dataset; raises ValueError if it is something else."""
+    """Return the text of a scalar dataset; raises ValueError if it contains no text."""
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
         raise ValueError(f"{group.name}/{name} is not a text")

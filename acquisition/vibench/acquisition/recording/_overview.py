@@ -57,7 +57,7 @@ class OverviewSums:
             yield piece
 
     def add(self, piece: Counts) -> None:
-        """Add the next counts."""
+        """Add the next counts of the channel."""
         found = extremes(piece)
         self._low.append(found.low)
         self._high.append(found.high)

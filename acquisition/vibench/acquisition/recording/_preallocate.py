@@ -31,10 +31,10 @@ MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
 """Margin added to the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""Additional length for pauses during a run [s]; disk space is reserved only as samples arrive."""
+"""Additional length for pauses during a run [s]; its disk space is reserved only when samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length of a recording without a planned end [s]; disk space is reserved only as samples arrive."""
+"""Declared length of a recording without a planned end [s]; its disk space is reserved as samples arrive."""
 RESERVE_AHEAD_S = 60.0
 """Length of each further reservation when a recording outgrows its reserved space [s]."""
 
@@ -65,15 +65,15 @@ class Places:
     capacity: int
     """Largest number of samples per channel that fits into the file."""
     reserved: int
-    """Number of samples per channel for which disk space is reserved."""
+    """Number of samples per channel for which disk space is reserved already."""
 
 
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """Create ``part`` for the recording ``path``, reserve its space, and return the offsets in the file.
 
-    The file is written as ``.tmp`` and then renamed, so that a ``.part`` can always be opened; if the process
-    is killed here, a ``.tmp`` without samples remains. Raises RecordingError when the file exists already,
-    its folder does not exist, or the disk is too full.
+    The file is written as ``.tmp`` and then renamed, so that a ``.part`` can always be opened. If the process
+    is killed before the renaming, a ``.tmp`` without samples remains. Raises RecordingError when the file
+    exists already, its folder does not exist, or the disk is too full.
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
@@ -208,7 +208,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
     """Apply ``change`` to a copy, then replace the file by the copy; return the result of ``change``.
 
     A crash leaves the old file unchanged (and perhaps a ``.tmp``). If another program changes the file
-    meanwhile, the change is repeated. Raises RecordingError when writing fails; the file is then unchanged.
+    meanwhile, ``change`` is repeated. Raises RecordingError when writing fails; the file is then unchanged.
     """
     try:
         with _one_at_a_time:

@@ -44,7 +44,7 @@ LONGEST = 300
 """Largest number of characters of a faulty name or text that a message quotes."""
 
 _LOCKED_OTHERWISE = "file locking flag values don't match"
-"""HDF5's message if this process has already opened the file with locks."""
+"""HDF5's message if this process already has the file open with locks."""
 
 
 def open_hdf5(path: Path) -> h5py.File:
@@ -120,7 +120,7 @@ def _require_ours(path: Path, file: h5py.File) -> None:
 
 
 class OpenRecording:
-    """HDF5 handle of a recording."""
+    """HDF5 handle of an open recording."""
 
     def __init__(self, path: Path) -> None:
         self.path = name_now(path)
@@ -134,10 +134,10 @@ class OpenRecording:
             self.file = open_hdf5(self.path)
         self.counts = CheckedCounts()
         self.described = ""
-        """``repr`` of the recording when opened: all content except samples and results."""
+        """``repr`` of the recording at opening: all its content except samples and results."""
 
     def reopen(self) -> None:
-        """Open the file again, to read its current content."""
+        """Open the file again, to read what has been written since."""
         self.file.close()
         self.file = open_hdf5(self.path)
 
@@ -156,7 +156,7 @@ class RecordedBlock:
 
 
 class Growth(Enum):
-    """Whether more samples may follow."""
+    """Whether more samples may follow, because the recording still grows."""
 
     FINISHED = auto()
     GROWING = auto()
@@ -182,7 +182,7 @@ class RecordingDescription:
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
     bench_check: Mapping[str, Any]
-    """Last bench check before the recording: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
+    """Last bench check before the recording (``checked``, ``verdict``, ``findings``, ...); or empty."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -204,7 +204,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_growing(self) -> bool:
-        """Whether the file is a ``.part``: being recorded or interrupted."""
+        """Whether the file is a ``.part``, which is being recorded or was interrupted."""
         return layout.N_VALID in self._open.file
 
     @property
@@ -219,7 +219,7 @@ class Recording(RecordingDescription):
 
     @property
     def packing(self) -> float:
-        """Compression ratio of the samples: about 1.3 for noise of 20 bits."""
+        """Compression ratio of the samples; about 1.3 for noise of 20 bits."""
         stored = sum(self._open.file[role].id.get_storage_size() for role in self.roles)
         return float(self.stored_bytes / max(stored, 1))
 
@@ -329,7 +329,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file; later reads are then compared with that check."""
+        """Whether this process has checked the whole file. Later reads are then compared with that check."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
@@ -432,7 +432,7 @@ def _require_as_checked(handle: OpenRecording, seal: str) -> None:
 
 
 def _read(handle: OpenRecording) -> Recording:
-    """Read and validate everything except samples and results."""
+    """Read and validate the content of the file, except samples and results."""
     file = handle.file
     is_part = layout.N_VALID in file
     growing = _growing(handle) if is_part else {}
@@ -491,7 +491,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return samples, state and reason of a ``.part``; "interrupted" if its program no longer runs."""
+    """Return samples, state and reason of a ``.part``; without a running program it is "interrupted"."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

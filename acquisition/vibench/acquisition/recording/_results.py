@@ -22,7 +22,7 @@ COMPLEX_PART = "complex_part"
 """Attribute that marks the real or imaginary part of a complex array; only h5py reads complex numbers."""
 SETTINGS_JSON = "settings_json"
 AXES = "axes_json"
-"""Attribute of an array: names of the axis arrays of its dimensions."""
+"""Attribute of an array with the names of the axis arrays of its dimensions."""
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
@@ -62,7 +62,7 @@ def write_result(
     roles: Sequence[str],
     key: SealKey | None,
 ) -> str:
-    """Add a sealed result; return its name. An existing name gets ``-2``, ``-3``, ..."""
+    """Add a sealed result and return its name. If the name exists, ``-2``, ``-3``, ... is appended."""
     _require_axes(name, arrays)
     results = file.require_group(layout.RESULTS)
     free_name = _free_name(results, name)
@@ -102,7 +102,7 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
     """Return every result of a recording, by name.
 
-    Raises RecordingError when a result was changed after sealing, or an entry is not a result.
+    Raises RecordingError when a result was changed after sealing, or an entry of the group is not a result.
     """
     found = {}
     for name, group in result_groups(file).items():

@@ -37,7 +37,7 @@ SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
 RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
 """Attributes of a result's group that contain its seal, and are therefore not sealed themselves."""
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""HDF5 attributes that link axes; they contain addresses inside the file, not data."""
+"""HDF5 attributes that link axes. They contain addresses inside the file instead of data."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
 """Largest multidimensional array [bytes]; such arrays (results) are read in one piece."""
@@ -67,15 +67,15 @@ class SealState(StrEnum):
 
     INTACT = "intact"
     DAMAGED = "damaged"
-    """Something was changed after sealing."""
+    """The file was changed after sealing."""
     UNSEALED = "unsealed"
-    """Written before recordings had seals; changes of scales, tables and plan cannot be detected."""
+    """The file was written before seals existed; changes of scales, tables and plan cannot be detected."""
     SEAL_GONE = "seal_gone"
-    """Written by a version that seals every recording, but the seal is missing."""
+    """The file was written by a version that seals every recording, but its seal is missing."""
     UNFINISHED = "unfinished"
-    """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
+    """The file is still being recorded, or was cut off; finishing or recovering seals it."""
     OTHER_KEY = "other_key"
-    """Unchanged, but not signed with the given key."""
+    """The file is unchanged, but not signed with the given key."""
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ def _is_long_signal(path: str, item: h5py.Dataset) -> bool:
 
 
 def _checksum_of_header(item: h5py.HLObject) -> str:
-    """Return the checksum of an object's attributes, type and shape."""
+    """Return the checksum of an HDF5 object's attributes, type and shape."""
     described: dict[str, Any] = {}
     attributes = item.attrs
     for name in attributes:
@@ -316,7 +316,7 @@ def _data_sha256(item: h5py.HLObject, states: list["Hash"] | None = None) -> str
 
 
 def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
-    """Return the checksum of the data, or "unreadable" if they cannot be read."""
+    """Return the checksum of a dataset's data, or "unreadable" if the data cannot be read."""
     try:
         return _data_sha256(item, states)
     except OSError as error:
@@ -409,7 +409,7 @@ class NotedSeal:
 
     point: str
     seal: str
-    """Seal in the table of points; for the file of an earlier attempt, the seal of that attempt."""
+    """Seal in the table of points. For the file of an earlier attempt, it is the seal of that attempt."""
     attempt_seal: str
     """Seal in the table of attempts; empty without an attempt, or for an attempt before seals existed."""
 
@@ -490,12 +490,12 @@ _KNOWN: dict[str, ChannelStates] = {}
 
 
 def remember(seal: str, states: ChannelStates) -> None:
-    """Keep these states, so that later reads of files with this seal are compared with them."""
+    """Keep the checksum states of a seal, with which later reads of files with this seal are compared."""
     _KNOWN[seal] = states
 
 
 def forget_checks() -> None:
-    """Forget all checks, so that files are checked again."""
+    """Forget all checks, so that files are checked again at the next reading."""
     _KNOWN.clear()
 
 

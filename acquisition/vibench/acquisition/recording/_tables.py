@@ -60,7 +60,7 @@ class Gap:
 
     first_sample: int
     last_sample: int
-    """The last sample that was lost."""
+    """Number of the last sample that was lost."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Segment:
     last_sample: int
     """Number of the last sample; one less than ``first_sample`` when the segment is empty."""
     is_complete: bool
-    """False when the recording ended before the segment did."""
+    """False if the recording ended before the end of the segment."""
     numbers: Mapping[str, Number]
 
     @property
@@ -123,7 +123,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
 
 
 def first_number(group: h5py.Group, name: str) -> int:
-    """Return the integer in a dataset with one element; raises RecordingError for anything else."""
+    """Return the integer in a dataset with one element; raises RecordingError for any other content."""
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
         raise RecordingError(f"{group.name}/{name} is not a whole number")
@@ -131,7 +131,7 @@ def first_number(group: h5py.Group, name: str) -> int:
 
 
 def ending(file: h5py.File) -> tuple[RecordingState, str]:
-    """Return state and reason of a ``.part``; if its program was killed, the state is still "recording"."""
+    """Return state and reason of a ``.part``; after a killed program, the state is still "recording"."""
     state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     is_whole = state in tuple(RecordingState)
     return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
@@ -250,7 +250,7 @@ class SegmentLabel(StrEnum):
     SWEEP = "sweep"
     DWELL = "dwell"
     STEP = "step"
-    """A frequency of the plan's list, or a level."""
+    """A frequency or a level of the plan's list."""
     SEARCH = "search"
     """A frequency that was added to localise a jump."""
     RESONANCE = "resonance"

@@ -80,7 +80,7 @@ RESERVED = 8
 
 
 class DescriptorReserve:
-    """File descriptors kept open during the run and released at its end, to finish the recording."""
+    """File descriptors kept in reserve during the run, and released at its end to finish the recording."""
 
     def __init__(self) -> None:
         self._held: list[int] = []
@@ -101,7 +101,7 @@ class DescriptorReserve:
 
 
 QUEUE_S = 10.0
-"""Length of the queue of samples that wait for the disk [s]; the slowest measured sync took 0.12 s."""
+"""Length of the queue of samples that wait to be written [s]; the slowest measured disk sync took 0.12 s."""
 GAP_PIECE_SAMPLES = 51_200
 
 ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILED)
@@ -162,19 +162,19 @@ class RecordingWriter:
         self._key = key
         self._digests = {channel.role: hashlib.sha256() for channel in header.channels}
         self.samples = 0
-        """Samples per channel so far."""
+        """Samples per channel that were appended so far."""
         self._reserved = places.reserved
         self._is_finished = False
 
     @property
     def committed_samples(self) -> int:
-        """Samples per channel that would survive a power cut now."""
+        """Samples per channel that would survive a power cut at this moment."""
         return self._committer.committed_samples
 
     def append(self, block: Block) -> None:
         """Append the next samples. Returns at once unless the disk is seconds behind.
 
-        Samples missing between this block and the last are marked as a gap and read as NaN.
+        Samples missing between the previous block and this block are marked as a gap; they read as NaN.
 
         Raises RecordingError when the block does not fit (wrong shape or order, volts that are not whole
         counts, full recording), or the disk has failed. Committed samples are kept.

@@ -45,21 +45,21 @@ def given_token() -> str:
 
 
 USUAL_GRID_RATE_HZ = 102_400.0
-"""Default number of computed steps per second on the virtual rig (its grid)."""
+"""Default number of computed time steps per second on the virtual rig (its grid)."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Smallest number of steps per second; the base motion is then 0.8 % too small at `WATCHED_HZ`."""
+"""Smallest number of time steps per second. Then the base motion is 0.8 % too small at `WATCHED_HZ`."""
 WATCHED_HZ = 500.0
-"""Frequency at which the grid is judged: highest resonance of the specimen and top of the paper's range."""
+"""Frequency at which a grid's error is judged: highest specimen resonance, top of the paper's range."""
 _MEASURED = 0.55
-"""Factor in `level_error`, from a comparison with 409,600 steps per second between 60 Hz and 1 kHz."""
+"""Factor in `level_error`, from a comparison with 409,600 time steps per second between 60 Hz and 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
 """Largest allowed level error of a plan on a grid coarser than the default."""
 STEPS_PER_SAMPLE = 2
-"""Smallest number of steps per sample on a coarser grid, due to the converter filter's transition band."""
+"""Smallest number of time steps per sample on a coarse grid: the converter filter has a transition band."""
 
 
 class VirtualConfig(FrozenModel):
-    """Properties needed only by a virtual rig."""
+    """Properties that a configuration needs only for a virtual rig."""
 
     seed: int = Field(ge=0)
     pace: Literal["free", "wall"] = "free"
@@ -106,7 +106,7 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest frequency with correct levels on a grid [Hz]; None (no limit) on the default one."""
+    """Return the highest frequency with correct levels on a grid [Hz]; None without limit (default grid)."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
@@ -172,7 +172,7 @@ class GeneratorConfig(FrozenModel):
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver; the drivers of this package have none."""
+    """Further settings of the driver; none of this package's drivers has any."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
@@ -198,7 +198,7 @@ class GeneratorConfig(FrozenModel):
 
     @property
     def shown_fraction(self) -> float:
-        """Displayed voltage for the load setting, over the open-circuit voltage."""
+        """Displayed voltage for the load setting, relative to the open-circuit voltage."""
         ohm = inf if self.load_ohm == HIGH_Z else self.load_ohm
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
@@ -238,7 +238,7 @@ class AmplifierConfig(FrozenModel):
 
 
 class ShakerLimits(FrozenModel):
-    """Limits of the shaker; all are peak values of a sine."""
+    """Limits of the shaker, as peak values of a sine."""
 
     stroke_m: Sourced
     velocity_m_per_s: Sourced
@@ -313,11 +313,11 @@ class DaqConfig(FrozenModel):
     """Largest error of the sample clock [parts per million]; absent if not stated."""
     channels: tuple[ChannelConfig, ...] = Field(min_length=1)
     output: OutputConfig | None = None
-    """Analogue output for streamed noise; optional."""
+    """Analogue output that plays streamed noise; optional."""
 
     @property
     def output_channel(self) -> str | None:
-        """Full name of the analogue output: ``"Dev1/ao0"``; None if there is none."""
+        """Full name of the analogue output: ``"Dev1/ao0"``; None if the rig has no output."""
         if self.output is None:
             return None
         return f"{self.output.device or self.device}/{self.output.physical}"
@@ -342,7 +342,7 @@ class SpecimenConfig(SpecimenTable):
 
 
 class LoopInput(StrEnum):
-    """Channels sampled by a real-time controller, in the order of its inputs."""
+    """Channels that a real-time controller samples, in the order of its inputs."""
 
     BASE = "base_acceleration"
     M0 = "m0_velocity"
@@ -371,7 +371,7 @@ class ControllerConfig(FrozenModel):
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input of a controller limited to a proportional-derivative law; absent for any linear law."""
+    """Only input on which the controller accepts a proportional-derivative law; absent for any linear law."""
     source: str = Field(min_length=1)
     """Source of sample rate, latency and limit."""
 
@@ -392,7 +392,7 @@ class Rig(FrozenModel):
     vibrometer: VibrometerConfig | None = None
     """Sensor of ``m0_velocity``, or of another mass in a scan; absent if another sensor measures m0."""
     accelerometer: AccelerometerConfig
-    """Sensor of the channel ``base_acceleration``."""
+    """Sensor of the channel ``base_acceleration``, on the base."""
     sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
     """Sensors of all other channels, by role."""
     daq: DaqConfig

@@ -23,7 +23,7 @@ class Sensor(Protocol):
     """Entry point of ``vibench.sensors``: returns the properties of a sensor; may query its instrument."""
 
     def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
-        """Return the properties of the sensor at an input."""
+        """Return the properties of the sensor at an input of the converter."""
 
 
 def sensor_name(config: ChannelConfig) -> str:
@@ -147,7 +147,7 @@ class KnobSheet(FrozenModel):
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Function that has the settings confirmed and returns the sheet; raises CheckFailed if one is wrong."""
+"""Function that asks to confirm the settings and returns the sheet; raises CheckFailed if one is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -257,9 +257,9 @@ class CalibrationRule(StrEnum):
     """Effect of an expired calibration."""
 
     ENFORCED = auto()
-    """The bench does not open."""
+    """The bench is not opened."""
     WAIVED = auto()
-    """The bench opens; every recording contains the calibration dates."""
+    """The bench is opened. Every recording contains the calibration dates."""
 
 
 @dataclass(frozen=True)
@@ -273,7 +273,7 @@ class Calibration:
 
     @property
     def is_to_come(self) -> bool:
-        """Whether the date is in the future, which is an error."""
+        """Whether the calibration date is in the future, which is an error."""
         return self.age_days < 0
 
     @property
@@ -311,7 +311,7 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
 
 
 def check_calibrations(rig: Rig, today: date) -> None:
-    """Check all calibrations of a rig; raises CheckFailed with those that have expired by ``today``."""
+    """Check all calibrations of a rig; raises CheckFailed with the calibrations that expired by ``today``."""
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:
         raise CheckFailed(

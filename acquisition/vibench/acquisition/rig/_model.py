@@ -16,7 +16,7 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""Peak over rms of a sine; the limiter's setting is the rms current of the largest unlimited sine."""
+"""Peak over rms of a sine; the limiter setting is the rms current of the largest sine that is not limited."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
@@ -59,7 +59,7 @@ _COLUMNS = {
     BaseQuantity.M0_ACCELERATION: (_M0, 2),
     BaseQuantity.P: (_P, 0),
 }
-"""Column of the linear motion for each quantity, and the power of i omega to multiply it by."""
+"""For each quantity: column of the linear motion, and the power of i omega by which it is multiplied."""
 
 
 class OnTable(StrEnum):
@@ -99,7 +99,7 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the same as `transfer`, but with m1 fixed to m2 by the stops."""
+        """Return the same quantity as `transfer`, but with m1 fixed to m2 by the stops."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
@@ -140,7 +140,7 @@ class RigModel:
 def _kept_motion(
     amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: bytes
 ) -> LinearMotion:
-    """Return the motion, solved once for all quantities at the same frequencies."""
+    """Return the linear motion, solved once for all quantities at the same frequencies."""
     return linear_motion(amplifier, shaker, specimen, np.frombuffer(frequency_hz, dtype=np.float64))
 
 

@@ -33,7 +33,7 @@ _UNITS = {
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
-"""Size in SI units of the units in data sheets, by the unit of the recorded quantity."""
+"""Size of data-sheet units in SI units, by the unit of the recorded quantity."""
 _EXAMPLES = {
     "m s-2": "'100 mV/g' or '10 mV/(m/s2)'",
     "m s-1": "'250 mm/s/V' or '4 V/(m/s)'",
@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest accepted number of a sensitivity, and inverse of the largest; others are typing errors."""
+"""Smallest accepted number of a sensitivity, and inverse of the largest; other numbers are typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
@@ -102,11 +102,11 @@ class StatedUncertainty(FrozenModel):
     """Relative uncertainty of a sensitivity, from a certificate or a data sheet."""
 
     relative: float = Field(gt=0.0, lt=1.0)
-    """Expanded uncertainty over the value; 0.01 means 1 %."""
+    """Expanded uncertainty relative to the value; 0.01 means 1 %."""
     coverage_factor: PositiveFloat = 2.0
-    """Expanded uncertainty over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
+    """Expanded over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
     source: str = Field(min_length=1)
-    """Certificate with its number, or data sheet."""
+    """Source of the uncertainty: certificate with its number, or data sheet."""
 
 
 def _acceleration_sensitivity(given: object) -> object:

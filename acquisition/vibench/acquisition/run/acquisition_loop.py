@@ -14,7 +14,7 @@ BLOCK_S = 0.1
 
 
 class AcquisitionLoop:
-    """Reads and records blocks. The clock is the number of samples read, so waiting means reading."""
+    """Reads and records blocks. The number of samples read is the clock, so waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """``advance`` is called after every block."""
@@ -37,8 +37,8 @@ class AcquisitionLoop:
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
         """Read and record blocks for another ``duration_s``; yield each block.
 
-        The end is the sample nearest to the sum of all durations so far, so that rounding does not
-        accumulate. The last ``lead_s`` [s] are left for the next call.
+        The last sample is nearest to the sum of all durations so far, so that rounding does not accumulate.
+        The last ``lead_s`` [s] are left for the next call.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
@@ -57,7 +57,7 @@ class AcquisitionLoop:
         return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
 
     def catch_up(self) -> Iterator[Block]:
-        """Read all waiting samples, and delay the rest of the plan by their duration."""
+        """Read all waiting samples, and delay the rest of the plan by the duration of these samples."""
         # Only once, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
@@ -105,7 +105,7 @@ class AcquisitionLoop:
         self._due_s = self._sampled / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:
-        """Start ``segment`` at the next sample, unless it is open already; end any other."""
+        """Start ``segment`` at the next sample, unless it is open already; end any other segment."""
         if segment == self.segment:
             return
         if self.segment is not None:
@@ -115,10 +115,10 @@ class AcquisitionLoop:
         self.segment = segment
 
     def log(self, kind: str, text: str) -> None:
-        """Add an event at the next sample."""
+        """Add an event to the recording at the next sample."""
         self._sink.log(kind, text, self.samples)
 
     def log_limit_trip(self, error: LimitExceeded) -> None:
-        """Add an event with the values of an exceeded limit at the sample that exceeded it."""
+        """Add an event with the values of an exceeded limit, at the sample that exceeded this limit."""
         if error.trip is not None:
             self._sink.log(EventKind.LIMIT, json.dumps(asdict(error.trip)), error.trip.sample)

@@ -21,7 +21,7 @@ class Drive(Protocol):
 
     @property
     def drive_source(self) -> DriveSource:
-        """Kind of instrument that plays."""
+        """Kind of instrument that plays the signal."""
 
     @property
     def pause_s(self) -> float:
@@ -33,7 +33,7 @@ class Drive(Protocol):
 
     @property
     def is_commanded(self) -> bool:
-        """Whether each change of the signal needs a command, which takes time while sampling continues."""
+        """Whether each change of the signal needs a command, whose time passes while sampling continues."""
 
     @property
     def setting_vpp(self) -> float:

@@ -42,7 +42,7 @@ class Outcome:
     path: Path
     """Path of the recording."""
     cause: Cause | None = None
-    """Cause of an early end; None for a completed plan."""
+    """Cause of an early end; None for a completed run."""
 
 
 class Ending:
@@ -54,7 +54,7 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the plan was completed; ``known`` states bounds of results."""
+        """Note that the run was completed as planned; ``known`` is a text on bounds of results."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
@@ -75,7 +75,7 @@ class Ending:
         return Outcome(self.state, self.reason, path, self._cause)
 
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
-        """Silence the drive, end sampling and finish the recording; each step runs even if another fails."""
+        """Silence the drive, end sampling and finish the recording; do each step even if another fails."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, sink)
             leaving.callback(self._stop_listening, digitizer)

@@ -30,12 +30,12 @@ GUARD_S = 0.02
 """Pause between the end of a burst and the next trigger [s]. The effect of a trigger during a burst is not
 documented for every firmware, and reading times vary by some milliseconds."""
 CHECK_MARGIN_S = 0.5
-"""Additional length of the burst for a check, for commands and the reading of samples [s]."""
+"""Extra length of the burst for a check [s], to allow for commands and the reading of samples."""
 LITTLE = 0.98
-"""Ratio of new to old level below which the amplitude is lowered before the frequency changes."""
+"""Ratio of new to old level below which the level is lowered before the frequency changes."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
-"""Duration of a ramp that does not count samples [s]."""
+"""Duration of a ramp during which no samples are read [s]."""
 _ROUNDING_S = 1e-9
 
 
@@ -62,7 +62,7 @@ class DeadMan:
         self._generator.arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Trigger the next burst."""
+        """Trigger the next burst of the sine."""
         self._generator.trigger()
         self._left_s = self._period_s
 
@@ -102,7 +102,7 @@ class GeneratorDrive:
 
     @property
     def can_hold(self) -> bool:
-        """Whether the signal continues without further commands; False for bursts and sweeps."""
+        """Whether the signal continues without further commands; false for bursts and sweeps."""
         return self._dead_man is None and not isinstance(self._play, Sweep)
 
     @property
@@ -116,7 +116,7 @@ class GeneratorDrive:
         return self._is_on and self._level > 0.0
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Store the duration of the check's tone; the output is off."""
+        """Store the duration of the check's sine; the output is off."""
         checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
         self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
@@ -141,7 +141,7 @@ class GeneratorDrive:
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
-        """Ramp down from the current level in as many steps as time allows; yield the length of each [s].
+        """Ramp down from the current level in as many steps as time allows; yield the time of each [s].
 
         Steps whose time has passed are skipped, but no step exceeds 1/`FEWEST_STAIRS` of the ramp.
         """
@@ -159,9 +159,9 @@ class GeneratorDrive:
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands, then turn the output off in any case.
 
-        Used when the run ends without sampling, or when switching off did not silence. The ramp has about 20
-        commands of a few milliseconds each, or four on a slow generator. If the output was off already, or
-        the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
+        Used when the run ends without sampling, or when the drive was still measured after switching off. The
+        ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output was
+        off already, or the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
         """
         was_off = not self._is_on
         try:
@@ -175,7 +175,7 @@ class GeneratorDrive:
             self._stop()
 
     def _sound(self, play: Play | None) -> None:
-        """Play the small tone of the check without a ramp; for anything else, turn the output off."""
+        """Play the small sine of the check without a ramp; for any other signal, turn the output off."""
         match play:
             case Tone(frequency_hz, _):
                 if not self._is_on:
@@ -230,7 +230,7 @@ class GeneratorDrive:
     def _change_tone(self, old: Tone, new: Tone) -> None:
         """Change amplitude and frequency: lower the amplitude first, or raise it last, for safety.
 
-        A small decrease, as between steps of a sweep, comes last too, so that the frequency is on time.
+        Between steps of a sweep, a small decrease also comes last, so that the frequency is on time.
         """
         if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
@@ -246,7 +246,7 @@ class GeneratorDrive:
             yield from self._pieces(ramp_s / count)
 
     def _stairs_within(self, ramp_s: float) -> int:
-        """Return the number of ramp steps that fit into ``ramp_s``, from the duration of the last command."""
+        """Return how many ramp steps fit into ``ramp_s``, given the duration of the last command."""
         made = self._stairs if self._setting_takes_s == 0.0 else int(ramp_s / self._setting_takes_s)
         return min(self._stairs, max(FEWEST_STAIRS, made))
 

@@ -44,7 +44,7 @@ def _high_pass(sample_rate_hz: float) -> _Section:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """Motion of the base at each sample of a block."""
+    """Motion of the base at each sample of a block of samples."""
 
     velocity: Samples
     """Velocity at each sample [m/s]."""
@@ -60,7 +60,7 @@ class BaseTracker:
         self._to_displacement = _integrator(sample_rate_hz)
 
     def follow(self, acceleration: Samples) -> BaseMotion:
-        """Return the base motion for the next samples [m/s2], which must follow without a gap."""
+        """Return the base motion for the next samples of acceleration [m/s2], which follow without a gap."""
         velocity = self._to_velocity.run(acceleration)
         return BaseMotion(velocity, self._to_displacement.run(velocity))
 
@@ -89,13 +89,13 @@ class SpecimenTracker:
 
 
 RMS_S = 1.0
-"""Averaging time of the rms current [s], whose limit is due to heating."""
+"""Averaging time for the rms current, whose limit is due to heating [s]."""
 REACTION = 1.1
-"""Allowed force on the table, over the coil's force limit; above 1, because the specimen reacts too."""
+"""Allowed force on the table, relative to the coil's force limit; above 1, as the specimen reacts, too."""
 SETTLING_S = 0.5
 """Time after the start in which integrated quantities are not checked [s]. An AC-coupled input drifts after
-its current is switched on, and the drift integrates to metres. The run is then still at the low level of its
-check. Measured quantities are checked from the first sample."""
+its current is switched on, and the drift integrates to metres. During this time, the run plays only the low
+level of its check. Measured quantities are checked from the first sample."""
 _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 

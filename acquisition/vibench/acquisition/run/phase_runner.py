@@ -28,7 +28,7 @@ changes, the delay shifts the count of cycles."""
 
 
 CLEAR = 0.3
-"""Fraction of the amplitude above which a sample is clearly positive or negative."""
+"""Fraction of the amplitude above which a sample counts as clearly positive or negative."""
 
 
 class Heard(Protocol):
@@ -47,7 +47,7 @@ class GlideWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Reset for another sweep."""
+        """Reset the count for another sweep."""
         self._first: tuple[float, float] | None = None
         """Planned cycles at the first upward zero crossing, and the frequency there [Hz]."""
         self._last_hz = 0.0
@@ -105,7 +105,7 @@ class GlideWatch:
 
     @property
     def more_cycles(self) -> float:
-        """Cycles of the drive beyond its plan; 0 if the converter's delay can explain them."""
+        """Cycles of the recorded drive beyond the plan; 0 if the converter's delay can explain them."""
         if self._first is None:
             return 0.0
         delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._first[1])
@@ -113,7 +113,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Compares a generator's own sweep with its planned course, block by block."""
+    """Compares a sweep made by the generator with its planned course, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide
@@ -134,38 +134,38 @@ HOLD_LONGEST_S = HOLD_ROOM_S
 
 
 LATEST = 0.5
-"""Largest delay of a command in a stepped sweep that is not logged, as a fraction of its step."""
+"""Largest delay of a command in a stepped sweep that needs no event, as a fraction of the step."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
 LEARNT = 0.05
 """Smallest fraction of a delay by which later commands are sent earlier; larger for the first steps."""
 LONGEST_LEAD = 0.25
-"""Largest lead of a command, as a fraction of its step."""
+"""Largest lead of a command sent early, as a fraction of the step."""
 TOLD_CYCLES = 0.1
 """Deviation of the drive at the end of a sweep above which an event is logged [cycles]."""
 MOST_MADE_UP = 3.0
 """Largest frequency correction for lost cycles, as a multiple of the planned frequency step."""
 LEAST_LEFT = 0.2
-"""Shortest time for a correction, over the step's duration; also the largest relative correction."""
+"""Shortest time for a correction, relative to the step's duration; also the largest relative correction."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
 class _Pace(Enum):
-    """Time from which a phase and its parts are counted."""
+    """Time at which a phase and its parts begin to count."""
 
     AFTER_THE_COMMAND = auto()
-    """The end of the phase's first command; for settling."""
+    """The end of the phase's first command; used for settling."""
     OF_THE_COMMANDS = auto()
-    """The planned time, or the end of the last command if that is later; for ramps."""
+    """The planned time, or the end of the last command if that is later; used for ramps."""
     OF_THE_PLAN = auto()
-    """The planned time; for stepped sweeps."""
+    """The planned time; used for stepped sweeps."""
     OF_ITSELF = auto()
     """The end of the previous phase: no command is due, or commands take no time."""
 
 
 class Stopped(Exception):
-    """Raised when the run was requested to end."""
+    """Raised when somebody requested the run to end."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.reason)
@@ -272,7 +272,7 @@ class PhaseRunner:
         """Return the phase with its frequency corrected for the cycles lost before it.
 
         While a command is late, the previous tone continues. The cycles lost are the difference of the two
-        frequencies times the delay. Cycles that one step cannot correct are left to the next step.
+        frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
         """
         if not isinstance(phase.play, Tone):
             return phase
@@ -300,7 +300,7 @@ class PhaseRunner:
         Delays above half a step are logged; several in a row raise DriveLate.
 
         Samples arrive some milliseconds after conversion, so a command that waits for them is late. Over a
-        sweep of 200 Hz this would amount to a cycle or two, so later commands are sent earlier.
+        sweep of 200 Hz, a cycle or two would be lost, so later commands are sent earlier.
         """
         late_s = self.loop.waiting_s - self._lead_s
         self._glides += 1
@@ -339,7 +339,7 @@ class PhaseRunner:
         """Ramp down from the current state without limit checks; an open segment stays incomplete.
 
         A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of the ramp for a stop
-        level [s]. Records until silence is measured; raises InstrumentError if it is not.
+        level [s]. Records until silence is measured; raises InstrumentError if the drive stays on.
         """
         self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
@@ -407,7 +407,7 @@ class PhaseRunner:
         self._enter(before)
 
     def refusal_to_hold(self) -> str:
-        """Return why the drive cannot be held now; empty if it can."""
+        """Return the reason why the drive cannot be held now; empty if it can be held."""
         source = self._drive.drive_source.value
         return "" if self._drive.can_hold else f"the present signal of the {source} cannot be held"
 

@@ -45,7 +45,7 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Smallest ratio of a sweep's step to the time of its commands; above 1, because that time varies."""
+"""Smallest ratio of a sweep's step to the time of its commands; above 1, because command times vary."""
 _MOST_COMMANDS = 2
 """Largest number of commands for one change of tone: amplitude and frequency."""
 
@@ -261,7 +261,7 @@ class Run(ClosedOnLeaving):
                     self._until.close()
 
     def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
-        """Play the plan; after a stop or a limit, ramp down as fast as the cause requires."""
+        """Play the plan; after a stop or an exceeded limit, ramp down as fast as the cause requires."""
         try:
             yield from self._played(runner)
             self._ending.is_finished(runner.loop.lost_samples, self._known)
@@ -381,7 +381,7 @@ class Run(ClosedOnLeaving):
 
 
 def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
-    """Carry out a controller's actions; the samples of each determine the next."""
+    """Carry out a controller's actions; the controller receives the samples of each action."""
     try:
         action = next(controller)
         while True:

@@ -23,14 +23,14 @@ from .acquisition_loop import BLOCK_S
 from .drive import Drive
 
 DRIVE_TOLERANCE = 0.15
-"""Relative tolerance of the measured drive; a wrong load setting is a factor of 2."""
+"""Relative tolerance of the measured drive; a wrong load setting would change it by a factor of 2."""
 BASE_FACTOR = 10 ** (3 / 20)
-"""Factor by which the base acceleration may differ from the model: 3 dB."""
+"""Factor by which the measured base acceleration may differ from the model: 3 dB."""
 WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
-"""Largest signal before anything plays, as a fraction of the expected signal."""
+"""Largest input signal before anything plays, as a fraction of the signal expected from the sine."""
 STILL_SHARE = 0.3
-"""First part of the quiet record, as a fraction, that is ignored: filter and table may still ring."""
+"""Fraction at the start of the quiet record that is ignored, because filter and table may still ring."""
 
 
 class LowLevelCheck(StrEnum):
@@ -93,7 +93,7 @@ def check_figures(
 def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
     """Return the amplitude of a sine of known frequency [V], fitted with a constant and a linear drift.
 
-    ``volts`` has the shape (samples,) and is longer than a period.
+    ``volts`` has the shape (samples,) and spans more than one period of the sine.
     """
     time_s = np.arange(len(volts)) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s
@@ -157,15 +157,15 @@ def _require_base(figures: CheckFigures) -> None:
 
 
 SILENT_V = 5e-3
-"""Half peak-to-peak voltage that counts as silence: noise, hum, a generator's lowest setting [V]."""
+"""Half peak-to-peak voltage that counts as silence: noise, hum, the lowest generator setting [V]."""
 HUM_FACTOR = 2.0
-"""Multiple of the hum before the run that also counts as silence, if it exceeds `SILENT_V`."""
+"""Factor on the hum before the run; up to this level a signal counts as silence, if above `SILENT_V`."""
 LISTEN_S = 0.02
 """Step of the search for silence: one period of the mains [s]."""
 LONGEST_S = 12.0
-"""Longest search for silence [s]; longer than the converter's buffer."""
+"""Longest search for silence [s], longer than the converter's buffer."""
 LOWER_AFTER_S = 1.0
-"""Time of measured drive after which the amplitude is lowered too [s]; the output's relay may be stuck."""
+"""Time of measured drive after which the amplitude is lowered, too [s]: the output's relay may be stuck."""
 STILL_ON = 0.1
 """Fraction of the largest recorded drive above which a remaining signal cannot be hum."""
 
@@ -191,7 +191,7 @@ class SilenceWatch:
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
     def begin(self, sample: int) -> None:
-        """Start the measurement: the stop was noticed before this sample."""
+        """Start the measurement of silence; the stop was noticed before this sample."""
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
@@ -220,7 +220,7 @@ class SilenceWatch:
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
     def note_heard(self) -> None:
-        """Note whether more than hum remains although the output was switched off."""
+        """Note whether more than hum remains after the output was switched off."""
         self.is_heard |= not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
 
     def require_silence(self) -> None:
@@ -282,7 +282,7 @@ class DriveGuard(ClosedOnLeaving):
         self._still_s, self._has_begun = 0.0, True
 
     def advance(self) -> None:
-        """Note that a block was read."""
+        """Note that a block of samples was read."""
         self._blocks += 1
         DRIVES_ON.note_advance()
 
@@ -298,7 +298,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """Stop monitoring, at any time; a drive that was not confirmed as off still counts as on."""
+        """Stop monitoring, at any time; a drive that was not confirmed as off is still listed as on."""
         self._watchdog.close()
 
     def _look(self) -> None:

@@ -15,7 +15,7 @@ from ..plan import DriveSource, Measurement, Phase, half_cosine
 from .acquisition_loop import BLOCK_S
 
 RELEASE_S = 0.05
-"""Duration of the fade after the last phase [s]."""
+"""Duration of the fade to zero after the last phase [s]."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class StreamDrive:
         """``terminal_factor`` is the voltage at a generator's terminal per volt of its setting."""
         self._output = output
         self.pause_s = output.ahead_samples / output.sample_rate_hz
-        """Time to play the samples written in advance [s]."""
+        """Time that the samples written in advance take to play [s]."""
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
         self._synthesizer = OutputSynthesizer(output.sample_rate_hz)
@@ -166,7 +166,7 @@ class StreamDrive:
 
     @property
     def is_playing(self) -> bool:
-        """Whether samples other than zero remain to be played."""
+        """Whether samples other than zero still have to be played."""
         return self._is_playing and self._sounds_until > self._played
 
     def arm(self, coming: Iterable[Phase]) -> None:
@@ -181,7 +181,7 @@ class StreamDrive:
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Write in advance while an earlier phase plays; yield the times to read until more samples fit."""
+        """Write in advance while an earlier phase plays; yield reading times until more samples fit."""
         self._is_playing = True
         full_vpp = self._amplitude_vpp * full_level(phase.play)
         yield from self._listened(phase.duration_s, full_vpp * phase.end_level)
@@ -217,7 +217,7 @@ class StreamDrive:
         return round(self._read_s * self._output.sample_rate_hz)
 
     def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
-        """Yield a duration in parts no longer than a block, and write in advance after each."""
+        """Yield a duration in parts no longer than a block; write samples in advance after each part."""
         begin_vpp = self.setting_vpp
         parts = ceil(duration_s / BLOCK_S * (1 - _ROUNDING))
         for part in range(1, parts + 1):

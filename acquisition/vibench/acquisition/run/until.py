@@ -34,7 +34,7 @@ _ASK_S = 0.05
 
 
 class UntilWatch(ClosedOnLeaving):
-    """Analyses a growing recording again and again until the requested bounds are met.
+    """Analyses a growing recording again and again until the error bounds are small enough.
 
     A stretch is a part of the recording with one result. Process and thread start before anything plays. The
     run queues requests, reads results and never waits. If the process fails, the longest time is recorded.
@@ -88,7 +88,7 @@ class UntilWatch(ClosedOnLeaving):
             self._beside.wait(_ASK_S)
 
     def phases(self, measurement: Measurement) -> Iterator[Phase]:
-        """Yield the phases of the measurement; recordings end early when the requested bounds are met."""
+        """Yield the phases of the measurement; recordings end early when error bounds are small enough."""
         for phase in phases(measurement):
             is_result = phase.segment is not None and phase.segment.label in self._labels
             if not isinstance(phase.play, Waveform):
@@ -145,7 +145,7 @@ class UntilWatch(ClosedOnLeaving):
         self._beside.do(lambda: self._look(note, recorded_s))
 
     def _look(self, note: UntilNote, recorded_s: float) -> None:
-        """Request the bounds for the first ``recorded_s`` of the stretch; runs in the thread."""
+        """Request the error bounds for the first ``recorded_s`` of the stretch; runs in the thread."""
         bounds: dict[str, float | None] = {}
         try:
             question = {"path": str(self._path), "stretch": note.stretch, "recorded_s": recorded_s}
@@ -171,7 +171,7 @@ class UntilWatch(ClosedOnLeaving):
         return self._process.stdout.readline()
 
     def close(self) -> None:
-        """End the process and discard its answer. May be called at any time."""
+        """End the analysis process and discard its answer. May be called at any time."""
         self._process.kill()
         self._process.wait(_ENDING_S)
         self._beside.close(_ENDING_S)
