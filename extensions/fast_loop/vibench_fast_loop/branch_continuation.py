@@ -12,9 +12,9 @@ from vibench.acquisition.recording import SegmentLabel
 from vibench.acquisition.rig import Rig
 
 _NO_TRIES = 12
-"""Maximum number of tries per point; each settles and measures."""
+"""Maximum number of attempts per point; the motion settles and is measured in each."""
 _BEFORE = 60
-"""Periods played before the evaluated perturbations, as lead-in and to find the size of perturbations."""
+"""Periods before the evaluated perturbations, as lead-in and to find the size of the perturbations."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -32,7 +32,7 @@ class BranchContinuation(AbstractFeedback):
     base_level: BaseLevel
     """Level of the base motion at every point."""
     start_hz: FrequencyHz
-    """Frequency at which the branch starts [Hz]."""
+    """Frequency at the start of the branch [Hz]."""
     low_hz: FrequencyHz
     """Lower end of the frequency range [Hz]."""
     high_hz: FrequencyHz
@@ -41,7 +41,7 @@ class BranchContinuation(AbstractFeedback):
     """Direction in which the frequency changes first."""
     begin_from: Literal["rest", "above"] = "rest"
     """Approach to the base level at the start: from rest, or from three times the drive that the model
-    without stops predicts. The second approach finds motions with impacts."""
+    without stops predicts. The second choice finds motions with impacts."""
     step_hz: PositiveFloat = 1.0
     """Longest step between points [Hz]; steps are shorter in folds and where points are difficult to find."""
     most_points: int = Field(default=60, ge=1, le=1000)
@@ -56,12 +56,12 @@ class BranchContinuation(AbstractFeedback):
     look_periods: int = Field(default=20, ge=10, le=1000)
     """Number of periods in one measurement."""
     record_s: PositiveFloat = 0.5
-    """Time recorded at each point [s]."""
+    """Time for which each point is recorded [s]."""
     perturbation: float = Field(default=0.0, ge=0, le=0.1)
     """Small changes of the drive that measure the stability of each point: relative rms change of the
-    fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 for no measurement."""
+    fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to measure no stability."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
-    """Number of periods with these changes at each point; a few more periods find their size."""
+    """Number of evaluated periods with small changes at each point; a few more periods find their size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -79,14 +79,14 @@ class BranchContinuation(AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of all points, each with the maximum number of tries [s]."""
+        """Duration of all points, each with the maximum number of attempts [s]."""
         look_s = self.settle_s + self.look_periods / self.low_hz
         perturbed = self.perturbed_periods + _BEFORE if self.perturbation else 0
         return self.most_points * (_NO_TRIES * look_s + self.record_s + perturbed / self.low_hz)
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The only base level of the branch."""
+        """The single base level of the branch."""
         return (self.base_level,)
 
     def segment(self, number: int, frequency_hz: float) -> Segment:
@@ -99,12 +99,12 @@ class BranchContinuation(AbstractFeedback):
         return Segment(SegmentLabel.PERTURBED, numbers)
 
     def require_holdable(self, rig: Rig) -> None:
-        """Refuse the branch if, according to the model, the fast loop of the rig would not hold it."""
+        """Refuse the branch if the model predicts that the rig's fast loop would not hold it."""
         from .fast_loop import fast_loop, require_held  # noqa: PLC0415 - plans are read without the model
 
         require_held(fast_loop(rig), self)
 
     def steps(self) -> Iterator[Step]:
-        """Yield a step at each end of the frequency range, at the largest setting."""
+        """Yield a step at each end of the frequency range, at the largest amplitude setting."""
         for number, frequency_hz in enumerate((self.low_hz, self.high_hz)):
             yield Step(LoopTone(frequency_hz), 0.0, self.record_s, self.segment(number, frequency_hz))

@@ -1,4 +1,4 @@
-"""Player of a fast loop's settings; it measures base and m0 until their standard errors are small."""
+"""Player of settings on a fast loop; it measures base and m0 until their standard errors are small."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ _GLIDE_S = 0.1
 _HIGHEST = 9
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
-"""Largest standard errors at the end of a measurement: of the base's fundamental and harmonics relative to
-the tolerance, and of m0 relative to itself."""
+"""Largest standard errors at the end of a measurement. Those of the base's fundamental and harmonics are
+relative to the tolerance, that of m0 is relative to m0 itself."""
 _ROUGHLY = 0.15
-"""Largest standard error of the base far from the level, relative to its distance from the level."""
+"""Largest standard error of the base, relative to its distance from the level while this is large."""
 _DRIFT = 3.0
-"""Largest difference between the two halves of settled blocks, in standard errors."""
+"""Largest difference between the two halves of the settled blocks, in standard errors."""
 _REMEMBERED = 0.8
-"""Weight of the scatter in earlier measurements; the few blocks of one measurement may agree by chance."""
+"""Weight of the scatter of earlier measurements; a few blocks of one measurement may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +51,13 @@ class LoopLook:
 
     @property
     def ratio_u(self) -> float:
-        """Standard error of real and imaginary part of the ratio."""
+        """Standard error of real and imaginary part of this ratio."""
         shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
         return float(abs(self.ratio) * np.hypot(*shares))
 
 
 class BranchPlayer:
-    """Player of settings; it measures the response of base and m0 to each."""
+    """Plays settings of a controller, and measures the response of base and m0 to each."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan
@@ -68,7 +68,7 @@ class BranchPlayer:
         self._blocks: list[LoopBlock] = []
         """Blocks of the current setting since the motion settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
-        """Squared deviations of blocks in earlier measurements, summed, and their degrees of freedom."""
+        """Sum of squared deviations of blocks in earlier measurements, and its degrees of freedom."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
         """Return a setting as a program of the controller."""
@@ -126,7 +126,7 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Return the blocks without the first half, repeated while it differs from the second half."""
+    """Return the second half of the blocks; halve again while their halves still differ."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
         # Differences of neighbours are used, because a drift hardly changes them.
@@ -141,7 +141,7 @@ def _settled_part(seen: Coefficients) -> Coefficients:
 
 
 def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
-    """Return whether the standard errors are small enough for the present distance from the level."""
+    """Return whether the standard errors are small enough for the base's present distance from the level."""
     share = look.base_u[: plan.harmonics] / level_m
     wrong = abs(abs(look.base_m[0]) / level_m - 1)
     return bool(

@@ -10,17 +10,17 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""Smallest change of the unknowns for which the derivative is updated."""
+"""Smallest change of the unknowns from which the derivative is updated."""
 _DOUBTED = 0.05
-"""Assumed standard error of the derivative, against which measurement noise is weighted."""
+"""Assumed standard error of the derivative, for its weight against measurement noise."""
 _REFERENCE_STEP = 0.15
-"""Relative change of the first coefficient that counts as one step."""
+"""Relative change of the first coefficient that counts as one step along the branch."""
 _RATIO_STEP = 1.0
 """Change of the ratio m0 / base that counts as one step."""
 _RATIO = 2
-"""Number of rows for the ratio m0 / base (real and imaginary part), after those of the residual."""
+"""Number of rows for the ratio m0 / base (real and imaginary part), which follow those of the residual."""
 _NEW = 0.3
-"""Share of a step by which a point must advance to count as new."""
+"""Fraction of a step by which a point must advance to count as a new point."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
 """Smallest distance of two points that define a direction, in steps (the tolerance moves points by less),
 and in standard errors."""
@@ -28,7 +28,7 @@ and in standard errors."""
 
 @dataclass(frozen=True, eq=False)
 class LoopSetting:
-    """Setting of a controller, which contains the unknowns of the equations."""
+    """Setting of a controller; the unknowns of the equations are part of it."""
 
     frequency_hz: float
     reference_v: Coefficients
@@ -38,7 +38,7 @@ class LoopSetting:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoint:
-    """A setting as unknowns of the equations; its measured response as residual and ratio."""
+    """A setting as unknowns of the equations, and its measured response as residual and ratio."""
 
     unknowns: Vector
     residual: Vector
@@ -46,11 +46,11 @@ class MeasuredPoint:
     ratio: complex
     """Fundamental of m0 over fundamental of the base."""
     noise: Vector
-    """Standard errors of the residual, and of real and imaginary part of the ratio."""
+    """Standard errors of the residual, and of real and imaginary part of this ratio."""
 
     @property
     def place(self) -> Vector:
-        """Coordinates for the arc length: frequency and both parts of the ratio, in steps."""
+        """Coordinates for the arc length: frequency and both parts of the ratio, each in steps."""
         return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
 
 
@@ -102,7 +102,7 @@ class BranchSolver:
         self._begin = self._unknowns(start)
 
     def first(self) -> PredictedPoint:
-        """Return the first prediction, at the fixed frequency of the start."""
+        """Return the first prediction, at the fixed frequency of the branch's start."""
         along = np.array([1.0, 0.0, 0.0])
         return PredictedPoint(self._begin, along * self._begin[0], along, 0.0)
 
@@ -121,7 +121,7 @@ class BranchSolver:
         return PredictedPoint(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
-        """Return the setting for these unknowns."""
+        """Return the controller setting that corresponds to these unknowns."""
         volts = np.exp(_REFERENCE_STEP * unknowns[1]) * self._volts[0]
         rest = (unknowns[2::2] + 1j * unknowns[3::2]) * self._volts[1:]
         return LoopSetting(
@@ -193,7 +193,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
 
 
 def _behind(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
-    """Return the latest point that is far enough from the last to define a direction, else the first."""
+    """Return the newest point far enough from the last point to define a direction, else the first point."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

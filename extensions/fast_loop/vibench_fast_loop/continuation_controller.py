@@ -46,28 +46,28 @@ from .open_loop_multiplier import (
 
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
-"""Number of tries for the first point, where the model without stops may be inaccurate."""
+"""Number of attempts for the first point, where the model without stops may be inaccurate."""
 _NEAR = 0.3
 """Largest relative error of the level at which the unknowns of the first motion are varied one by one."""
 _SHORTEST_STEP = 1 / 64
-"""Shortest step relative to the step of the plan."""
+"""Shortest step, as a fraction of the step in the plan."""
 _GROWTH, _EASY = 1.5, 3
-"""Factor by which steps grow, if the last point needed at most this number of tries."""
+"""Factor by which steps grow if the last point needed at most the number of attempts below."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
-"""Variations of the unknowns: frequency and first coefficient in steps, harmonics relative to the level."""
+"""Variations of the unknowns. Frequency and first coefficient: in steps; harmonics: relative to the level."""
 _BELOW = 5.0
-"""Start value of the first coefficient below the model's value, in steps."""
+"""Initial value of the first coefficient below the model's value, in steps."""
 _ABOVE = 8.0
-"""Start value of the first coefficient above the model's value, in steps: about three times that value."""
+"""Initial value of the first coefficient above the model's value (about three times as large), in steps."""
 _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps]; largest base harmonics relative to the level
 for a decrease. Both are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Limits of the change of base level per step of the first coefficient, before the level is reached."""
+"""Limits of the slope (change of base level per step of the first coefficient) until the level is reached."""
 _LEAST_CHANGE = 0.01
 """Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Parts of the tolerance allowed to fundamental and harmonics; small, because folds move with the level."""
+"""Fractions of the tolerance allowed to fundamental and harmonics; small, as folds move with the level."""
 _BEND_HZ = 0.05
 
 
@@ -129,7 +129,7 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
 
 
 def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[MeasuredPoint, int] | None]:
-    """Change the drive until the base has its level; return the first motion and the number of tries."""
+    """Change the drive until the base has its level; return the first motion and the number of attempts."""
     predicted = solver.first()
     unknowns = predicted.unknowns.copy()
     above = player.plan.begin_from == "above"
@@ -159,7 +159,7 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, colu
     """Return to the last point, and update the derivative by varying its first unknowns one by one.
 
     The derivatives with respect to frequency and first coefficient change most. Those with respect to
-    harmonics are learnt from joint changes, and can make the equations unsolvable near a fold.
+    harmonics follow from joint changes; near a fold they can make the equations unsolvable.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -172,7 +172,7 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, colu
 def _correct(
     player: BranchPlayer, solver: BranchSolver, predicted: PredictedPoint
 ) -> Controller[tuple[MeasuredPoint, int] | None]:
-    """Return the point of the branch near a prediction, and the number of tries; None if not found."""
+    """Return the point of the branch near a prediction, and the number of attempts; None if not found."""
     unknowns = predicted.unknowns
     for tries in range(1, _MOST_TRIES + 1):
         seen = yield from _look_at(player, solver, unknowns)
@@ -220,21 +220,21 @@ def _record(
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:
-    """Return whether the base moves as a sine of its level, closely enough for a point of the branch."""
+    """Return whether the base moves as a sine of its level, accurately enough for a point of the branch."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
 
 
 _EACH = 5
-"""Drive periods per change: deviations hardly grow in this time, but the upper modes follow the change."""
+"""Drive periods per change. Deviations hardly grow in this time, but the upper modes follow the change."""
 _LEAD, _TRIAL = 3, 8
-"""Number of changes before the evaluated changes, and in the trial that finds the size of the changes."""
+"""Number of changes before the evaluated changes; also in the trial that finds their size."""
 _CHANGED = (0, 2)
-"""Coefficients that are perturbed: the first, and the third, where the specimen also drives the table."""
+"""Indices of perturbed coefficients: first and third harmonic, as the specimen drives the table at both."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
 """Size of the drive's changes in the trial, and their largest size, relative to the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion counts as changed if it differs by more than this share and this many standard errors."""
+"""A motion counts as changed if it differs by more than this fraction and this many standard errors."""
 _NEVER = 1e-9
 
 
@@ -301,7 +301,7 @@ def _fit(
 def stability_note(
     found: OpenLoopMultiplier, number: int, perturbation: float, before: LoopLook, after: LoopLook
 ) -> BranchStabilityNote:
-    """Return the note on a fit; undetermined if the held motion has changed during the perturbation."""
+    """Return the note on a fit; undetermined if the held motion changed during the perturbation."""
     error = float(np.hypot(before.m0_u[0], after.m0_u[0]) / abs(before.m0_m[0]))
     moved = float(abs(abs(after.m0_m[0] / before.m0_m[0]) - 1))
     low, high = found.bounds

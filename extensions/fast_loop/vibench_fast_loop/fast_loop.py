@@ -1,4 +1,4 @@
-"""The law of a rig's fast loop, the calibration of its coefficients, and a prediction whether it holds."""
+"""Law of a rig's fast loop, calibration of its coefficients, and prediction of whether it holds a branch."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Largest multiplier allowed along a branch; deviations then fall to a third within a hundred periods."""
+"""Largest multiplier allowed along a branch; with it, deviations fall to a third within a hundred periods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class FastLoop:
 
     @property
     def feedback(self) -> LoopFeedback:
-        """The law for a controller, with sensor voltages as input."""
+        """The law for a controller whose inputs are sensor voltages."""
         units = np.array(_units_per_volt(self.rig))
         return LoopFeedback(
             step=_rows(self.law.step),
@@ -161,23 +161,23 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Number of motions checked along a branch; stable ones too, because a delayed law may destabilise them."""
+"""Number of motions checked along a branch; also stable motions, as a delayed law may destabilise them."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods to try, and tolerance; the smallest with a whole number of samples is used."""
+"""Numbers of periods to try until they contain a whole number of samples, and the tolerance for "whole"."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Points per period at which the slope of the spring force is computed, without and with stops."""
 _PART_S = 1e-6
 """Longest part of a control step with one slope of the stops' force [s]; a contact has a hundred parts."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
-"""Decreasing levels, relative to the required level, that lead to a motion with impacts."""
+"""Decreasing levels relative to the required level, along which a motion with impacts is reached."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """How far along a branch, and how well, a law holds the motions from the start on."""
+    """Part of a branch on which a law holds the motions, and the largest multiplier."""
 
     multiplier: float
-    """Largest multiplier over a period under the law, among the checked motions."""
+    """Largest multiplier over a period under the law, among the motions that were checked."""
     at_hz: float
     held_hz: float | None
     """End of the range in which every motion is held [Hz]; None if the first motion is not held."""

@@ -35,7 +35,7 @@ from vibench.sim import Branch, Specimen
 from .fast_loop import impact_branch
 
 _LEAST = 3
-"""Minimum number of points in which a turn of the frequency can be found."""
+"""Minimum number of points in which a turn of the frequency along the branch can be found."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ class HeldBranch(Labelled):
     """Rms of the second and higher harmonics of the base displacement, relative to its fundamental."""
     residue_acceleration: Reals
     stability: tuple[str, ...]
-    """Stability without feedback under a sinusoidal base: values of `Stability`; empty if not measured."""
+    """Stability without feedback for a sinusoidal base: values of `Stability`; empty if not measured."""
     multiplier: Reals
-    """Largest multiplier over a period, from small perturbations; NaN if undetermined."""
+    """Largest multiplier over a period, estimated from small perturbations; NaN if undetermined."""
     multiplier_u: Reals
 
     @property
@@ -107,7 +107,7 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
 
 _HEIGHT_IN = 4.4
 _ROOM_HZ = 1.0
-"""Margin of the model's branch beyond the held points [Hz]."""
+"""Frequency margin of the model's branch beyond the held points [Hz]."""
 
 
 def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:

@@ -19,7 +19,7 @@ from .plant import SampledPlant
 
 # Weights of the design: expected sizes of motion, voltage and noise.
 RELATIVE_M = 3e-5
-"""Motion of p with the same cost as a control voltage of 0.1 V [m]."""
+"""Displacement p that has the same cost in the law's design as a control voltage of 0.1 V [m]."""
 PUSH_N = 3e-3
 """Unknown force between m1 and m2 that the filter assumes, rms over a step [N]."""
 VOLT = 1e-2
@@ -30,7 +30,7 @@ NOISE = 0.2, 1e-4
 
 @dataclass(frozen=True, eq=False)
 class LinearLaw:
-    """Voltage u from samples s: u = output @ memory + direct @ s; then memory = step @ memory + inlet @ s."""
+    """Voltage u from samples s: u = output @ memory + direct @ s. Then memory = step @ memory + inlet @ s."""
 
     step: Table
     """Matrix of shape (n, n)."""
@@ -98,7 +98,7 @@ def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
 
 
 class _WeightedPlant(NamedTuple):
-    """A plant scaled by the sizes of its motions, with matrices of cost and noise."""
+    """A plant in units of its typical motions, with matrices of cost and noise."""
 
     step: Table
     volt: Vector

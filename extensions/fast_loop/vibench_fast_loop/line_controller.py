@@ -13,7 +13,7 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import LoopFacts, LoopProgram, LoopReport, LoopRequest
 
 _PART = 0.01
-"""Largest relative deviation of rate, limit and watchdog time from the configuration."""
+"""Largest relative deviation of the controller's rate, limit and watchdog time from the configuration."""
 _LEAVING_S = 0.1
 _LONGEST_LINE = 1_000_000
 """Longest answer that is read [bytes]; a faulty controller may never end its line."""
@@ -61,19 +61,19 @@ class LineController:
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program; return the report."""
+        """Change to a program; return the controller's report."""
         return self._request(LoopRequest(ask="play", program=program), LoopReport)
 
     def report(self) -> LoopReport:
-        """Return the state and the blocks measured since the last report."""
+        """Return the controller's state, and the blocks measured since the last report."""
         return self._request(LoopRequest(ask="report"), LoopReport)
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp the output down to silence; return the report."""
+        """Ramp the output down to silence; return the controller's report."""
         return self._request(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
 
     def close(self) -> None:
-        """Silence the output and close the connection; if this fails, the watchdog silences the output."""
+        """Silence the output and close the connection. If this fails, the watchdog silences the output."""
         if self._is_open:
             try:
                 self.silence(_LEAVING_S)

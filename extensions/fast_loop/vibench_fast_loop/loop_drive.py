@@ -1,4 +1,4 @@
-"""A real-time controller as a drive: it receives programs, and sends reports while it plays."""
+"""A real-time controller as a drive. It receives programs, and sends reports while it plays."""
 
 from collections.abc import Callable, Iterable, Iterator
 
@@ -11,9 +11,9 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import ControllerDriver, LoopBlock, LoopController, LoopProgram, LoopState, ProgramTone
 
 TALK = 0.25
-"""Longest interval between requests, relative to the time of the watchdog."""
+"""Longest interval between requests, as a fraction of the watchdog's time."""
 QUICK_S = 0.1
-"""Ramp duration for silence outside ramp phases [s]."""
+"""Duration of a ramp to silence outside the ramp phases of a run [s]."""
 _ROUNDING_S = 1e-9
 
 
@@ -24,7 +24,7 @@ class LoopDrive:
     is_commanded = False
     pause_s = 0.0
     can_hold = False
-    """Whether it can hold its output unattended: no, because the watchdog needs requests."""
+    """Whether it can hold its output without requests: no, because the watchdog needs requests."""
 
     def __init__(self, controller: LoopController, measurement: Measurement) -> None:
         self._controller = controller
@@ -40,7 +40,7 @@ class LoopDrive:
 
     @property
     def setting_vpp(self) -> float:
-        """Twice the fundamental of the program [V]; 0 in silence."""
+        """Twice the fundamental of the program, as an equivalent generator setting [V]; 0 in silence."""
         return 0.0 if self._program is None else 2 * abs(complex(*self._program.reference_v[0]))
 
     @property
@@ -50,14 +50,14 @@ class LoopDrive:
 
     @property
     def coefficients(self) -> tuple[LoopBlock, ...]:
-        """Coefficients measured since the start of the phase."""
+        """Fourier coefficients measured since the start of the phase."""
         return tuple(self._blocks)
 
     def arm(self, coming: Iterable[Phase]) -> None:
         """Do nothing; the controller is already silent."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Do nothing."""
+        """Do nothing, because nothing is prepared in advance."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
         """Play a phase with regular requests; yield the reading time before each request [s]."""
@@ -80,7 +80,7 @@ class LoopDrive:
         self._silence(0.0)
 
     def silence(self) -> None:
-        """Silence the output in any state."""
+        """Silence the output, in any state of the controller."""
         self._silence(QUICK_S)
 
     def _play(self, play: Play, ramp_s: float | None) -> None:

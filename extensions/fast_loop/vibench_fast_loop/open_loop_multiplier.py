@@ -38,11 +38,11 @@ _HALF = 4
 """Half length of the window of an envelope [periods]."""
 _EACH = 4
 _INPUTS = {1: 2, 3: 1}
-"""Harmonics of the base used as inputs, with the highest derivative used of each."""
+"""Harmonics of the base used as inputs of the fit; for each, the highest derivative that is used."""
 _BLOCK = 8
 """Number of periods in a block; residuals of different blocks count as independent."""
 _MODEL = 0.01
-"""Standard error due to the truncated expansion: bias for noise-free motions (docs/decisions/0069)."""
+"""Standard error due to the truncated expansion, from the bias in noise-free motions (decision 0069)."""
 _QUANTILE = 2.1
 """97.5 % quantile of Student's distribution for about twenty blocks, for a 95 % interval."""
 
@@ -126,7 +126,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
 
 
 def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
-    """Return the largest multiplier; its error is from residuals in blocks of periods (delta method)."""
+    """Return the largest multiplier; its error follows from residuals of blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]
@@ -141,7 +141,7 @@ def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vecto
 
 
 def _turn(motion: PerturbedMotion) -> Complexes:
-    """Return the carrier at the drive frequency, which is estimated from the base because clocks differ."""
+    """Return the carrier at the drive frequency, estimated from the base, because the clocks differ."""
     turn = np.exp(-2j * np.pi * np.arange(len(motion.base)) / motion.period)
     inside = slice(motion.first, motion.first + round(2 * motion.periods * motion.period))
     phase = np.unwrap(np.angle(_envelope(motion.base, turn, motion.period, 0)[inside]))

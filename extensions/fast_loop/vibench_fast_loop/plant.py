@@ -20,12 +20,12 @@ SHOWN = 2
 
 @dataclass(frozen=True)
 class LoopTiming:
-    """Sample rate and latency of a controller."""
+    """Sample rate and latency of a real-time controller."""
 
     rate_hz: float
     """Samples per second; each sample is the mean since the previous sample."""
     latency_s: float
-    """Time from a sample to the voltage that it determines [s]."""
+    """Time from a sample to the output of the voltage that the sample determines [s]."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.rate_hz < np.inf and 0.0 <= self.latency_s < np.inf):

@@ -22,7 +22,7 @@ MOST_MEMORY = 64
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Row = tuple[Finite, ...]
 Pair = tuple[Finite, Finite]
-"""Real and imaginary part."""
+"""Real and imaginary part of a Fourier coefficient."""
 
 
 class LoopFeedback(FrozenModel):
@@ -75,7 +75,7 @@ class LoopState(StrEnum):
     SILENT = "silent"
     PLAYING = "playing"
     ENDING = "ending"
-    """The controller ramps down by itself."""
+    """The controller ramps its output down."""
 
 
 class LoopBlock(FrozenModel):
@@ -84,20 +84,20 @@ class LoopBlock(FrozenModel):
     end_s: float
     """End of the block on the clock of the controller [s]."""
     steady: bool
-    """Whether nothing changed during the block."""
+    """Whether the program stayed the same during the block."""
     output: tuple[Pair, ...]
-    """Output voltage, program and law together."""
+    """Output voltage of program and law together, from the mean on [V]."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
 
 class LoopReport(FrozenModel):
-    """Report of a controller; each block is contained in one report only."""
+    """Report of a controller. Each measured block is contained in one report only."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     state: LoopState
     reason: str = ""
-    """Reason why it ends or is silent without a command; otherwise empty."""
+    """Reason why the controller ramps down or is silent without a command; otherwise empty."""
     time_s: float
     blocks: tuple[LoopBlock, ...] = ()
 
@@ -113,7 +113,7 @@ class LoopFacts(FrozenModel):
     limit_v: PositiveFloat
     """Largest output voltage, peak [V]."""
     watchdog_s: PositiveFloat
-    """Time without a request after which the controller ramps down [s]."""
+    """Time without a request after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
     """Only input on which it accepts a proportional-derivative law; None if it accepts any linear law."""
 
@@ -126,12 +126,12 @@ class LoopRequest(FrozenModel):
     program: LoopProgram | None = None
     """Program for the request "play"."""
     ramp_s: NonNegativeFloat = 0.1
-    """Ramp duration for the request "silence" [s]."""
+    """Ramp duration for a request "silence" [s]."""
 
 
 @dataclass(frozen=True)
 class ProgramTone(LoopTone):
-    """A sine, with the program by which the controller plays it."""
+    """A sine in the plan, with the program by which the controller plays it."""
 
     program: LoopProgram | None = None
 
@@ -144,7 +144,7 @@ class LoopController(RealTimeController, Protocol):
         """Identity and capabilities of the controller."""
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program over its glide time; return the report."""
+        """Change to a program over its glide time; return the controller's report."""
 
     def report(self) -> LoopReport:
         """Return the state and the blocks measured since the last report, and restart the watchdog.
@@ -153,7 +153,7 @@ class LoopController(RealTimeController, Protocol):
         """
 
     def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down to silence; allowed at any time. Return the report."""
+        """Ramp down to silence; allowed at any time. Return the controller's report."""
 
 
 class ControllerDriver(Protocol):

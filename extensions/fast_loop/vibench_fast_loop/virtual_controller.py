@@ -72,7 +72,7 @@ class VirtualController:
 
     @property
     def is_on(self) -> bool:
-        """Whether the controller plays or ramps down."""
+        """Whether the controller is playing or ramping down."""
         return self._state is not LoopState.SILENT
 
     @contextmanager
@@ -99,7 +99,7 @@ class VirtualController:
                 now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def execute(self, message: bytes) -> Reply:
-        """Execute one line of the protocol, and return the line that answers it."""
+        """Execute one line of the protocol, and return the answer as a line."""
         try:
             request = LoopRequest.model_validate_json(message)
         except ValidationError as error:
@@ -196,7 +196,7 @@ class LoopCables:
 
     @property
     def is_on(self) -> bool:
-        """Whether the controller plays, or delayed voltages remain."""
+        """Whether the controller is active, or delayed voltages remain to be played."""
         return self._loop.is_on or bool(self._late.any())
 
     def move(
