@@ -15,7 +15,7 @@ MOST_SAMPLES = 1 << 27
 """Largest number of values in a buffer or a read: 1 GiB."""
 
 LEAST_PRETRIGGER = 2
-"""Smallest number of samples before and after a reference trigger."""
+"""Smallest number of samples that can be stored before, and after, a reference trigger."""
 
 
 @dataclass
@@ -23,16 +23,16 @@ class Timing:
     """Configuration of sample clock and triggers."""
 
     kind: SampleTimingType | None = None
-    """None: the device's default."""
+    """Type of sample timing; None: the device's default."""
     requested_hz: float = 1000.0
     mode: AcquisitionType = AcquisitionType.FINITE
     samples: int = 1000
     """Samples to acquire; for a continuous task, the smallest buffer size."""
     clock_source: str = ""
     trigger_source: str = ""
-    """Empty: no trigger; sampling begins when the task is started."""
+    """Terminal of the start trigger; empty: sampling begins when the task is started."""
     reference_source: str = ""
-    """Empty: no reference trigger, around whose edge a finite task stores samples."""
+    """Terminal of the reference trigger, around which a finite task stores samples; empty: no trigger."""
     pretrigger: int = 0
     """Samples per channel stored before the reference trigger."""
 
@@ -50,28 +50,28 @@ def check_memory(samples: int, channels: int) -> None:
 
 
 _ROUNDING_SAMPLES = 1e-5
-"""Tolerance in sample periods for due samples, because rig time is a sum with rounding errors."""
+"""Tolerance, in sample periods, for deciding whether a sample is due: rig time has rounding errors."""
 
 
 class Stream:
     """A running acquisition or generation; samples are counted per channel from the start of the task."""
 
     def __init__(self, rate_hz: float, began_s: float, total: float) -> None:
-        """Start at rig time ``began_s``; ``total`` is the number of samples, or infinity."""
+        """Start at rig time ``began_s`` [s]; ``total`` is the number of samples per channel, or infinity."""
         self.rate_hz = rate_hz
         self.began_s = began_s
         self.total = total
         self.transferred = 0
-        """Number of samples acquired or generated so far."""
+        """Number of samples per channel acquired or generated so far."""
         self.failure: DaqmxRefusal | None = None
 
     @property
     def is_done(self) -> bool:
-        """Whether all samples are transferred, or never will be."""
+        """Whether all samples of the task are transferred, or the rest will never be."""
         return self.transferred >= self.total or self.failure is not None
 
     def reaches(self, count: int) -> bool:
-        """Return whether ``count`` samples are transferred."""
+        """Return whether ``count`` samples per channel are transferred."""
         return self.transferred >= count
 
     def time_of(self, count: float) -> float:
@@ -79,7 +79,7 @@ class Stream:
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     def due(self, now_s: float) -> int:
-        """Return how many samples a stream without end has transferred at rig time ``now_s``."""
+        """Return how many samples a stream without end has transferred until rig time ``now_s``."""
         return math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
 
 
@@ -104,7 +104,7 @@ class Acquisition(Stream):
         """
         super().__init__(rate_hz, began_s, math.inf if pretrigger else total)
         self.position = 0
-        """Number of samples read by the program."""
+        """Number of samples per channel that the program has read."""
         self.queried_at = -1
         """Read position at the last query of available samples."""
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
@@ -118,7 +118,7 @@ class Acquisition(Stream):
 
     @property
     def available(self) -> int:
-        """Number of unread samples."""
+        """Number of samples per channel that the program has not read yet."""
         return 0 if self.awaits_trigger else self.transferred - self.position
 
     def advance_to(self, now_s: float) -> None:
@@ -136,7 +136,7 @@ class Acquisition(Stream):
 
     @property
     def enough_before_s(self) -> float:
-        """Rig time at which enough samples before a trigger are stored [s]; infinite once they are."""
+        """Rig time at which enough samples before a trigger are stored [s]; infinite once they are stored."""
         kept = self._pretrigger
         return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
 

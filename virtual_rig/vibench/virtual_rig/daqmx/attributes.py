@@ -37,7 +37,7 @@ DRIVER_VERSION = (24, 8, 0)
 
 @dataclass(frozen=True)
 class Attribute:
-    """One property: how it is read and, if writable, how it is set."""
+    """One property: how it is read and, if writable, how it is set by a program."""
 
     get: Callable[[Any], object]
     set: Callable[[Any, Any], None] | None = None
@@ -48,15 +48,15 @@ Attributes = Mapping[str, Attribute]
 
 @dataclass(frozen=True)
 class Group:
-    """The properties of one type of object."""
+    """The properties of one type of object, such as tasks or channels."""
 
     name: str
     """Prefix of the property names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], list[Any]]
-    """Function that returns the objects of a request; a query reads the first, setting applies to all."""
+    """Function that returns the objects of a request. A query reads the first; a setting applies to all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
-    """Whether these properties cannot be set while the task runs."""
+    """Whether these properties are read-only while the task runs."""
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -71,7 +71,7 @@ class Group:
         }
 
     def find(self, subject: Any, request: Any) -> tuple[str, Attribute]:
-        """Return name and property of the number in a request (-200197 if the subject does not have it)."""
+        """Return name and property of the number in a request (-200197 if the object does not have it)."""
         number = int(request.attribute_raw or request.attribute)
         name = self.names.get(number, f"0x{number:X}")
         attributes = self.attributes(subject)

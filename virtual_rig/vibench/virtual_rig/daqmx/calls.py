@@ -38,7 +38,7 @@ Fields = Mapping[str, object]
 
 
 class DaqmxSystem:
-    """State of the driver; the caller must hold the rig's lock."""
+    """State of the simulated driver; the caller must hold the rig's lock."""
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
@@ -46,13 +46,13 @@ class DaqmxSystem:
         self._unnamed = 0
 
     def task(self, name: str) -> Task:
-        """Return a task by name (-200088 if there is none)."""
+        """Return a task by its name (-200088 if there is no such task)."""
         if name not in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
         return self.tasks[name]
 
     def create(self, request: Any) -> Fields:
-        """Create a task, or attach to an existing one; an empty name selects an unused one."""
+        """Create a task, or attach to an existing one; an empty name selects an unused name."""
         name, behavior = request.session_name, request.initialization_behavior
         if behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_ATTACH_TO_EXISTING:
             self.task(name)
@@ -84,7 +84,7 @@ class DaqmxSystem:
 
 
 TaskCall = Callable[[Task, Any], Fields | None]
-"""Function of task and request that returns the fields of the response, if any."""
+"""Function of a task and a request, which returns the fields of the response, if any."""
 
 
 def pick(request: Any, field: str) -> int:
@@ -93,7 +93,7 @@ def pick(request: Any, field: str) -> int:
 
 
 def deadline(timeout_s: float) -> float:
-    """Return the time of the monotonic clock at which a timeout ends; infinite for a negative one [s]."""
+    """Return the time of the monotonic clock at which a timeout ends; infinite for a negative timeout [s]."""
     return math.inf if timeout_s < 0 else time.monotonic() + timeout_s
 
 
@@ -198,14 +198,14 @@ TASK_CALLS: Mapping[str, TaskCall] = {
 
 Listener = Iterator[Any]
 _BY_OTHERS = math.inf
-"""Rig time of an event that only other calls can cause."""
+"""Rig time [s] that stands for an event which only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    A listener waits for rig time like a reader. With time on demand it advances time, and continues
-    when the announced samples have been read.
+    A listener waits for rig time like a reader. With time on demand, the listener advances time, and
+    continues when the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
@@ -225,7 +225,7 @@ def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerCon
 
 
 def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.ServicerContext) -> Listener:
-    """Yield the responses, in a separate thread that holds the rig's lock only while it checks."""
+    """Yield the responses from a separate thread, which holds the rig's lock only while it checks."""
     subscription = _Subscription(system, task, context)
     while stream := subscription.await_run():
         count = response.n_samples
@@ -235,7 +235,7 @@ def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.Servic
 
 
 class _Subscription:
-    """A listener on one task: the run that it follows, and whether its client is connected."""
+    """A listener on one task: its current run, and whether its client is connected."""
 
     def __init__(self, system: DaqmxSystem, task: Task, context: grpc.ServicerContext) -> None:
         self._system = system
@@ -257,7 +257,7 @@ class _Subscription:
         self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, math.inf)
 
     def await_run(self) -> Stream | None:
-        """Wait for the next run; return None if the client or the task is gone."""
+        """Wait for the next run of the task; return None if the client or the task is gone."""
         with self._rig.changed:
             self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._followed))
             self._followed = None if self._has_gone else self._task.stream

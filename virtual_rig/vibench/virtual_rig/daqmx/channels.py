@@ -32,7 +32,7 @@ class InputChannel(_VoltageChannel):
 
     terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
     coupling: Coupling | None = None
-    """None: the device's default (AC with excitation, DC without)."""
+    """Input coupling; None: the device's default (AC with excitation, DC without)."""
     excitation: ExcitationSource = ExcitationSource.NONE
     excitation_a: float = 0.0
 
@@ -49,7 +49,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def actual_coupling(self) -> Coupling:
-        """Effective coupling."""
+        """Coupling that the input actually has."""
         if self.coupling is not None:
             return self.coupling
         wants = Coupling.AC if self.iepe_current_a else Coupling.DC
@@ -57,7 +57,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def range_v(self) -> float:
-        """Smallest full scale that contains the expected values [V]; NaN if none does."""
+        """Smallest full scale that contains the expected values [V]; NaN if no full scale does."""
         wanted_v = max(abs(self.minimum), abs(self.maximum))
         return next((each for each in self.side.ranges_v if wanted_v <= each * _SLACK), float("nan"))
 
@@ -68,7 +68,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def raw_bits(self) -> int:
-        """Bits of an unscaled sample in transfers."""
+        """Number of bits of an unscaled sample in transfers."""
         return 16 if self.side.bits <= 16 else 32
 
     def verify(self) -> None:

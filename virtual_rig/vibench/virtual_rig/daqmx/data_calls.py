@@ -21,18 +21,18 @@ from .tasks import Task
 
 @dataclass(frozen=True)
 class Reading:
-    """Result of a read."""
+    """Result of a read from a task."""
 
     volts: NDArray[np.float64]
     """Samples of all channels of the task, shape (channels, samples) [V]."""
     status: int = 0
-    """0, or the reason for fewer samples than requested."""
+    """DAQmx status: 0, or the reason for fewer samples than requested."""
     began_s: float = 0.0
     """Rig time of the first sample [s]."""
 
     @property
     def samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return int(self.volts.shape[1])
 
 
@@ -61,7 +61,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
 
 def default_samples(task: Task) -> int:
-    """Return how many samples "all" means: all of a finite task, the unread ones of a continuous task."""
+    """Return how many samples "all" means: all of a finite task, all unread ones of a continuous task."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -70,7 +70,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Return the number of unread samples per channel; if there are none, time on demand advances."""
+    """Return the number of unread samples per channel; if all are read, time on demand advances."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -79,7 +79,7 @@ def available(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples; time on demand advances if none was read since the last query."""
+    """Return the number of unread samples. Time on demand advances if none was read since the last query."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -140,7 +140,7 @@ def _nothing_in_time(task: Task, wanted: int) -> Reading:
 def _await(
     task: Task, stream: Stream, until_s: float, is_there: Callable[[], bool], deadline_s: float
 ) -> bool:
-    """Wait for samples of a run; return whether they came in time. Refused if the run is stopped (-88709)."""
+    """Wait for samples of a run; return whether they came in time. A stopped run is refused (-88709)."""
 
     def has_ended() -> bool:
         return stream.failure is not None or task.stream is not stream
@@ -217,7 +217,7 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 
 
 def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:
-    """Read samples, converted and in the caller's layout; "all" is limited by the caller's array."""
+    """Read samples, converted and in the caller's layout; the caller's array limits "all" samples."""
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan
@@ -293,7 +293,7 @@ def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
-    """Refuse to write to a task without outputs, or another number of values than its channels need."""
+    """Refuse to write to a task without outputs, or values whose number does not fit its channels."""
     if not task.outputs:
         task.require_channels()
         raise task.refusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK)

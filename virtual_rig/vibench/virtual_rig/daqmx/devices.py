@@ -23,12 +23,12 @@ _NI_9234_MAX_DIVISOR = 31
 _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
-"""Relative tolerance, so that a rate that is read back and set again does not change to the next rate."""
+"""Relative tolerance: a rate that is read back and set again must not change to the next possible rate."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Sample rates within an interval; with a clock, only those that divide it by an integer."""
+    """Sample rates within an interval; with a clock, only the clock rate divided by an integer."""
 
     minimum_hz: float
     maximum_hz: float
@@ -47,20 +47,20 @@ class AnalogInputs:
 
     count: int
     ranges_v: tuple[float, ...]
-    """Full scales in ascending order, positive and negative [V]."""
+    """Full scales in ascending order, each symmetric about zero [V]."""
     rates: Rates
     bits: int
     couplings: tuple[Coupling, ...]
     iepe_currents_a: tuple[float, ...]
-    """Possible excitation currents without 0; empty: no excitation."""
+    """Possible excitation currents besides 0 [A]; empty: the inputs have no excitation."""
     terminals: tuple[TerminalConfiguration, ...]
-    """The first is the default."""
+    """Possible couplings; the first is the default."""
     untimed: SampleTimingType
     """Timing of a task without a sample clock: delta-sigma converters run the clock at its default rate."""
     detects_overloads: bool = False
     """Whether the device reports clipped inputs."""
     is_multiplexed: bool = False
-    """Whether the inputs of a task share one converter, and so its highest rate."""
+    """Whether the inputs of a task share one converter, and therefore share its highest rate."""
 
 
 @dataclass(frozen=True)

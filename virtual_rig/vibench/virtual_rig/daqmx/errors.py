@@ -15,7 +15,7 @@ class DaqmxRefusal(InstrumentError):
     def __init__(
         self, code: int, detail: str = "", samples_read: int | None = None, samples_written: int | None = None
     ) -> None:
-        """Store the DAQmx ``code``; ``detail`` gives the rejected and the allowed values."""
+        """Store the DAQmx ``code``; ``detail`` is text on the rejected and the allowed values."""
         super().__init__("\n\n".join(filter(None, (sentence(code), detail, f"Status Code: {int(code)}"))))
         self.code = int(code)
         self.samples_read = samples_read
@@ -67,7 +67,7 @@ class ServerGone:
 
 
 class Unavailable(Exception):
-    """The server does not answer."""
+    """The server does not answer this call."""
 
 
 class Faults:
@@ -78,11 +78,11 @@ class Faults:
         self._restart_is_due = False
 
     def add(self, rule: Fault | ServerGone) -> None:
-        """Add a rule."""
+        """Add a rule to the active rules."""
         self._rules += (rule,)
 
     def remove(self, rule: Fault | ServerGone) -> None:
-        """Remove a rule; a server that comes back has lost its tasks."""
+        """Remove a rule. A server that answers again after that has lost its tasks."""
         self._restart_is_due |= rule in self._rules and isinstance(rule, ServerGone)
         self._rules = tuple(other for other in self._rules if other is not rule)
 

@@ -13,21 +13,21 @@ from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough to play new data soon."""
+"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
 
 
 class OutputBuffer:
     """Samples written by a program and not yet used by the device, shape (channels, size) [V]."""
 
     def __init__(self, channels: int, size: int = 0) -> None:
-        """Create a buffer; with ``size`` 0 it grows with the samples written before the start."""
+        """Create a buffer; with ``size`` 0, the buffer grows with the samples written before the start."""
         self.is_sized = size > 0
         self.written = 0
         self._ring = np.zeros((channels, size))
 
     @property
     def size(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return int(self._ring.shape[1])
 
     @property
@@ -36,7 +36,7 @@ class OutputBuffer:
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
-        """Enlarge the buffer by ``count`` samples, before the start of a task without a buffer size."""
+        """Enlarge the buffer by ``count`` samples, before the start of a task without a set buffer size."""
         self._ring = np.concatenate([self._ring, np.zeros((self._ring.shape[0], count))], axis=1)
 
     def write(self, volts: NDArray[np.float64]) -> None:
@@ -70,10 +70,10 @@ class Generation(Stream):
         self._world = world
         self._outputs = outputs
         self.repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
-        """Whether the buffer is played repeatedly; if not, every sample is played once."""
+        """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(outputs), 0))
-        """Samples in the device's memory; a repeated buffer is not transferred ahead."""
+        """Number of samples in the device's memory; a repeated buffer is not transferred ahead."""
         self._most_in_memory = 0 if self.repeats else device.memory
         self._fetched = 0
         self._recent = np.empty((len(outputs), 0))
@@ -92,7 +92,7 @@ class Generation(Stream):
         return self.time_of(max(0, left)) - LEAD_S
 
     def prepare(self, until_s: float) -> None:
-        """Pass the samples up to rig time ``until_s``, plus a lead, to the world."""
+        """Pass samples to the world, up to rig time ``until_s`` plus a lead."""
         if not self._is_open:
             return
         wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)

@@ -51,7 +51,7 @@ class Rig:
         self._generations: list[Generation] = []
         self._armed: dict[str, list[Callable[[], None]]] = {}
         self._holders: dict[str, Any] = {}
-        """Tasks that have reserved an input or output side of a device."""
+        """Tasks that have reserved the inputs or the outputs of a device."""
 
     @property
     def now_s(self) -> float:
@@ -60,7 +60,7 @@ class Rig:
 
     @property
     def is_used(self) -> bool:
-        """Whether a task runs."""
+        """Whether any task runs."""
         return bool(self._acquisitions or self._generations)
 
     def wall_s(self, rig_s: float) -> float:
@@ -95,7 +95,7 @@ class Rig:
             self.changed.notify_all()
 
     def run(self, stream: Acquisition | Generation) -> None:
-        """Include a stream in the advance of time; it starts now."""
+        """Include a stream in the advance of time; the stream starts now."""
         if isinstance(stream, Generation):
             stream.prepare(self.now_s)
             self._generations.append(stream)
@@ -179,7 +179,7 @@ class OnDemandPace:
         return _wait(rig, is_there, deadline_s)
 
     def pass_time(self, rig: "Rig", duration_s: float) -> None:
-        """Advance by ``duration_s``, so that a program that polls does not wait for ever."""
+        """Advance by ``duration_s``, so that a polling program does not wait for ever."""
         rig.advance_to(rig.now_s + duration_s)
 
 
@@ -192,7 +192,7 @@ class WallPace:
     loses_samples = True
 
     def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
-        """Follow ``clock`` [s], any monotonic clock."""
+        """Follow ``clock`` [s], which may be any monotonic clock."""
         if not 0 < speed < float("inf"):
             message = f"the speed of the rig is {speed} times real time; it must be above 0 and finite"
             raise ValueError(message)
@@ -216,12 +216,12 @@ class WallPace:
             self._thread.join()
 
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:  # noqa: ARG002 - this clock needs no hint
-        """Wait until ``is_there()`` or the deadline; return whether it became true."""
+        """Wait until ``is_there()`` is true or the deadline passes; return whether it became true."""
         self._step(rig)
         return is_there() or _wait(rig, is_there, deadline_s)
 
     def pass_time(self, rig: "Rig", duration_s: float) -> None:  # noqa: ARG002 - time passes by itself
-        """Advance the rig to the clock."""
+        """Advance the rig to the present time of the clock."""
         self._step(rig)
 
     def _keep_up(self, rig: "Rig") -> None:
@@ -236,7 +236,7 @@ class WallPace:
             pause_s = YIELD_S if behind_s > 0 else TICK_S if is_used else SLICE_S
 
     def _step(self, rig: "Rig") -> float:
-        """Compute at most one slice, so that the lock is released soon; return the remaining lag."""
+        """Compute at most one slice, so that the lock is released soon; return how far the rig lags [s]."""
         began_s, rig_began_s = self._began_s
         target_s = rig_began_s + self.speed * (self._clock() - began_s)
         rig.advance_to(min(target_s, rig.now_s + SLICE_S))

@@ -52,7 +52,7 @@ class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships 
 
 
 LOOPBACK = "127.0.0.1:0"
-"""Default address: this computer only, because the server has no passwords, and a free port."""
+"""Default address: only for this computer, because the server has no passwords, and with a free port."""
 
 LAST_PORT = 65_535
 _WORKERS = 64
@@ -104,7 +104,7 @@ class DaqServer:
         _require_address(address)
         self.faults = Faults()
         self._refused: set[str] = set()
-        """Names of calls whose last attempt failed."""
+        """Names of calls that failed at their last attempt."""
         self._pace = pace or OnDemandPace()
         self._rig = Rig(world, self._pace, catalogue or Catalogue())
         self._system = DaqmxSystem(self._rig)
@@ -126,14 +126,14 @@ class DaqServer:
         self._server.start()
 
     def __enter__(self) -> Self:
-        """Return the server, which has been running since its creation."""
+        """Return the server, which runs from its creation on."""
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def let_pass(self, duration_s: float) -> None:
-        """Advance rig time without a request."""
+        """Advance rig time without a request of a client."""
         with self._rig.changed:
             self._rig.advance_to(self._rig.now_s + duration_s)
 
@@ -221,7 +221,7 @@ def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
 
 
 def _require_address(address: str) -> None:
-    """Refuse text other than ``host:port``, because gRPC maps ports above the limit to others."""
+    """Refuse text other than ``host:port``: gRPC would map port numbers above the limit to other ports."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(
@@ -238,7 +238,7 @@ class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
         self._listening = listening
 
     def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
-        """Return the handler of a call; None for another service."""
+        """Return the handler of a call; None if the call belongs to another service."""
         service, _, name = handler_call_details.method.removeprefix("/").partition("/")
         method = SERVICE.methods_by_name.get(name)
         if service != SERVICE.full_name or method is None:

@@ -42,7 +42,7 @@ class TdmsLog:
             raise DaqmxRefusal(DAQmxErrors.GENERIC_FILE_IO, f"File: {self._path}\n{error}") from error
 
     def write(self, task: "Task", volts: NDArray[np.float64], began_s: float) -> None:
-        """Append samples, shape (channels, samples) [V]; ``began_s`` is the rig time of the first."""
+        """Append samples, shape (channels, samples) [V]; ``began_s`` is the rig time of the first sample."""
         from nptdms import ChannelObject, TdmsWriter  # noqa: PLC0415 - an extra; few programs log
 
         self._began = self._began or np.datetime64(round(task.rig.wall_s(began_s) * 1e6), "us")
@@ -75,7 +75,7 @@ class TaskState(IntEnum):
 
 
 class Task:
-    """One task; every method is called with the rig's lock held."""
+    """A task of the driver; all its methods are called with the rig's lock held."""
 
     def __init__(self, name: str, rig: Rig) -> None:
         self.name = name
@@ -84,7 +84,7 @@ class Task:
         self.timing = Timing()
         self.log: TdmsLog | None = None
         self.output_size = 0
-        """Size of the output buffer in samples per channel; 0: the size of the first writes."""
+        """Size of the output buffer in samples per channel; 0: as large as the first writes."""
         self.regeneration = RegenerationMode.ALLOW_REGENERATION
         self.inputs: list[InputChannel] = []
         self.outputs: list[OutputChannel] = []
@@ -123,7 +123,7 @@ class Task:
 
     @property
     def rate_hz(self) -> float:
-        """Effective rate [Hz]: the requested rate, rounded up to a possible one; -200077 out of range."""
+        """Effective rate [Hz]: the requested rate, rounded up to a possible rate; -200077 if out of range."""
         side, requested_hz = self.side, self.timing.requested_hz
         is_shared = isinstance(side, AnalogInputs) and side.is_multiplexed
         highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
@@ -146,7 +146,7 @@ class Task:
 
     @property
     def is_running(self) -> bool:
-        """Whether the task is started."""
+        """Whether the task has been started."""
         return self.state is TaskState.RUNNING
 
     @property
@@ -264,7 +264,7 @@ class Task:
                 raise
 
     def start(self) -> None:
-        """Start, or wait for the trigger."""
+        """Start the run, or wait for the start trigger."""
         self.require_stopped()
         self._verify()
         if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.filled:
@@ -286,7 +286,7 @@ class Task:
 
     @property
     def output_buffer(self) -> OutputBuffer:
-        """The output buffer, created at first use."""
+        """The output buffer, which is created at its first use."""
         if self.buffer is None:
             self.buffer = OutputBuffer(len(self.outputs), self.output_size)
         return self.buffer
@@ -322,7 +322,7 @@ class Task:
             self._await_reference_edge()
 
     def await_reference(self, deadline_s: float) -> bool:
-        """Wait for a reference trigger until the deadline; return False if it is still awaited then."""
+        """Wait for a reference trigger until the deadline; return False if it has not come by then."""
         acquisition = self.acquisition
         if acquisition is None:
             return True

@@ -40,7 +40,7 @@ from .terminal_voltage import Relay, Terminal
 
 DEFAULT_SERIAL = "C010101"
 SOUNDING_CHANNEL = 1
-"""The only connected channel; channel 2 stores settings without an output."""
+"""The only connected channel; channel 2 only stores settings."""
 
 
 class AFG1022(ScpiInstrument):
@@ -115,7 +115,7 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Make the other channel follow this channel's frequency, or stop following it."""
+        """Make the other channel follow this channel's frequency, or stop doing so."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)
@@ -173,7 +173,7 @@ class AFG1022(ScpiInstrument):
 
 
 def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings with a mode switched on or off (SCPI has one switch per mode)."""
+    """Return settings with a mode switched on or off; SCPI has a separate switch for each mode."""
     if wanted:
         return replace(settings, mode=mode)
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
@@ -203,7 +203,7 @@ def _write_shape(generator: AFG1022, channel: int, parameter: bytes) -> None:
 
 
 def _whole_degrees(parameter: bytes) -> int:
-    """Return the phase of ``31DEG`` or of radians, truncated to degrees; it must not be negative."""
+    """Return the phase of ``31DEG`` or of radians in whole degrees, truncated; it must not be negative."""
     full_turn_deg = 360.0
     angle, unit = scpi.number_and_unit(parameter)
     if unit not in ("", "RAD", "DEG"):
@@ -243,7 +243,7 @@ def _ask_catalogue(generator: AFG1022, _: int) -> bytes:
 
 
 def load_command(header: str) -> Command:
-    """Return the command of the declared load; high impedance is infinite."""
+    """Return the command that declares the load; high impedance is infinite."""
     row = number(
         header, "IVI; drivers contradict each other", "declared_load_ohm", scpi.RESISTANCE_UNITS,
         lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,

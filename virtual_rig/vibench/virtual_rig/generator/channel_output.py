@@ -30,13 +30,13 @@ LOWEST_BURST_FREQUENCY_HZ = 2e-3
 OPEN_AMPLITUDE_RANGE_VPP = (2e-3, 20.0)
 """Amplitude limits in open circuit: 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
 OPEN_PEAK_V = 10.0
-"""Largest |offset| + amplitude/2 in open circuit, the stricter of the two published values."""
+"""Largest |offset| + amplitude/2 in open circuit [V], the stricter of two published values."""
 _PEAK_ROUNDING_V = 1e-9
 _HIGHEST_MEMORY_FREQUENCY_HZ = 10e6
 
 
 class RunMode(StrEnum):
-    """Run modes of the generator; values are the SCPI nodes."""
+    """Run modes of the generator; the values are SCPI nodes."""
 
     CONTINUOUS = "CW"
     SWEEP = "SWE"
@@ -64,7 +64,7 @@ _WORDS = {
     "PRNO": NOISE,
     "DC": DC,
 }
-"""Shapes without a memory; PRNO is the spelling in public drivers."""
+"""Shapes that need no waveform memory; PRNO is the spelling in public drivers."""
 _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, NOISE: 25e6, DC: 1e6}
 
 
@@ -93,7 +93,7 @@ class ChannelSettings:
 
     relay: Relay = Relay.OPEN
     declared_load_ohm: float = OUTPUT_RESISTANCE_OHM
-    """``math.inf`` for high impedance."""
+    """Declared load [ohm]; ``math.inf`` for high impedance."""
     shape: str = SINE
     frequency_hz: float = 1e6
     amplitude_vpp: float = 2.0
@@ -110,12 +110,12 @@ class ChannelSettings:
     sweep_spacing: Spacing = Spacing.LINEAR
     trigger: Trigger = Trigger.IMMEDIATE
     burst_cycles: float = 5
-    """``math.inf`` for an endless burst."""
+    """Number of periods in a burst; ``math.inf`` for an endless burst."""
     burst_mode: BurstMode = BurstMode.TRIGGERED
 
     @property
     def declared_share(self) -> float:
-        """Displayed voltage over open-circuit voltage."""
+        """Displayed voltage relative to open-circuit voltage."""
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.declared_load_ohm)
 
     @property
@@ -125,7 +125,7 @@ class ChannelSettings:
         return lowest, highest_frequency_hz(self.shape)
 
     def check(self) -> None:
-        """Refuse a peak beyond the output stage, and noise that is not continuous (-221)."""
+        """Refuse a peak beyond the output stage, and noise in a mode other than continuous (-221)."""
         is_moded_noise = self.mode is not RunMode.CONTINUOUS and self.shape == NOISE
         peak_v = abs(self.offset_v) + self.amplitude_vpp / 2
         if peak_v > OPEN_PEAK_V + _PEAK_ROUNDING_V or is_moded_noise:
@@ -187,7 +187,7 @@ class ChannelOutput(Timeline):
         self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a waiting burst or sweep; without one, or during a burst, do nothing.
+        """Start a waiting burst or sweep; without a waiting one, or during a burst, do nothing.
 
         A gated burst never starts, because nothing is connected to the gate input.
         """
@@ -213,7 +213,7 @@ class ChannelOutput(Timeline):
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
     ) -> PhaseCourse:
-        """Return the phase course; the same object if it is unchanged."""
+        """Return the phase course; the same object as before if it is unchanged."""
         running = self.latest.course
         if _course_key(previous) == _course_key(settings):
             return running

@@ -18,7 +18,7 @@ UHZ_PER_HZ = 1_000_000
 CURVATURE_TOLERANCE_CYCLES = 1e-6
 """Largest deviation of the phase from a straight line within a piece."""
 FINEST_SPLIT = 256
-"""Most pieces per interval; only sweeps above about 1e9 Hz/s would need more."""
+"""Maximum number of pieces per interval; only sweeps above about 1e9 Hz/s would need more pieces."""
 NO_TIMES: Samples = np.empty(0)
 
 
@@ -72,7 +72,7 @@ class SweptPhase:
     hold_s: float
     spacing: Spacing
     begin_s: float
-    """Time of the trigger; ``math.inf`` while waiting."""
+    """Time of the trigger [s]; ``math.inf`` while waiting for it."""
     anchor_s: float
     offset: float
     """Phase at ``anchor_s`` [cycles]."""
@@ -94,7 +94,7 @@ class SweptPhase:
         return np.asarray(self.start_hz * waited_s + swept + self.stop_hz * held_s)
 
     def _cycles_within(self, time_s: Samples) -> Samples:
-        """Integrate the frequency from the start of the sweep."""
+        """Return the integral of the frequency since the start of the sweep [cycles]."""
         if self.spacing is Spacing.LINEAR or self.start_hz == self.stop_hz:
             rate = (self.stop_hz - self.start_hz) / self.sweep_s
             return np.asarray(time_s * (self.start_hz + 0.5 * rate * time_s))

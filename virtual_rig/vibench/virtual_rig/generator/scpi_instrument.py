@@ -123,7 +123,7 @@ def choice(
 
 
 LONGEST_REPLY = 1 << 20
-"""Largest reply to one message in bytes; useful ones have up to 17 kB."""
+"""Largest reply to one message [bytes]; useful replies have up to 17 kB."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Quirks:
     unknown_is_syntax_error: bool = True
     """An unknown command queues -102; an unknown query also answers an empty line (else -113, no reply)."""
     out_of_range_becomes_default: bool = True
-    """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
+    """A number out of range silently sets the parameter's default (else -222 and no change)."""
     panel_load_ohm: float | None = None
     """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (one driver's report); else None."""
 
@@ -174,7 +174,7 @@ class ScpiInstrument:
         self.status = scpi.Status()
         self.lock = threading.RLock()
         self.now_s = 0.0
-        """Arrival time of the current message."""
+        """Rig time of the current message's arrival [s]."""
         self.clock = clock
         self.commands = (*commands, *COMMON_COMMANDS)
         self._patterns = [(scpi.header_pattern(command.header), command) for command in self.commands]
@@ -200,17 +200,17 @@ class ScpiInstrument:
             return Reply(data, delay_s)
 
     def report(self, code: scpi.ErrorCode) -> None:
-        """Queue an error of the interface, such as an unread reply or a read without a query."""
+        """Queue an error of the interface, such as an unread reply, or a read without a query before it."""
         with self.lock:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; if the host's read times out, its following read receives this reply."""
+        """Delay the next reply; if the host's read times out, the host's next read receives this reply."""
         with self.lock:
             self._next_delay_s = delay_s
 
     def corrupt_next_reply(self) -> None:
-        """Corrupt the next reply: every second byte from the first on, except its end."""
+        """Corrupt the next reply: change every second byte from the first on, except the reply's end."""
         with self.lock:
             self._next_is_corrupted = True
 
@@ -308,7 +308,7 @@ class ScpiDevice(Protocol):
     """The device of a socket."""
 
     def execute(self, message: bytes) -> Reply:
-        """Execute one complete message and return its reply."""
+        """Execute one complete message, and return the reply."""
 
 
 class ScpiSocket(socketserver.ThreadingTCPServer):
@@ -349,7 +349,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
 
 
 class _Session(socketserver.BaseRequestHandler):
-    """One client: collects bytes until a message is complete, and answers it."""
+    """One client of the socket: collects bytes until a message is complete, and answers the message."""
 
     server: ScpiSocket
 

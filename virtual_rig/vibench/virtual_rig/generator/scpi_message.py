@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 QUEUE_LENGTH = 20
-"""Errors in the queue before "Queue overflow" (the depth is assumed; SCPI requires >= 2)."""
+"""Maximum number of errors in the queue before "Queue overflow" (assumed depth; SCPI requires >= 2)."""
 
 
 class ErrorCode(IntEnum):
-    """SCPI-1999 error numbers (volume 2, chapter 21.8) of the instrument."""
+    """SCPI-1999 error numbers (volume 2, chapter 21.8) that the instrument uses."""
 
     NO_ERROR = 0
     SYNTAX_ERROR = -102
@@ -47,7 +47,7 @@ class ErrorCode(IntEnum):
 
 
 class ScpiError(Exception):
-    """Refusal of a command, with the number for the error queue."""
+    """Refusal of a command, with the error number for the error queue."""
 
     def __init__(self, code: ErrorCode) -> None:
         super().__init__(f'{int(code)},"{code.text}"')
@@ -78,7 +78,7 @@ class Status:
             self._errors[-1] = ErrorCode.QUEUE_OVERFLOW
 
     def next_error(self) -> ErrorCode:
-        """Return and remove the oldest error; NO_ERROR from an empty queue."""
+        """Return and remove the oldest error; return NO_ERROR if the queue is empty."""
         return self._errors.popleft() if self._errors else ErrorCode.NO_ERROR
 
     def take_events(self) -> int:
@@ -229,7 +229,7 @@ def units(message: bytes) -> list[Unit]:
 
 
 def _trim(piece: bytes) -> bytes:
-    """Remove white space around a header or parameter, but no bytes of a block's data."""
+    """Remove white space around a header or parameter, but leave the data bytes of a block unchanged."""
     piece = piece.lstrip(b" \t\r")
     length = (block_length(piece, 0) or 0) if piece.startswith(b"#") else 0
     return piece[:length] if length > 1 else piece.rstrip(b" \t\r")

@@ -28,7 +28,7 @@ class PeriodicShape(Protocol):
 
 @dataclass(frozen=True)
 class Sine:
-    """sin(2 pi phase)."""
+    """Sine: sin(2 pi phase)."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the mean: the sine at the middle, multiplied by sinc(span)."""
@@ -37,7 +37,7 @@ class Sine:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """1 for the first ``duty`` of the cycle, then -1."""
+    """Square wave: 1 for the first ``duty`` of the cycle, then -1."""
 
     duty: float = 0.5
 
@@ -118,7 +118,7 @@ class Table:
 OUTPUT_RESISTANCE_OHM = 50.0
 NO_BLOCK = -1
 NOISE_BLOCK = 4096
-"""Noise samples per draw; each block has its own seed."""
+"""Number of noise samples per block; each block has its own seed."""
 _CONTINUES = 1e-3
 """Largest distance of a block's start from the end of the block that it continues, in intervals."""
 
@@ -147,7 +147,7 @@ class Signal:
     course: PhaseCourse = field(default_factory=lambda: SteadyPhase(0, 0.0))
     shape: PeriodicShape = field(default_factory=Sine)
     amplitude_vpp: float = 0.0
-    """Peak to peak, open circuit."""
+    """Amplitude, peak to peak, in open circuit [V]."""
     offset_v: float = 0.0
     burst: Burst | None = None
 
@@ -186,7 +186,7 @@ class Terminal:
 
     @property
     def divider(self) -> float:
-        """Voltage at the terminal over open-circuit voltage."""
+        """Ratio of the voltage at the terminal to the open-circuit voltage."""
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.load_ohm)
 
     def own_time(self, time_s: Samples) -> Samples:
@@ -211,7 +211,7 @@ class Timeline:
 
     @property
     def latest(self) -> Signal:
-        """The signal of the last command."""
+        """The signal that the last command set."""
         return self._signals[-1]
 
     def jump(self, by_s: float) -> None:

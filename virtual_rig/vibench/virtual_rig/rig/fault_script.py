@@ -38,7 +38,7 @@ _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
 
 @dataclass(frozen=True)
 class PlayedFault:
-    """A fault that has started."""
+    """A fault that has started, with the function that ends it."""
 
     fault: str
     began_s: float
@@ -64,7 +64,7 @@ class RigFaults:
         self._disk = disk
         self._heals: list[Heal] = []
         self.played: list[PlayedFault] = []
-        """Faults of scripts that have started."""
+        """Faults of scripts that have started so far."""
 
     def play(self, script: "FaultScript") -> None:
         """Schedule every fault of a script at its rig time."""
@@ -92,7 +92,7 @@ class RigFaults:
         return self._until(self._cable.plug_cable)
 
     def hang_generator(self) -> Heal:
-        """Make the generator unresponsive; its output continues."""
+        """Make the generator stop answering; its output continues."""
         self._cable.hang()
         return self._until(self._cable.wake)
 
@@ -122,7 +122,7 @@ class RigFaults:
         return self._until(lambda: self._world.set_amplifier_gain_db(self._world.configured_gain_db))
 
     def widen_gaps(self, by_m: Annotated[float, Field(ge=-1e-4, le=1e-3)]) -> Heal:
-        """Move the specimen's stops away from m1, or closer [m], as by a loose screw or wear."""
+        """Move the specimen's stops away from m1, or closer to m1 [m], as by a loose screw or wear."""
         self._world.widen_gaps(by_m)
         return self._until(lambda: self._world.widen_gaps(0.0))
 
@@ -169,7 +169,7 @@ class RigFaults:
         return self._in_force(ServerGone())
 
     def fill_disk(self, refusals: PositiveInt | None = None) -> Heal:
-        """Make writes of recordings fail as on a full disk, ``refusals`` times or until the fault ends."""
+        """Make writes of recordings fail as on a full disk: ``refusals`` times, or until the fault ends."""
         return self._until(self._disk.fill() if refusals is None else self._disk.fill(refusals))
 
     def slow_disk(self, delay_s: PositiveFloat) -> Heal:
@@ -193,7 +193,7 @@ class ScriptedFault(FrozenModel):
     at_s: NonNegativeFloat
     """Rig time since switch-on [s]."""
     for_s: PositiveFloat | None = None
-    """Duration in rig time [s]; absent: permanent, or ending by itself."""
+    """Duration in rig time [s]; absent: the fault is permanent, or ends by itself."""
     fault: str
 
     def begin(self, rig: RigFaults) -> Heal:
@@ -218,7 +218,7 @@ def _scripted(fault: Callable[..., Heal]) -> type[ScriptedFault]:
 
 
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
-"""Faults of the recording program, not of the rig."""
+"""Faults of the recording program instead of the rig."""
 
 _SCRIPTED = (
     RigFaults.pull_usb_cable,
@@ -246,7 +246,7 @@ else:
 
 
 class FaultScript(FrozenModel):
-    """Faults and their times, in any order."""
+    """Faults with their start times, in any order."""
 
     faults: tuple[FaultKind, ...] = ()
 

@@ -35,10 +35,10 @@ GENERATORS: Mapping[int, type[AFG1022]] = {0x0699: AFG1022, 0x0957: Keysight3350
 
 
 class DiskFaults(Enum):
-    """Handling of disk faults in a script."""
+    """Whether a script may cause disk faults."""
 
     PLAYED = auto()
-    """This process records; the faults act on its disk."""
+    """This process records; the faults of a script act on its disk."""
     REFUSED = auto()
     """Another process records; this process cannot cause faults on its disk."""
 
@@ -97,7 +97,7 @@ class VirtualRig:
             ),
         )
         self.controller = _controller(rig, lambda: self.world.time_s)
-        """The controller of a fast loop; None without one."""
+        """The simulated controller of a fast loop; None if the rig has no fast loop."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self.visa_resource = self._usb.identification.resource_name
@@ -116,18 +116,18 @@ class VirtualRig:
 
     @property
     def controller_resource(self) -> str:
-        """VISA name of the real-time controller's socket; empty without one."""
+        """VISA name of the real-time controller's socket; empty if the rig has no controller."""
         socket = self._running_state.controller
         return "" if socket is None else socket.resource_name
 
     @property
     def faults(self) -> RigFaults:
-        """Faults on demand."""
+        """Object that starts faults on demand."""
         return self._running_state.faults
 
     @property
     def played_faults(self) -> tuple[PlayedFault, ...]:
-        """Faults of the configuration's script that have started."""
+        """Faults of the configuration's script that have started so far."""
         return tuple(self._running_state.faults.played)
 
     def aim(self, role: Role) -> None:

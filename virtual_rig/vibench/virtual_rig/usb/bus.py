@@ -107,15 +107,15 @@ class RemoteUsbDevice:
         """The device's descriptors at the time of the connection."""
 
     def bulk_out(self, data: bytes) -> None:
-        """Send one transfer."""
+        """Send one transfer to the device."""
         self._call("BulkOut", data)
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
-        """Receive one transfer."""
+        """Receive one transfer from the device."""
         return self._call("BulkIn", _READ.pack(length, timeout_ms), timeout_ms)
 
     def control(self, setup: Setup) -> bytes:
-        """Execute a class request."""
+        """Execute a class request of the device."""
         return self._call("Control", _SETUP.pack(*astuple(setup)))
 
     def close(self) -> None:
@@ -126,7 +126,7 @@ class RemoteUsbDevice:
         return self._channel.unary_unary(f"/{SERVICE}/{name}")
 
     def _call(self, name: str, request: bytes, timeout_ms: int = 0) -> bytes:
-        """Call a method; a lost server or connection counts as a disconnected device."""
+        """Call a method of the device; a lost server or connection counts as a disconnected device."""
         deadline_s = None if timeout_ms == _NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
         try:
             answer = self._method(name)(request, timeout=deadline_s, metadata=self._metadata)
@@ -212,7 +212,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         )
 
     def get_configuration_descriptor(self, dev: _Port, config: int) -> SimpleNamespace:  # noqa: ARG002
-        """Return a configuration; IndexError past the last."""
+        """Return a configuration; IndexError for a number past the last."""
         if config != 0:
             raise IndexError(config)
         return SimpleNamespace(
@@ -228,7 +228,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         )
 
     def get_interface_descriptor(self, dev: _Port, intf: int, alt: int, config: int) -> SimpleNamespace:  # noqa: ARG002
-        """Return an interface; IndexError past the last."""
+        """Return an interface; IndexError for a number past the last."""
         if (intf, alt) != (0, 0):
             raise IndexError((intf, alt))
         return SimpleNamespace(
@@ -302,14 +302,14 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
     # Transfers
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
-        """Send one transfer; return the number of bytes."""
+        """Send one transfer; return the number of bytes sent."""
         device = self._present(dev_handle)
         with _usb_errors():
             device.bulk_out(data.tobytes())
         return len(data) * data.itemsize
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
-        """Fill the buffer from one transfer; return the number of bytes."""
+        """Fill the buffer from one transfer; return the number of bytes received."""
         device = self._present(dev_handle)
         with _usb_errors():
             return _fill(buff, device.bulk_in(len(buff), timeout))

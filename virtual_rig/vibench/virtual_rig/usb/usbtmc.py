@@ -57,7 +57,7 @@ class Setup:
 AFG1022_IDS = 0x0699, 0x0353
 """USB vendor and product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
-"""Message id, tag, inverted tag, length, attributes, unused termination character (table 1 to 4)."""
+"""Bulk header: message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
 ALIGNMENT = 4
 NEVER_MS = 2**32 - 1
 
@@ -199,7 +199,7 @@ class UsbTmcInstrument:
             self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
 
     def _transfer(self, tag: int, length: int) -> bytes:
-        """Return a transfer with the requested part of the reply; the last part has the end bit."""
+        """Return a transfer with the requested part of the reply; the end bit marks the last part."""
         payload, self._flight.reply = self._flight.reply[:length], self._flight.reply[length:]
         attributes = 0 if self._flight.reply else END_OF_MESSAGE
         header = HEADER.pack(MessageId.REQUEST_IN, tag, tag ^ BYTE, len(payload), attributes, 0)

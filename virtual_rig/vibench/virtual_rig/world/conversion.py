@@ -31,18 +31,18 @@ _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
 """Kaiser 1974, as in Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
 
 _DROOP_REACH = 3
-"""Grid points on each side used by the droop correction."""
+"""Number of grid points on each side of a step that the droop correction uses."""
 _DROOP_BAND = 0.23
-"""Upper end of the correction's fit, in cycles per step."""
+"""Upper end of the fit of the droop correction, in cycles per step."""
 _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
-"""Table rows per output sample: linear interpolation between them is 110 dB below the signal."""
+"""Table rows per output sample. Linear interpolation between rows has an error 110 dB below the signal."""
 _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest delay of a channel for which the filter needs no future means [steps]; negative: an advance."""
+"""Smallest channel delay for which the filter needs no future means [steps]; negative: an advance."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Decimator:
     """Filter that computes samples of one channel from means over the world's steps."""
 
     ratio: float
-    """Steps per sample; integers are faster."""
+    """Time steps per sample; whole numbers compute faster."""
     start_step: int
     delay_steps: float
     """Part of the sensor's delay that is not yet included in the means."""
@@ -85,7 +85,7 @@ class Decimator:
 
     @cached_property
     def _work(self) -> Structure:
-        """Data common to all blocks."""
+        """Filter data that all blocks of a conversion share."""
         return native_engine().new(
             "Decimation", table=self.table, reach=self.reach, ratio=self.ratio, begin=self.centre(-1)
         )
@@ -146,11 +146,11 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder; an excitation current causes a voltage at it."""
+"""Output resistance of generator, divider and decoder [ohm]; an excitation current causes a voltage at it."""
 COMPLIANCE_V = 19.0
-"""Voltage of an open input with excitation."""
+"""Voltage of an open input with excitation [V]."""
 OVER_RANGE = 1.02
-"""Level at which the modulator clips, over the range; counts are limited to the range."""
+"""Level at which the modulator clips, relative to the range; counts are limited to the range."""
 
 
 def clip_v(range_v: float) -> float:
@@ -177,7 +177,7 @@ class InputStage:
         return self._cables.get(self.configured.physical_channel, OPEN_INPUT)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Return volts at the converter, and whether they clip, for signals of shape (signals, steps)."""
+        """Return volts at the converter, and whether each clips, for signals of shape (signals, steps)."""
         offset_v, gain = _operating_point(self.configured, self.cable)
         signal = signals[self.cable.signal]
         match self.configured.coupling:

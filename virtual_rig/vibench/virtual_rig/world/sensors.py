@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Random numbers per page: short pages cost more generator calls, long pages more unused numbers."""
+"""Random numbers per page: short pages need more generator calls, long pages give more unused numbers."""
 
 
 class NoiseStream:
@@ -61,21 +61,21 @@ class Disturbance:
     stop_step: int
     """The first step after the disturbance."""
     level: float
-    """Share of full scale, -1 to 1."""
+    """Level as a fraction of full scale, -1 to 1."""
 
 
 class RandomDropouts:
     """Times at which speckle interrupts the laser signal: a Poisson process.
 
     The decoder then follows noise instead of the carrier. In a drop-out the output has a random, constant
-    level; its length is exponentially distributed.
+    level; the durations are exponentially distributed.
     """
 
     MEAN_S = 30.0 / 102_400
-    """Mean length, about 0.3 ms; assumed."""
+    """Mean duration of a drop-out [s]: about 0.3 ms, which is assumed."""
 
     def __init__(self, per_s: float, stream: NoiseStream, grid: TimeGrid = USUAL_GRID) -> None:
-        """Create drop-outs with an expected number of ``per_s`` per second."""
+        """Create drop-outs, on average ``per_s`` per second."""
         self._per_page = per_s * grid.step_s * PAGE
         self._mean_steps = self.MEAN_S * grid.rate_hz
         self._stream = stream
@@ -102,12 +102,12 @@ class RandomDropouts:
 
 
 _FIT_BAND = 0.2
-"""Upper end of the fit, as a share of the grid's rate: the pass band of a converter at half the rate."""
+"""Upper end of the fit, relative to the grid's rate: the pass band of a converter at half that rate."""
 _FIT_FLOOR = 1e-2
-"""Lower end of the fit; below it, the exact gain at zero frequency dominates."""
+"""Lower end of the fit; below it, the gain is determined by the exact gain at zero frequency."""
 _FIT_POINTS = 64
 _ZEROS = 6
-"""Number of fitted numerator weights."""
+"""Number of numerator weights that are fitted."""
 
 
 @dataclass(frozen=True)
@@ -169,9 +169,9 @@ def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: floa
 
 
 IEPE_BIAS_V = 10.0
-"""Constant voltage of a powered IEPE sensor; 8 to 12 V is usual."""
+"""Constant voltage of a powered IEPE sensor [V]; 8 to 12 V is usual."""
 LONGEST_DELAY_S = 5e-3
-"""Largest sensor delay, limited by the history kept for a conversion at its lowest rate."""
+"""Largest sensor delay [s], limited by the history kept for a conversion at its lowest rate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +182,7 @@ class SensorParts:
     noise: FloatArray
     """Noise in units of the motion, shape (steps,)."""
     instead: FloatArray
-    """Values that replace the motion except where they are NaN, in its units; empty if there are none."""
+    """Values that replace the motion where they are not NaN, in its units; empty if nothing is replaced."""
     full_scale: float
     """Full scale in units of the motion."""
     full_scale_v: float

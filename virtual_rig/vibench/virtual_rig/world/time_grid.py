@@ -10,7 +10,7 @@ from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
 FULL_BAND_HZ = 25_600.0
-"""Band of the noise figures in the rig's configuration: half the highest usual rate."""
+"""Bandwidth for which the rig's configuration states noise [Hz]: half the highest usual sample rate."""
 
 PPM = 1e-6
 
@@ -39,7 +39,7 @@ class TimeGrid:
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:
-        """Return the rms per step of white noise that has the given rms in ``FULL_BAND_HZ``."""
+        """Return the rms per step of white noise whose rms in ``FULL_BAND_HZ`` is given."""
         return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
 
     def step_at(self, time_s: float) -> int:

@@ -67,7 +67,7 @@ class AnalogueOutput:
         self._queue = np.concatenate([self._queue, np.asarray(volts, dtype=np.float64)])
 
     def unplayed(self, now_step: int) -> int:
-        """Return the number of samples that have not ended."""
+        """Return the number of samples in the queue whose end has not been played."""
         ended = int(max(now_step - self._begin_step, 0.0) / self._steps_per_sample + _ROUNDING)
         return max(len(self._queue) - ended, 0)
 
@@ -90,16 +90,16 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""Tolerance in samples, for samples that end on a step."""
+"""Tolerance, in samples, for samples that end at a step."""
 
 
 LOWEST_RATE_HZ = 500.0
-"""Lowest rate of a conversion; its filter needs a tenth of a second of history."""
+"""Lowest sample rate of a conversion, whose filter needs a tenth of a second of history [Hz]."""
 HIGHEST_RATE_HZ = 250e3
-"""Highest rate of a conversion; above the grid's rate, samples are interpolated."""
+"""Highest sample rate of a conversion [Hz]; above the grid's rate, samples are interpolated."""
 
 _STRETCH_STEPS = 8192
-"""Steps per block: enough to amortise the cost of a call, few enough for the processor's cache."""
+"""Time steps per block: enough to amortise the cost of a call, few enough for the processor's cache."""
 
 
 class TerminalVoltage(Protocol):
@@ -174,7 +174,7 @@ class World:
         slowest = history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz)
         self._history = np.zeros((len(self._rows), slowest + 2))
         self._due: list[tuple[int, int, Callable[[], None]]] = []
-        """Scheduled actions by due step; actions of the same step keep their order."""
+        """Scheduled actions by the step at which they are due; actions at one step keep their order."""
         self._scheduled = count()
         self._step = 0
         self._unspent_steps = 0.0
@@ -189,7 +189,7 @@ class World:
         return self._step * self._grid.step_s
 
     def advance(self, duration_s: float) -> None:
-        """Advance rig time; fractions of a step are accumulated."""
+        """Advance rig time; fractions of a step are carried over to the next call."""
         with self._turn:
             wanted = self._unspent_steps + duration_s * self._grid.rate_hz
             steps = max(round(wanted), 0)
@@ -204,9 +204,9 @@ class World:
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Start a conversion now.
 
-        Rates from 500 Hz to 250 kHz are possible, on a coarser grid up to half its rate; integer ratios are
-        faster. All inputs share the delay of a delta-sigma converter: 40 samples, or 40 grid steps if longer.
-        Raises ConfigurationError for other rates.
+        Rates from 500 Hz to 250 kHz are possible, on a coarser grid up to half its rate; integer ratios to
+        the grid's rate are faster. All inputs share the delay of a delta-sigma converter: 40 samples, or 40
+        grid steps if longer. Raises ConfigurationError for other rates.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
@@ -234,7 +234,7 @@ class World:
             return conversion
 
     def play(self, physical_channel: str, volts: FloatArray, sample_rate_hz: float) -> None:
-        """Append samples to the queue of an analogue output; an idle output starts now."""
+        """Append samples to the queue of an analogue output, which starts now if it is idle."""
         with self._turn:
             self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
 
@@ -249,7 +249,7 @@ class World:
             self.plant.gain = 10 ** (gain_db / 20)
 
     def widen_gaps(self, by_m: float) -> None:
-        """Set both gaps to their initial size plus ``by_m`` [m]."""
+        """Set both gaps of the stops to their initial size plus ``by_m`` [m]."""
         began = self._specimen
         lower, upper = began.gaps_m
         with self._turn:
@@ -262,7 +262,7 @@ class World:
             self._compute_to(self._step + 1)  # the velocity over a step needs the state before it
 
     def disturb_response(self, duration_s: float, level: float) -> None:
-        """Make the sensor of m0 output ``level`` (share of full scale) for a while."""
+        """Make the sensor of m0 output ``level`` (fraction of full scale) for a while."""
         with self._turn:
             stop = self._step + self._grid.step_at(duration_s)
             for role in RESPONSE_ROLES:
@@ -390,7 +390,7 @@ _STATES = {
     "m1": ("y", "vy"),
     "m2": ("z", "vz"),
 }
-"""Columns of displacement and velocity for each place of a sensor."""
+"""Columns of displacement and velocity of the motion, for each place of a sensor."""
 
 
 def _sensors_of(rig: Rig, virtual: VirtualConfig, grid: TimeGrid) -> Iterator[tuple[Role, MotionSensor]]:
