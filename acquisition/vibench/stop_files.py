@@ -47,7 +47,7 @@ def write_stop_file(stop: str, reason: str) -> None:
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     try:
         os.write(descriptor, reason.encode(errors="replace")[:LONGEST_REASON])
-    except OSError:  # a full disk: the file name is sufficient
+    except OSError:  # if the disk is full, the file name is sufficient
         pass
     finally:
         os.close(descriptor)

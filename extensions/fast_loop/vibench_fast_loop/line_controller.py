@@ -91,7 +91,7 @@ class LineController:
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
             line = self._link.read_bytes(_LONGEST_LINE, break_on_termchar=True)
-        except MemoryError:  # the caller releases its reserve
+        except MemoryError:  # the caller releases its memory reserve
             raise
         except Exception as error:  # pyvisa-py passes on whatever sockets raise
             raise InstrumentLost(
@@ -103,7 +103,7 @@ class LineController:
             if isinstance(answer, dict) and "refused" in answer:
                 raise InstrumentError(f"the real-time controller at {where} refused: {answer['refused']}")
             return kind.model_validate_json(line)
-        except (ValueError, RecursionError) as error:  # pydantic raises a ValueError
+        except (ValueError, RecursionError) as error:  # pydantic's validation error is a ValueError
             raise InstrumentError(
                 f"the program at {where} is not a controller of loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or give the name of its driver"

@@ -369,14 +369,14 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
     generator = generator_driver(connected.generator).open(connected.generator)
     with ExitStack() as silencing:
         silencing.callback(generator.close)
-        silencing.callback(generator.stop)  # callbacks run in reverse order
+        silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
         note_open_bench(simulated + next(_instruments(rig)))  # several rigs may have the same name
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)
         controller = _controller(connected, closing)
-        # When leaving, silence first, then close the rest.
+        # On leaving, silence the outputs first, then close all instruments.
         closing.push(silencing.pop_all())
     if output is not None:
         closing.callback(output.stop)
@@ -399,7 +399,7 @@ def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
     if rig.controller is None:
         return None
     controller: RealTimeController = plug_in(PlugInKind.DRIVE, "controller").open(rig.controller)
-    closing.callback(controller.close)  # silences it
+    closing.callback(controller.close)  # opening a generator silences it
     return controller
 
 

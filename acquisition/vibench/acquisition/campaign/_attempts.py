@@ -182,7 +182,7 @@ class Attempts:
             self._bench = self._reopened_bench(self._reopen, error)
             self._tell(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self._bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
+            self._bench.idle(LOOK_EVERY_S)  # repeating at once seldom works
         self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
@@ -201,7 +201,7 @@ class Attempts:
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
                     raise lost from error
-                # The bench is not notified when somebody reconnects an instrument, so try again.
+                # The bench is not notified when somebody reconnects an instrument, so try again to open it.
                 self._bench.idle(LOOK_EVERY_S)
                 idled_s += LOOK_EVERY_S
             else:

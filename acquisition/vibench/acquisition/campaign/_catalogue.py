@@ -118,7 +118,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
-        # A growing file has reserved space that does not contain samples yet; do not count it.
+        # A growing file contains reserved space without samples; do not count this space.
         size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
         bench_check=recording.check_text,
         results=", ".join(recording.result_names),
@@ -199,7 +199,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
         with closing(_open_catalogue(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
             return _entries(connection)
-    except (sqlite3.OperationalError, OSError):  # a disk that is full or read-only
+    except (sqlite3.OperationalError, OSError):  # the disk is full or read-only
         with closing(_prepare(sqlite3.connect(":memory:", isolation_level=None))) as connection:
             _update(folder, connection)
             return _entries(connection)
@@ -243,9 +243,9 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             found = path.stat()
             size_bytes = found.st_size
             stamp = _stamp(found, noted(path.parent).get(path.name, ()))
-        except FileNotFoundError:  # the file got its final name in the meantime
+        except FileNotFoundError:  # the recording was finished meanwhile and has its final name
             continue
-        except OSError:  # for example a link to itself; its entry states that it cannot be read
+        except OSError:  # for example a link to itself; the entry states that the file cannot be read
             size_bytes, stamp = 0, ""
         where = place_below(folder, path)
         # The state of a .part file changes to "interrupted" when its program has ended, although the file

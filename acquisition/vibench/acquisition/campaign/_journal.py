@@ -514,7 +514,7 @@ class Journal(ClosedOnLeaving):
                 yield self._connection
                 self._connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # after a disk error SQLite has rolled back already
+                if self._connection.in_transaction:  # after a disk error, SQLite has already rolled back
                     self._connection.execute("ROLLBACK")
                 raise
 

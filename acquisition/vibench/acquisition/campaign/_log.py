@@ -82,7 +82,7 @@ class CampaignLog(ClosedOnLeaving):
         self.path = path
         try:
             self._file = path.open("a", encoding="utf-8")
-            # A killed program may have left half a line.
+            # A killed program may have left an incomplete last line.
             if not _ends_a_line(path):
                 self._file.write("\n")
         except OSError as error:

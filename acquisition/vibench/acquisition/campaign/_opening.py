@@ -88,7 +88,7 @@ def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, st
     errors: dict[str, str] = {}
     for path in attempts:
         if not part_of(path).exists():
-            with suppress(OSError):  # the file was being prepared and contains no sample
+            with suppress(OSError):  # the recording was being prepared and contains no sample
                 tmp_of(path).unlink()
             continue
         try:

@@ -341,7 +341,7 @@ class ReconnectingBench:
             self._last_check = before.last_check
             sheet = before.confirmations
             self._confirm = lambda knobs: _confirmed_before(sheet, knobs)
-            with suppress(AcquisitionError):  # a lost instrument cannot be silenced; all others have been
+            with suppress(AcquisitionError):  # only a lost instrument cannot be silenced
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
         self._bench = open_bench(self._rig, self._confirm, power=self._power)

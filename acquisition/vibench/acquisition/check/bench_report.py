@@ -23,7 +23,7 @@ from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
 """Largest level of the test sine as a fraction of the bench's amplitude limit, far below clipping."""
-# After this time a step has decayed in an AC coupling of 0.5 Hz.
+# After this time, a step has decayed in an AC coupling with a corner of 0.5 Hz.
 _SETTLE_S = 1.5
 _READ_S = 2.0
 _BYTES_PER_SAMPLE = 4
@@ -79,7 +79,7 @@ def bench_report(
     during = reader.during_sine(drive)
     after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
-        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # output relay may be stuck
+        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # the output relay may be stuck
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle(bench.output))

@@ -140,7 +140,7 @@ class PhaseLaw:
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Before the first look only the level changed, so the earlier phase error is taken as equal.
+        # Before the first look only the level changed, so the phase error before it is taken as equal.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -228,16 +228,16 @@ class PhaseSearch:
             used = away[:_NEAREST]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
-        # In a mode the tangent of the error is a straight line over frequency; the phase itself is not.
+        # For a mode, the tangent of the phase error is a straight line over frequency; the error is not.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
-            # All tries have one frequency, or all errors are too large: the crossing is not determined.
+            # All measurements have one frequency, or all errors are too large: the zero is not determined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
         # The tangent magnifies phase errors by 1 / cos^2, so each point has the weight cos^4.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # Extrapolate from the best try, because other modes bend the line away from its own crossing.
+        # Extrapolate from the best measurement, because other modes bend the line away from its own zero.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)

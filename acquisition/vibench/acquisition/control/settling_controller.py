@@ -297,7 +297,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
                 level=held,
             )
         )
-        # Average over all pieces since the last change, because chaotic motion needs a long average.
+        # Average over all pieces since the last change of the drive, because chaos needs a long average.
         next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)

@@ -155,7 +155,7 @@ class SineLoop:
         """Sample without drive, to measure the noise of the response."""
         samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
-        # During the first half, the vibration from the bench check decays.
+        # During the first half of this silence, the vibration from the bench check decays.
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
@@ -325,7 +325,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # Use only the newest measurement, because earlier ones belong to another setting.
+        # Use only the newest measurement, because earlier measurements belong to another setting.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:

@@ -45,7 +45,7 @@ class DriveClock:
         angle = 2 * pi * self._near_hz * offset_s
         basis = np.stack([np.sin(angle), np.cos(angle), np.ones(count)], axis=1)
         solution = np.linalg.lstsq(basis, drive)[0]
-        # Cycles of A sin(2 pi (f t + c)) at the block's centre, minus those of the nominal frequency.
+        # Phase in cycles of A sin(2 pi (f t + c)) at the block's centre, minus that of the nominal frequency.
         turns = float(np.arctan2(solution[1], solution[0])) / (2 * pi) - self._near_hz * centre_s
         before = self._phases[-1] if self._phases else turns
         turns = before + (turns - before + 0.5) % 1.0 - 0.5
@@ -155,7 +155,7 @@ class Stroboscope:
 
     def _keep_from(self, start_s: float) -> None:
         self._begun_s = start_s
-        # Keep one more sample, because the next block may shift the estimated start slightly to the left.
+        # Keep one more sample, because the next block may shift the estimated start of a period to the left.
         keep = max(0, int(start_s * self._rate_hz) - 1 - self._first)
         self._left = self._left[:, keep:]
         self._first += keep
@@ -177,7 +177,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
         at_starts = _hermite(integral, rotated, low, part)
         scale = 1.0 if order == 0 else 2.0
-        # The factor 1j makes the coefficient of A sin(...) equal to A if the sine begins at a start.
+        # The factor 1j makes the coefficient of A sin(...) equal to A if the sine begins with the period.
         turned = np.exp(2j * pi * order * turns * starts[:-1]) * (1j if order else 1.0)
         found[:, order] = scale * np.diff(at_starts) / length * turned
     return found
@@ -315,7 +315,7 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # The means of the thirds also differ by chance; ``allowed`` includes the noise.
+    # The means of the three thirds also differ by chance; ``allowed`` includes the noise.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 

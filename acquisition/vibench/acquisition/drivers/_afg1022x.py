@@ -46,7 +46,7 @@ class AFG1022X(ScpiInstrument):
     )
     # Frequencies are sent with a resolution of 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp: half of that plus 0.1 % of the value is rounding; more is another value.
+    # The panel resolves 1 mVpp. Half of that plus 0.1 % of the value is rounding; more means another value.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
@@ -77,7 +77,7 @@ class AFG1022X(ScpiInstrument):
         InstrumentError for another instrument. The output is then off, if the generator could be reached.
         """
         generator = cls(config)
-        leave = generator.disconnect  # another instrument gets no further commands
+        leave = generator.disconnect  # another kind of instrument gets no further commands
         try:
             generator._identify()
             leave = generator.close
@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set before the shape too, because the sine's frequency may be too high for the memory.
+            # Set the frequency before the shape, too, because the sine's may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
@@ -155,7 +155,7 @@ class AFG1022X(ScpiInstrument):
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude during the drive."""
-        _ = self.playing  # with unknown settings nothing is sent
+        _ = self.playing  # if settings are unknown, nothing is sent
         panel_vpp = amplitude_vpp * self._panel_factor
         self.model.check_amplitude(self._config, panel_vpp)
         with self._changing():
@@ -181,7 +181,7 @@ class AFG1022X(ScpiInstrument):
     def start(self) -> None:
         """Turn the output on, and read the state of the output back."""
         with self._changing():
-            _ = self.playing  # with unknown settings it stays off
+            _ = self.playing  # if settings are unknown, the output stays off
             self.output = "ON"
 
     def stop(self) -> None:
@@ -298,7 +298,7 @@ class AFG1022X(ScpiInstrument):
         """Set a sine of the smallest amplitude, without modulation modes and offset, from any state."""
         # *RST is not used: its effect on the output of this model is not documented.
         self._end_modes()
-        self.offset_v = 0.0  # the offset first, because this lowers every peak
+        self.offset_v = 0.0  # set the offset first, because this lowers every peak
         self._mute()
         self._select(None)
         self._set_frequency(_QUIET_FREQUENCY_HZ)
@@ -332,7 +332,7 @@ class AFG1022X(ScpiInstrument):
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves an error; the empty reply has already shown it
+        self.complaints()  # an unknown query leaves an error, as the empty reply has shown already
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)

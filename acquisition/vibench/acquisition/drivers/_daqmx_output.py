@@ -19,9 +19,9 @@ from ._daqmx_errors import daqmx_call
 from ._overload import require_playable
 
 _WRITE_TIMEOUT_S = 10.0
-# Number of final zeros: the output holds the last value, and some devices need more than one sample.
+# Number of zeros at the end: the output holds the last value, and some devices need more than one sample.
 _ZERO_SAMPLES = 64
-# Rounding of the rate that is read back; a larger deviation means another rate.
+# Rounding of the rate that is read back; a larger deviation means that the rate is another one.
 _SAME_RATE = 1e-6
 
 
@@ -115,7 +115,7 @@ class DaqmxOutput:
             with ExitStack() as last:
                 last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
                 last.callback(self._release)
-                # An output that ran out of samples reports this again; it has stopped, as required.
+                # An output that ran out of samples reports this again; the output has stopped, as required.
                 last.enter_context(suppress(DataLost))
                 if task is not None:
                     with daqmx_call(f"stopping {self._physical}"):
@@ -186,7 +186,7 @@ class DaqmxOutput:
 
 def _set_idle_output(channel: AOChannel) -> IdleOutput:
     """Set the idle output to zero volts; return the value read back, as many devices hold the last value."""
-    # A device that cannot do this refuses the setting; a device without this setting refuses the query.
+    # A device that cannot hold zero refuses the setting; a device without this setting refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS
         if channel.ao_idle_output_behavior is AOIdleOutputBehavior.ZERO_VOLTS:

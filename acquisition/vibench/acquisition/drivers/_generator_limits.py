@@ -117,7 +117,7 @@ class GeneratorModel:
                 f"{fewest} to {most} points. Nothing was sent; resample it"
             )
         peak = float(np.max(np.abs(values)))
-        # Not "peak > 1": a NaN must not pass.
+        # This form, and not "peak > 1", also refuses a NaN.
         if not peak <= 1.0 + 1e-9:
             raise LimitExceeded(
                 f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
@@ -137,7 +137,7 @@ class GeneratorModel:
 
 def _require(value: float, allowed: tuple[float, float], unit: str, reason: str) -> None:
     lowest, highest = allowed
-    if not lowest <= value <= highest:  # so that a NaN is refused
+    if not lowest <= value <= highest:  # this form also refuses a NaN
         raise LimitExceeded(
             f"{value:g} {unit} was requested; {lowest:g} to {highest:g} {unit} are allowed ({reason}). "
             "Nothing was sent; choose a value in that range"
@@ -167,7 +167,7 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     memory_points=(8, 65_536),
     top_code=65_534,
     burst_cycles=(1, 100_000_000),
-    # Models with one or two channels, 20 or 30 MHz; the numbers are taken from public programs.
+    # The numbers of models with one or two channels, 20 or 30 MHz, are taken from public programs.
     usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
     longest_sweep_s=500.0,  # linear sweeps may last longer, logarithmic sweeps may not
 )

@@ -7,7 +7,7 @@ from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
 OVERLOAD_FRACTION = 0.95
-# A delta-sigma converter's filter rings about this long after a clip; overloads closer than this are one.
+# A delta-sigma converter's filter rings about this long after a clip; closer overloads count as one.
 _RECOVERY_SAMPLES = 64
 
 
@@ -28,7 +28,7 @@ def overload_ranges(
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
     for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
-        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # skips NaN, which `read_block` refuses
+        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # this form skips NaN, which `read_block` refuses
             continue
         past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
         breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)
@@ -44,7 +44,7 @@ def overload_ranges(
 def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
     """Raise LimitExceeded for a NaN or a sample beyond the bench's limit, InstrumentError if closed."""
     peak_v = float(np.max(np.abs(volts), initial=0.0))
-    if not peak_v <= limit_v:  # so that a NaN does not pass
+    if not peak_v <= limit_v:  # this form also refuses a NaN
         raise LimitExceeded(
             f"a peak of {peak_v:g} V was requested from {physical}; {limit_v:g} V are allowed here. Nothing "
             "was written; lower the amplitude"

@@ -19,7 +19,7 @@ from ._visa_link import Link
 
 Codes = NDArray[np.uint16]
 
-# An error queue has some tens of entries; more replies than this mean that it is not being emptied.
+# An error queue has some tens of entries; more replies than this mean that the queue is not being emptied.
 _LONGEST_QUEUE = 64
 # A faulty instrument may never stop sending. The longest SCPI text has 255 letters; 8192 points have 16 kB.
 _LONGEST_TEXT = 300
@@ -160,7 +160,7 @@ class ScpiInstrument:
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves an error after its empty reply
+        self.complaints()  # an unknown query leaves an error in the queue after its empty reply
         if reply and reply.strip('"').upper() not in answers:
             raise SettingRefused(
                 f"{self.name}: {header} was set to {word} and still reads {reply!r}; "
@@ -186,7 +186,7 @@ class ScpiInstrument:
             self._reply_due = True
             self._link.write(message)
             reply = self._link.read_bytes(longest + 1, break_on_termchar=True)
-            # On a stream, a newline byte among the codes ends a read too.
+            # On a stream, a newline byte among the codes also ends a read.
             while self._link.read_termination and len(reply) <= min(sum(_block(reply)), longest):
                 reply += self._link.read_bytes(longest + 1 - len(reply), break_on_termchar=True)
             if len(reply) > longest:
@@ -207,7 +207,7 @@ class ScpiInstrument:
                 with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
-                        is_stream = bool(self._link.read_termination)  # its codes may have newline bytes
+                        is_stream = bool(self._link.read_termination)  # codes may contain newline bytes
                         self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=not is_stream)
                     except pyvisa.VisaIOError as error:
                         if error.error_code != _LATE:
@@ -266,7 +266,7 @@ class Number:
         header, text = self.header.format(c=owner.channel), self.form.format(value)
         owner.command(f"{header} {text}")
         got = owner.query_number(f"{header}?")
-        if not abs(got - value) <= self.absolute + self.relative * abs(value):  # so that a NaN is refused
+        if not abs(got - value) <= self.absolute + self.relative * abs(value):  # this form also refuses a NaN
             raise _refusal(owner, header, text, f"{got:.10g}")
         owner.held[self.header] = got
 

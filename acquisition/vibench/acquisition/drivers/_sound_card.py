@@ -79,7 +79,7 @@ class _Card:
         with self.changed:
             if status.input_overflow or self.waiting > self.most_waiting:
                 self.failure = "samples were overwritten before they were read"
-            if not self.failure:  # after a failure, samples are discarded
+            if not self.failure:  # after a failure, samples from the card are discarded
                 self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
                 self.waiting += heard.shape[0]
             self.changed.notify_all()

@@ -40,7 +40,7 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
                 f"{resource} is in use by another program; close that program and open the bench again"
             ) from error
         raise _absent(resource, error) from error
-    except MemoryError:  # the caller releases its reserve
+    except MemoryError:  # the caller releases its memory reserve
         raise
     except Exception as error:  # pyvisa-py reports absent devices as bare Exception, ValueError or OSError
         raise _absent(resource, error) from error
@@ -58,7 +58,7 @@ def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
     pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
     """
     with warnings.catch_warnings():
-        # When it searches the network, pyvisa-py warns of missing packages and leaves a socket open.
+        # While searching the network, pyvisa-py warns of missing packages and leaves a socket open.
         warnings.simplefilter("ignore", UserWarning)
         warnings.simplefilter("ignore", ResourceWarning)
         return tuple(_manager(visa_library).list_resources("?*"))
@@ -100,7 +100,7 @@ def _is_locked_out(resource: str) -> bool:
         try:
             found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))
             bus, number = (int((device / each).read_text()) for each in ("busnum", "devnum"))
-        except (OSError, ValueError):  # a port of a hub, or a device that was just unplugged
+        except (OSError, ValueError):  # this is a port of a hub, or a device that was just unplugged
             continue
         if found == wanted and not os.access(USB_NODES / f"{bus:03d}" / f"{number:03d}", os.W_OK):
             return True

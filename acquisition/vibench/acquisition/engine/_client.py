@@ -347,7 +347,7 @@ class Attendant:
 
     def close(self) -> None:
         """Stop attending the engine. May be called at any time."""
-        self._beat_s = inf  # `live` sends nothing from now on
+        self._beat_s = inf  # `live` sends nothing after this
         self._end()
 
     def _end(self) -> None:

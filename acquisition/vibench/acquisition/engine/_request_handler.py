@@ -51,7 +51,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    # Equal plans are checked once: otherwise a long campaign would make viewers wait.
+    # Check equal plans only once: a long campaign would otherwise make viewers wait.
     for point in played_alike(points):
         checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
         drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
@@ -292,7 +292,7 @@ class RequestHandler:
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if since_s > STALL_S:  # requests of viewers waited while this process was stalled
+        if since_s > STALL_S:  # viewers' requests waited while this process was stalled
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -322,7 +322,7 @@ class RequestHandler:
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
-            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer of the last requests has gone
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # the last requests' viewer has gone
         return self.continues_unattended or (self._is_orphan and self._is_looked_after)
 
     @property
@@ -363,7 +363,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # a start meanwhile creates a new switch
+        while switch is not self._engine.switch:  # a start in the meantime creates a new switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

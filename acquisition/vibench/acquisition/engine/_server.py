@@ -60,7 +60,7 @@ class Admission:
         self._token = token.encode()
         self._admitted = admitted
         self._make_room = make_room
-        self._waiting: dict[socket.socket, _Waiting] = {}  # oldest first
+        self._waiting: dict[socket.socket, _Waiting] = {}  # ordered from the oldest to the newest
         self._reserve: int | None = None
         self._wake, self._woken = socket.socketpair()
         self._selector = selectors.DefaultSelector()
@@ -105,7 +105,7 @@ class Admission:
         oldest = next(iter(self._waiting.values()), None)
         if oldest is not None and len(self._waiting) >= WAITING_MOST:
             if monotonic() - oldest.since_s < YOUNG_S:
-                sleep(YOUNG_S / 10)  # messages of the waiting clients may be on the way, and are read first
+                sleep(YOUNG_S / 10)  # messages of waiting clients may be on the way; they are read first
                 return
             self._turn_away(next(iter(self._waiting)))
         try:

@@ -222,7 +222,7 @@ def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
 def _heeds(client: EngineClient) -> bool:
     status = client.status()
     is_silent = status.run is not None and status.run.amplitude_vpp == 0.0
-    # Before its first run, and between two runs, nothing plays.
+    # Nothing plays before the first run of an engine and between two runs.
     is_between = status.state in (EngineState.RUNNING, EngineState.HELD) and status.run is None
     return is_silent or is_between or status.state not in SOUNDING
 

@@ -175,7 +175,7 @@ def _with_absolute_folder(request: CampaignRequest) -> CampaignRequest:
     return request.model_copy(update={"folder": request.folder.absolute()})
 
 
-# The engine's process may have another working folder than the client.
+# The engine's process may have another working folder than the client, so send an absolute path.
 AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
 AbsoluteRequest = Annotated[CampaignRequest, AfterValidator(_with_absolute_folder)]
 

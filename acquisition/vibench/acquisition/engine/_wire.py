@@ -109,7 +109,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
             incoming.take(connection.recv(min(incoming.missing, PIECE_BYTES)))
             if within_s is not None:
                 until_s = monotonic() + within_s if until_s is None else until_s
-                # A timeout of 0 would mean no waiting at all.
+                # A timeout of 0 would make the socket non-blocking.
                 connection.settimeout(max(until_s - monotonic(), 1e-3))
     finally:
         connection.settimeout(patience_s)

@@ -111,7 +111,7 @@ class ResonanceTracking(AbstractFeedback):
         if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])
         moved = harmonics[self.harmonic - 1]
-        # The cube of a sine has a sine at three times its phase, its square a cosine at twice.
+        # The cube of a sine has a sine at three times its phase; the square has a cosine at twice its phase.
         turned = -1j if 2 in (self.harmonic, self.subharmonic) else 1.0
         return turned * moved * (moved / max(abs(moved), 1e-300)) ** (self.subharmonic - 1)
 

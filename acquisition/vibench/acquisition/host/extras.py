@@ -21,7 +21,7 @@ def need_extra(extra: str) -> None:
     Raises MissingLibrary when one is not installed. ``extra`` is its name in `pyproject.toml`.
     """
     for library in EXTRAS[extra]:
-        # The parent first, because find_spec of a submodule raises if the parent is missing.
+        # Check the parent first, because find_spec of a submodule raises an error if the parent is missing.
         if find_spec(library.partition(".")[0]) is None or find_spec(library) is None:
             raise _missing(library, extra)
 

@@ -193,7 +193,7 @@ def _complaint(detail: Any) -> str:
     if not detail["loc"]:
         return reason
     match detail["input"]:
-        case dict() | [dict(), *_]:  # too long to show; the reason names the wrong entry
+        case dict() | [dict(), *_]:  # the value is too long to show; the reason names the wrong entry
             given = ""
         case value:
             given = f" = {_shown(value)}"

@@ -68,7 +68,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
-    # All different tones, waveforms and stream sources of the plan, at their highest level.
+    # All different tones, waveforms and stream sources of the plan, each at its highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(
@@ -134,7 +134,7 @@ class _BroadPlay:
         if not self._touches:
             return self._through(self._model.transfer, quantity)
         stuck = self._through(self._model.stuck_transfer, quantity)
-        # Add the effect, averaged over the band, of a p whose amplitude equals the gap.
+        # Add the effect of a motion p whose amplitude equals the gap, averaged over the band.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
@@ -153,7 +153,7 @@ def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
     lines = held_lines(waveform.values, HELD_SPANS)
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Use twice the samples that the highest line needs, so that no peak between samples is missed.
+    # Use twice the samples that the highest spectral line needs, so that no peak between samples is missed.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)

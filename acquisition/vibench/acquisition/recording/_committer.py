@@ -137,7 +137,7 @@ class Committer:
         finally:
             with self._changed:
                 self._changed.notify_all()
-            if self._is_abandoned:  # the disk is back, but the caller no longer waits
+            if self._is_abandoned:  # the disk responds again, but the caller no longer waits
                 with suppress(OSError):
                     self._disk.close()
 

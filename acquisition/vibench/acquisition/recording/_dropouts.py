@@ -179,7 +179,7 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
             # The flanks end at the neighbouring runs, whose samples are not motion.
             before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
             is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
-            is_short = one.stop - one.first <= longest + flank  # with ringing on both sides
+            is_short = one.stop - one.first <= longest + flank  # includes ringing on both sides
             if so_far is not None and is_alone and is_short:
                 rough = _roughness(velocity, one, before, after)
                 if rough < np.inf:

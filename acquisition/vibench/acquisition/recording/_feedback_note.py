@@ -353,7 +353,7 @@ class UntilNote(AbstractNote):
             for name, wish in self.wishes.items()
             for bound in (self.bounds.get(name),)
         )
-        # Scatter falls with the square root of time.
+        # The scatter of a mean falls with the square root of time.
         needed_s = self.looked_s * max(self.shares) ** 2 if self.bounds else inf
         if self.recorded_s is not None:
             end = "known well enough" if self.is_reached else "longest time"

@@ -179,7 +179,7 @@ def whereabouts(part: Path, error: Exception) -> str:
     """Return a sentence: where the committed samples are after a disk error, and what to do."""
     try:
         is_there = part.exists()
-    except OSError:  # the folder does not respond
+    except OSError:  # the folder no longer responds
         is_there = False
     # After FileNotFoundError, the recording was removed; a file with this name is a different file.
     if is_there and not isinstance(error, FileNotFoundError):

@@ -214,7 +214,7 @@ class ChannelHeader:
     def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
         """Return the header of the channel ``role`` from the attributes that :meth:`attributes` returned."""
         given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
-        # Only NaN differs from itself.
+        # NaN is the only value that differs from itself.
         absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
         return cls(**{**given, **absent, "role": role, "unit": attributes["units"]})  # type: ignore[arg-type]
 

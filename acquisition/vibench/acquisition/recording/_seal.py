@@ -472,7 +472,7 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
     """Open a database read-only, also in a read-only folder."""
     address = path.resolve().as_uri()
     try:
-        # If it could write, the last connection to close would clean up the database files.
+        # If this connection could write, the last connection to close would clean up the database files.
         with closed_on_error(opened(f"{address}?mode=rw")) as connection:
             connection.execute("PRAGMA query_only = ON")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()

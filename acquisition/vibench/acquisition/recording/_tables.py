@@ -113,7 +113,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
         or dataset.ndim != 1
         or dataset.dtype.kind != wanted.kind
         or dataset.dtype.itemsize > wanted.itemsize
-        or len(dataset) > table.capacity + 1  # a recovery adds one event
+        or len(dataset) > table.capacity + 1  # a recovery adds one event to the table
     ):
         raise RecordingError(
             f"the column {column.name} of the table {table.name} must have the type {column.dtype} and at "

@@ -145,7 +145,7 @@ class OutputConfig(FrozenModel):
     """Largest allowed magnitude of the voltage [V]."""
     sample_rate_hz: PositiveFloat
     """Sample rate of the output, which the hardware must support exactly [samples/s]."""
-    # At least three blocks of a run: one is played, one is ready, and one is being written.
+    # At least three blocks of a run: one is being played, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
     """Time written in advance [s]. It is the longest tolerated pause of this computer, and the delay of an
     early ramp down."""

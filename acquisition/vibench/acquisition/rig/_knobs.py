@@ -132,7 +132,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# A confirmation is valid for a campaign of a day and a night; later, settings may have changed.
+# A confirmation is valid for a campaign of a day and a night. After that, settings may have changed.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 

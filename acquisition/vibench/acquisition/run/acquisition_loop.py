@@ -58,7 +58,7 @@ class AcquisitionLoop:
 
     def catch_up(self) -> Iterator[Block]:
         """Read all waiting samples, and delay the rest of the plan by the duration of these samples."""
-        # Only once, because more samples arrive during reading.
+        # Ask for waiting samples only once, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
         longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
@@ -79,7 +79,7 @@ class AcquisitionLoop:
         while sampled < goal:
             yield self._next(min(piece, goal - self.samples))
             sampled = self._sampled
-        # Ignore up to half a sample, which is the rounding of the goal and must not accumulate.
+        # Ignore up to half a sample: this is the rounding of the goal and must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
 
     @property

@@ -95,7 +95,7 @@ def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
     plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
     frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
     frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
-    if frequency_hz is None:  # the frequencies are decided during the run
+    if frequency_hz is None:  # feedback decides the frequencies during the run
         raise _without_dead_man(f"{measurement.name} is not a sine of one frequency")
     if frequency_hz * longest_s < 1:
         raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")

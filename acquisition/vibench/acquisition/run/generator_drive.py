@@ -165,7 +165,7 @@ class GeneratorDrive:
         """
         was_off = not self._is_on
         try:
-            with suppress(AcquisitionError):  # if the ramp fails, stop() still switches off
+            with suppress(AcquisitionError):  # if the ramp fails, stop() still switches the output off
                 self._ramp_down_blindly()
         finally:
             self._stop()
@@ -251,7 +251,7 @@ class GeneratorDrive:
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Set before the command is sent, so that the output counts as on if the command fails half-way.
+        # Set the level before the command, so that the output counts as on if the command fails half-way.
         self._is_on = True
         self._generator.start()
 
@@ -266,7 +266,7 @@ class GeneratorDrive:
         quiet_vpp = self._quiet_vpp()
         try:
             self._generator.set_amplitude(quiet_vpp)
-        except AcquisitionError:  # its settings are unknown after a failed change
+        except AcquisitionError:  # the generator's settings are unknown after a failed change
             self._generator.load_sine(CHECK_FREQUENCY_HZ, quiet_vpp)
         self._level, self._setting_vpp = 0.0, quiet_vpp
 

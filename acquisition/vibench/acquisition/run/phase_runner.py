@@ -231,7 +231,7 @@ class PhaseRunner:
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
             yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # exclude the time of the next command
+            self.loop.enter(None)  # leave out the time of the next command
         waits = self._drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
@@ -347,7 +347,7 @@ class PhaseRunner:
         if self._drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
         if level is StopLevel.OFF:
-            self._drive.cut()  # before reading, because the converter may not answer
+            self._drive.cut()  # switch off before reading, because the converter may not answer
         self.loop.cut()
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level), self.loop.time_s):
@@ -371,12 +371,12 @@ class PhaseRunner:
         yield from self._read(LISTEN_S)
         if not self._silence.is_silent:
             self.loop.cut()
-            yield from self._read(LISTEN_S)  # and all samples converted before the output was off
+            yield from self._read(LISTEN_S)  # this also reads samples converted before the output was off
         lower_s = self.loop.elapsed_s + wait_s
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
                 self._silence.note_heard()
-                with suppress(AcquisitionError):  # the measured drive decides, not this call
+                with suppress(AcquisitionError):  # the measured drive decides, not the result of this call
                     self._drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
                 self.loop.cut()

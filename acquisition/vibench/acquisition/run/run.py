@@ -329,7 +329,7 @@ class Run(ClosedOnLeaving):
                 self._begin(announced)
                 loop.log(EventKind.CHECK, "skipped: the bench was checked shortly before")
                 pause_s = 0.0
-        del announced  # not stored for drives that do not read ahead
+        del announced  # phases are stored only for drives that read ahead
         yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
         if self._controller is None:
             for phase in playing:

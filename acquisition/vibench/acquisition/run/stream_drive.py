@@ -206,7 +206,7 @@ class StreamDrive:
         Used when the run ends without sampling. A device that accepts no more samples is stopped at once.
         """
         try:
-            with suppress(AcquisitionError):  # if this fails, stop() still follows
+            with suppress(AcquisitionError):  # if the fade fails, stop() still follows
                 self._fade_blindly()
         finally:
             self.cut()

@@ -83,7 +83,7 @@ class KeptStops:
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             self._taken.add(path)
             with suppress(OSError):
-                _answer(path, "silent").unlink(missing_ok=True)  # answer to an earlier stop
+                _answer(path, "silent").unlink(missing_ok=True)  # this file is the answer to an earlier stop
                 rename(path, _answer(path, "taken"))
         self.confirm()
 
@@ -94,7 +94,7 @@ class KeptStops:
         """
         is_advancing = DRIVES_ON.take_advance()
         for path in tuple(self._taken):
-            with suppress(OSError):  # somebody has removed the folder
+            with suppress(OSError):  # somebody has removed the state folder
                 if not DRIVES_ON:
                     with suppress(FileNotFoundError):
                         rename(_answer(path, "taken"), _answer(path, "silent"))
@@ -197,7 +197,7 @@ class Program(BaseModel):
         try:
             with closing(OpenFile(_path(self))) as file:
                 return not file.is_locked_alone()
-        except OSError:  # file removed, or a disk without locks
+        except OSError:  # the file was removed, or the disk has no locks
             return False
 
     @property
@@ -281,18 +281,18 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
             "VIBENCH_STATE_DIR to the folder of the program. In an emergency switch the amplifier off by hand"
         ) from error
     for path in paths:
-        if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait
+        if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait for ever
             continue
         try:
             yield path, model.model_validate_json(_read_announcement(path))
-        except (ValueError, OSError):  # from another version, of another type, or removed meanwhile
+        except (ValueError, OSError):  # a file from another version, of another type, or removed meanwhile
             continue
 
 
 def _read_announcement(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except PermissionError:  # for example of root; a stop only needs write access to the folder
+    except PermissionError:  # a file of root, for example; a stop only needs write access to the folder
         pid, start, _ = path.name.split(".")
         facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
@@ -423,7 +423,7 @@ def _lock(path: Path) -> OpenFile | None:
     try:
         if file.is_locked_alone():
             return file
-    except OSError:  # a disk without locks
+    except OSError:  # the disk has no locks
         pass
     file.close()
     return None
@@ -438,9 +438,9 @@ def _write(program: Program) -> Path:
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(program.model_dump_json())
-        rename(coming, path)  # so that readers never see a half-written file
+        rename(coming, path)  # so that readers never see an incomplete file
     except OSError:
-        coming.unlink(missing_ok=True)  # an empty file may remain on a full disk
+        coming.unlink(missing_ok=True)  # on a full disk, an empty file may remain
         raise
     return path
 

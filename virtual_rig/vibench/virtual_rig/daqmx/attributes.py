@@ -194,7 +194,7 @@ READ: Attributes = {
     "CHANNELS_TO_READ": Attribute(_channel_names),
     "NUM_CHANS": Attribute(lambda task: len(task.channels)),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
-    "0x31E8": Attribute(default_samples),  # has no name in the protocol: how many samples "all" means
+    "0x31E8": Attribute(default_samples),  # without a name in the protocol: how many samples "all" means
     "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }
@@ -266,7 +266,7 @@ GROUPS = {
 """Groups, keyed by their part of the call names in the protocol."""
 
 
-# From call to property, and from value to message
+# Tables from call to property, and from value to message
 
 SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
 _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")

@@ -192,7 +192,7 @@ class Catalogue:
         """
         found, prefix = [], ""
         for given in expand(names):
-            # A name without a device is on the device of the name before: ``"Dev1/ai0, ai2"``.
+            # A name without a device belongs to the device of the name before it: ``"Dev1/ai0, ai2"``.
             if "/" in given.strip("/"):
                 prefix, name = given.rpartition("/")[0], given
             else:

@@ -180,7 +180,7 @@ class DaqServer:
         """
         try:
             self.faults.check(name)
-        except DaqmxRefusal:  # a missing server does not advance time
+        except DaqmxRefusal:  # while the server does not answer, rig time does not advance
             if name in self._refused:
                 self._pace.pass_time(self._rig, FAILED_CALL_S)
             self._refused.add(name)
@@ -192,7 +192,7 @@ class DaqServer:
             with _report_refusals(context), self._rig.changed:
                 self.faults.check(name)
                 listener = call(request, context)
-            context.send_initial_metadata(())  # the client waits for the metadata
+            context.send_initial_metadata(())  # without metadata, the client would keep waiting
             yield from listener
 
         return handle

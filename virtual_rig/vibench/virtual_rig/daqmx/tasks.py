@@ -332,7 +332,7 @@ class Task:
 
         while not is_there() and time.monotonic() < deadline_s:
             self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, deadline_s)
-            self.rig.changed.wait(_BREATH_S)  # let other callers stop the task
+            self.rig.changed.wait(_BREATH_S)  # lets other callers stop the task
         return is_there()
 
     def is_done(self) -> bool:

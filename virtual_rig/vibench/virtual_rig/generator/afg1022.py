@@ -57,7 +57,7 @@ class AFG1022(ScpiInstrument):
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
-    points, top_code = (2, 8192), 16383  # 14 bits (IVI; public drivers read them back)
+    points, top_code = (2, 8192), 16383  # codes have 14 bits (IVI; public drivers read them back)
     defaults = ChannelSettings()
 
     def __init__(

@@ -322,7 +322,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
         0 selects a free one; see ``port`` and ``resource_name``.
     """
 
-    daemon_threads = True  # a thread per client, which does not keep the process alive
+    daemon_threads = True  # each client has a thread, which does not keep the process alive
     allow_reuse_address = True
     block_on_close = False
 

@@ -334,7 +334,7 @@ def as_block(data: bytes) -> bytes:
 
 def as_number(value: float) -> bytes:
     """Return a number in the instrument's format: ``1.5E+03``, ``9.9E+37``, ``0.0E+00``."""
-    mantissa, exponent = f"{value + 0.0:.11E}".split("E")  # -0.0 + 0.0 is 0.0
+    mantissa, exponent = f"{value + 0.0:.11E}".split("E")  # adding 0.0 turns -0.0 into 0.0
     whole, _, decimals = mantissa.partition(".")
     return f"{whole}.{decimals.rstrip('0') or '0'}E{int(exponent):+03d}".encode("ascii")
 

@@ -58,7 +58,7 @@ class Triangle:
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the mean: the middle value if the range contains no corner, else from the integral."""
-        begin = start + 0.25  # counted from the lowest point
+        begin = start + 0.25  # phase is counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
         middle = self._value(0.5 * (begin + end))
@@ -305,9 +305,9 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     pieces = np.bincount(interval, minlength=intervals)
     sums = np.bincount(interval, weights=durations * means, minlength=intervals)
     widths = np.bincount(interval, weights=durations, minlength=intervals)
-    # Coinciding edges give empty intervals without weight.
+    # Coinciding edges give empty intervals, which have no weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # Divisions of other intervals must not change the mean of an undivided one, not even in the last bit.
+    # Divisions of other intervals must not change the mean of an undivided one, even in the last bit.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

@@ -130,7 +130,7 @@ class RemoteUsbDevice:
         deadline_s = None if timeout_ms == _NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
         try:
             answer = self._method(name)(request, timeout=deadline_s, metadata=self._metadata)
-        except (grpc.RpcError, ValueError) as error:  # ValueError: the channel was closed on this side
+        except (grpc.RpcError, ValueError) as error:  # ValueError: the gRPC channel was closed on this side
             raise OSError(errno.ENODEV, os.strerror(errno.ENODEV)) from error
         (number,) = _ERRNO.unpack_from(answer)
         if number:

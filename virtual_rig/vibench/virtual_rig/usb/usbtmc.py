@@ -226,7 +226,7 @@ class UsbTmcInstrument:
 
 
 def _fail(number: int) -> NoReturn:
-    raise OSError(number, os.strerror(number))  # a TimeoutError for ETIMEDOUT
+    raise OSError(number, os.strerror(number))  # with ETIMEDOUT, OSError becomes a TimeoutError
 
 
 _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {

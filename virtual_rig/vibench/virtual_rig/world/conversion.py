@@ -237,7 +237,7 @@ class ConverterInput:
         self._noise_v = noise_v
         self._noise = noise
         self._count_v = volts_per_count(stage.configured.range_v)
-        self._means, _ = stage.pass_on(history)  # clipping before the conversion is ignored
+        self._means, _ = stage.pass_on(history)  # clipping before the start of the conversion is ignored
         self._means_first_step = start_step - history.shape[1]
 
     def take(self, signals: FloatArray, sample: int, count: int) -> FloatArray:

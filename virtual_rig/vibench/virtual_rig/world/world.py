@@ -259,7 +259,7 @@ class World:
         """Move the vibrometer's beam to the mass of ``role``, whose velocity replaces that of m0."""
         with self._turn:
             self._beam = role
-            self._compute_to(self._step + 1)  # the velocity over a step needs the state before it
+            self._compute_to(self._step + 1)  # the mean velocity over a step needs the state before the step
 
     def disturb_response(self, duration_s: float, level: float) -> None:
         """Make the sensor of m0 output ``level`` (fraction of full scale) for a while."""
@@ -373,7 +373,7 @@ class World:
             case "velocity":
                 means = np.diff(place) / h
             case "displacement":
-                # Mean of the Hermite cubic through both ends.
+                # Mean of the cubic Hermite polynomial through the states at both ends.
                 means = 0.5 * (place[:-1] + place[1:]) - h / 12 * np.diff(velocity)
             case _:
                 pull = self._specimen.stiffnesses[0] * (column["x"] - place)
