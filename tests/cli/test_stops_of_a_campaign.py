@@ -82,7 +82,7 @@ def until(program, is_so):
 
 
 def is_resting(status):
-    return any("resting for" in each.what for each in status.messages)
+    return any("pausing for" in each.what for each in status.messages)
 
 
 def is_held(status):

@@ -43,7 +43,7 @@ class LoopFeedback(FrozenModel):
         widths = [*(len(row) == memory for row in self.step), *(len(row) == inputs for row in self.inlet)]
         if not (all(widths) and len(self.step) == len(self.inlet) == memory and len(self.direct) == inputs):
             raise ValueError(
-                f"a feedback of {memory} outputs needs step of {memory} x {memory}, inlet of {memory} x "
+                f"a law with {memory} state variables needs step of {memory} x {memory}, inlet of {memory} x "
                 f"{inputs} and direct of {inputs}; make the shapes agree"
             )
         return self

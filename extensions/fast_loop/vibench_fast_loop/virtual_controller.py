@@ -105,7 +105,7 @@ class VirtualController:
         except ValidationError as error:
             first = error.errors()[0]
             place = ".".join(map(str, first["loc"]))
-            answer = _refusal(f"{place}: {first['msg']}; its output continues")
+            answer = _refusal(f"{place}: {first['msg']}; the output continues")
         else:
             with self._turn:
                 self._now["unheard"] = 0.0
@@ -119,7 +119,7 @@ class VirtualController:
             case LoopRequest(ask="play", program=LoopProgram() as program):
                 self._play(program)
             case LoopRequest(ask="play"):
-                return _refusal("play: no program was given; its output continues")
+                return _refusal("play: no program was given; the output continues")
             case LoopRequest(ask="silence", ramp_s=ramp_s):
                 self._end("", ramp_s)
         blocks, self._blocks = tuple(self._blocks), []

@@ -47,7 +47,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     assert len(began_s) == 1
     assert max(loudest_v) < 1e-4  # velocity of the table [m/s]: noise of the amplifier
     told = (tmp_path / "c.status").read_text()
-    assert "resting for 12 s before two" in told
+    assert "pausing for 12 s before two" in told
 
 
 def test_cooling_pauses_are_part_of_plan_and_estimate(rig, tmp_path):

@@ -117,7 +117,7 @@ def test_a_density_above_its_abort_limit_ramps_down_the_run(record_noise):
     ("changes", "said"),
     [
         ({"spectrum": ()}, "at least 1 item"),
-        ({"spectrum": corners((100, 1), (50, 1))}, "in rising order"),
+        ({"spectrum": corners((100, 1), (50, 1))}, "from low to high"),
         ({"abort_db": 2.0}, "must be above tolerance_db"),
         ({"response_limits": corners((50, 1), (50, 2))}, "response_limits has corners"),
     ],

@@ -248,7 +248,7 @@ def test_events_beyond_the_table_size_are_counted(tmp_path, make_header):
             writer.log("note", f"number {number}")
     with open_recording(tmp_path / "a.h5") as recording:
         assert len(recording.events) == 4096
-        assert recording.events[-1].text == "5 more events were not kept"
+        assert recording.events[-1].text == "5 more events did not fit here"
 
 
 def test_a_finished_writer_refuses_samples(tmp_path, make_header, make_block):

@@ -157,7 +157,7 @@ def test_invalid_requests_are_refused_in_a_sentence(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     for line in (b"{}", b"nonsense", b'{"ask": "play"}', b'{"ask": "play", "program": {"frequency_hz": -1}}'):
         told = json.loads(wired.controller.execute(line).data)
-        assert "its output continues" in told["refused"]
+        assert "the output continues" in told["refused"]
     with pytest.raises(ValueError, match="make the shapes agree"):
         LoopFeedback(step=((0.0,),), inlet=((0.0,),), output=(0.0,), direct=(1.0, 0.0))
     assert wired.report().state is LoopState.PLAYING

@@ -43,7 +43,7 @@ class CoolingPause:
         if not self._is_due or not self._rest_s:
             return
         self._is_due = False
-        text = f"resting for {self._rest_s:g} s before {name}"
+        text = f"pausing for {self._rest_s:g} s before {name}"
         self._say(CampaignEvent(CampaignEventKind.RESTING, text, {"point": name, "rest_s": self._rest_s}))
         left_s = self._rest_s
         while (left_s > 0 or self._switch.is_holding) and self._switch.request is None:

@@ -248,7 +248,7 @@ def make_folder(folder: Path) -> None:
     except OSError as error:
         raise RecordingError(
             f"the folder {folder} cannot be created ({error.strerror}). Nothing was played; "
-            "give a folder that exists, or another name for the new one"
+            "give a folder that exists, or another path for the new folder"
         ) from error
 
 

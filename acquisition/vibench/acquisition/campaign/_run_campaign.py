@@ -300,7 +300,7 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
         except RecordingError as error:
             raise RecordingError(
                 f"another program is running the campaign {campaign.name!r} in {folder}. "
-                "Nothing was changed; wait until it has ended, or stop it"
+                "Nothing was changed; wait until that program has ended, or stop it"
             ) from error
         yield log
 

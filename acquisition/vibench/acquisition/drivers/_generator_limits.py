@@ -94,9 +94,9 @@ class GeneratorModel:
         self.check_frequency(Shape.SINE, sweep.start_hz)
         self.check_frequency(Shape.SINE, sweep.stop_hz)
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
-            most = f"at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "none"
+            most = f"for at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "not by itself"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was requested; internal sweeps of the {self.name}: "
+                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} sweeps "
                 f"{most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
@@ -121,7 +121,7 @@ class GeneratorModel:
         if not peak <= 1.0 + 1e-9:
             raise LimitExceeded(
                 f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
-                "(the amplitude is given separately). Nothing was sent; scale it"
+                "(the amplitude is given separately). Nothing was sent; scale the values"
             )
         swing = values - values.mean()
         factor = float(np.max(np.abs(swing)))

@@ -144,7 +144,7 @@ class SoundCardDigitizer:
             card = _Card(rig, inputs, output)
         except ValueError as error:
             raise InstrumentLost(
-                f"there is no sound card {rig.daq.device!r} ({error}); set daq.device to an existing one"
+                f"there is no sound card {rig.daq.device!r} ({error}); set daq.device to an existing card"
             ) from error
         except _sounddevice().PortAudioError as error:
             raise InstrumentError(

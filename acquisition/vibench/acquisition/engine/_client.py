@@ -139,7 +139,7 @@ def require_ended(engine: Announcement) -> None:
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:
     if len(chosen) > 1:
-        raise EngineError(f"several programs drive a bench: {_named(chosen)}; name one with --pid")
+        raise EngineError(f"several programs drive a bench: {_named(chosen)}; select one with --pid")
     return chosen[0]
 
 

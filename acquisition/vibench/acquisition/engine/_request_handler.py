@@ -81,7 +81,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
             "Without a viewer: "
             + (
-                f"aborted after {granted_s:.1f} s; after {hung_s:.1f} s if the window hangs"
+                f"aborted after {granted_s:.1f} s, or after {hung_s:.1f} s if the window hangs"
                 if is_attended
                 else "continues, unattended"
             ),

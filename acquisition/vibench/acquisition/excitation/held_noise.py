@@ -65,7 +65,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
         for name, corners in (("spectrum", self.spectrum), ("response_limits", self.response_limits)):
             places = [each.frequency_hz for each in corners]
             if places != sorted(set(places)):
-                raise ValueError(f"{name} has corners at {places} Hz; give each once, in rising order")
+                raise ValueError(f"{name} has corners at {places} Hz; list each once, from low to high")
         if self.abort_db <= self.tolerance_db:
             raise ValueError(
                 f"abort_db = {self.abort_db:g} must be above tolerance_db = {self.tolerance_db:g}; raise it"

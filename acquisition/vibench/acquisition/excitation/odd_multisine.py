@@ -46,7 +46,7 @@ class OddMultisine(PeriodicNoise):
         if self.detection_lines not in ((), silent):
             raise ValueError(
                 "detection_lines must be the odd lines of the band that are not excited; "
-                "leave detection_lines out to get them"
+                "leave detection_lines out to use these"
             )
         # Store the chosen lines in the plan, so that other programs can read them from its file.
         object.__setattr__(self, "excited_lines", tuple(sorted(excited)))

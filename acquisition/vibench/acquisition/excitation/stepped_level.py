@@ -43,7 +43,7 @@ class SteppedLevel(FixedSine):
         count = self._steps()
         if count > MOST_STEPS:
             raise ValueError(
-                f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: widen step_vpp or "
+                f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: raise step_vpp or "
                 "split the measurement"
             )
         return self

@@ -35,7 +35,7 @@ class FrequencyGrid(FrozenModel):
         if steps > 2 * MOST_STEPS:
             # Check before building the list: a typing error in the step could give millions of values.
             raise ValueError(
-                f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
+                f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: raise step_hz or "
                 "split the measurement"
             )
         return self
@@ -76,7 +76,7 @@ class FrequencySteps(AbstractExcitation):
         if count > self.most_steps:
             raise ValueError(
                 f"the plan has {count} steps; one recording holds at most {self.most_steps}: "
-                "widen the grid or split the measurement"
+                "use a coarser grid or split the measurement"
             )
         return self
 

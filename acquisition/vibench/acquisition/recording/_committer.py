@@ -263,7 +263,7 @@ class Journal:
         if self._events.free_rows > 1:
             return self._events.append((sample, time.time(), kind, text))
         self._dropped_events += 1
-        cells = (sample, time.time(), "events lost", f"{self._dropped_events} more events were not kept")
+        cells = (sample, time.time(), "events lost", f"{self._dropped_events} more events did not fit here")
         if self._events.free_rows:
             return self._events.append(cells)
         return self._events.replace(self._events.rows - 1, cells)
@@ -272,7 +272,7 @@ class Journal:
         """Begin a named range of samples."""
         if self._open is not None:
             raise RecordingError(
-                f"The segment {label!r} cannot begin: {self._open.label!r} is still open. End that first."
+                f"The segment {label!r} cannot begin: {self._open.label!r} is open. End that segment first."
             )
         numbers_json = json_text(f"The numbers of segment {label!r}", numbers)
         if len(numbers_json) > layout.NUMBERS_WIDTH:

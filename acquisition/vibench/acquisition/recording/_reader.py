@@ -345,7 +345,7 @@ class Recording(RecordingDescription):
         except DAMAGE as error:
             require_reachable(self._open.file, error)
             raise RecordingError(
-                f"The results in {self.path} cannot be read: {error}. Its samples are unchanged; analyse it."
+                f"The results in {self.path} cannot be read: {error}. Its samples are intact; analyse them."
             ) from error
 
     @property

@@ -368,7 +368,7 @@ def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
     """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
-    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none with the given key ({key.name})", "")
+    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none signed with the key ({key.name})", "")
 
 
 def _signature_check(

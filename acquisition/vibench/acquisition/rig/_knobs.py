@@ -285,7 +285,7 @@ class Calibration:
     def advice(self) -> str:
         """What to do about an invalid calibration."""
         if self.is_to_come:
-            return "the date is in the future: enter the certificate's date in the configuration"
+            return "the date is in the future: enter the date on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"
 
     def __str__(self) -> str:

@@ -291,7 +291,7 @@ class PhaseRunner:
         more, self._lost_cycles = self._glide.more_cycles, 0.0
         self._glide.begin()
         if abs(more) > TOLD_CYCLES:
-            text = f"the recorded drive ended {more:+.2g} cycles from its plan"
+            text = f"at its end, the recorded drive was {more:+.2g} cycles off its plan"
             self.loop.log(EventKind.LATE, text)
 
     def _require_pace(self, phase: Phase) -> float:

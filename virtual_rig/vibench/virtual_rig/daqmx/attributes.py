@@ -76,7 +76,7 @@ class Group:
         name = self.names.get(number, f"0x{number:X}")
         attributes = self.attributes(subject)
         if name not in attributes:
-            raise not_supported(f"{self.name}.{name}", "The simulated driver does not have it.")
+            raise not_supported(f"{self.name}.{name}", "The simulated driver lacks this property.")
         return f"{self.name}.{name}", attributes[name]
 
 

@@ -280,7 +280,7 @@ def _write(task: Task, request: Any) -> Fields:
 def _write_waveforms(task: Task, request: Any) -> Fields:
     rows = [np.array(waveform.y_data) for waveform in request.waveforms]
     if len({row.size for row in rows}) != 1:
-        raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
+        raise unsupported_value("number of waveforms", len(rows), "one per channel, all of the same length")
     _check_size(task, sum(row.size for row in rows), rows[0].size)
     return write(task, np.stack(rows), request)
 
