@@ -59,9 +59,9 @@ class LimitTrip:
     """A limit that a running measurement has exceeded, and the measured value."""
 
     channel: str
-    """Role of the channel: ``"base_acceleration"``."""
+    """Role of the channel, for example ``"base_acceleration"``."""
     quantity: str
-    """Quantity that exceeded its limit: ``"stroke"``."""
+    """Quantity that exceeded its limit, for example ``"stroke"``."""
     value: float
     """Largest magnitude in the block of samples that exceeded the limit, in ``unit``."""
     limit: float

@@ -45,7 +45,7 @@ class BranchContinuation(AbstractFeedback):
     step_hz: PositiveFloat = 1.0
     """Longest step between points [Hz]; steps are shorter in folds and where points are difficult to find."""
     most_points: int = Field(default=60, ge=1, le=1000)
-    """Maximum number of points."""
+    """Maximum number of points on the branch."""
     harmonics: int = Field(default=5, ge=3, le=15)
     """Highest base harmonic that is controlled to zero."""
     tolerance: Share = 0.004

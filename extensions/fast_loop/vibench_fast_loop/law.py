@@ -33,11 +33,11 @@ class LinearLaw:
     """Voltage u from samples s: u = output @ memory + direct @ s. Then memory = step @ memory + inlet @ s."""
 
     step: Table
-    """Matrix of shape (n, n)."""
+    """Matrix from memory to next memory, shape (n, n)."""
     inlet: Table
     """Matrix of shape (n, 2), per m/s2 of the base and per m/s of m0."""
     output: Table
-    """Matrix of shape (1, n) [V]."""
+    """Matrix from memory to output voltage, shape (1, n) [V]."""
     direct: Table
     """Matrix of shape (1, 2), volts per m/s2 of the base and per m/s of m0."""
 

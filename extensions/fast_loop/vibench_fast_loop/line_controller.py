@@ -56,7 +56,7 @@ class LineController:
 
     @property
     def identity(self) -> Identity:
-        """Identity of the controller."""
+        """Identity of the controller, with its serial number."""
         facts = self.facts
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
 

@@ -72,7 +72,7 @@ class OpenLoopMultiplier:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """95 % interval of the multiplier."""
+        """95 % confidence interval of the multiplier."""
         return self.size - _QUANTILE * self.error, self.size + _QUANTILE * self.error
 
 

@@ -35,7 +35,7 @@ class LoopTiming:
 
     @property
     def step_s(self) -> float:
-        """Time between two samples [s]."""
+        """Time between two samples of the controller [s]."""
         return 1.0 / self.rate_hz
 
 
@@ -87,7 +87,7 @@ class SampledPlant:
 
     @property
     def size(self) -> int:
-        """Length of the state vector."""
+        """Number of entries in the state vector."""
         return 9 + SHOWN + self.waiting
 
     @cached_property

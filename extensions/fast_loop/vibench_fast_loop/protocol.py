@@ -33,9 +33,9 @@ class LoopFeedback(FrozenModel):
     inlet: tuple[Row, ...]
     """Matrix of shape (n, 2), as rows [per V]."""
     output: Row
-    """Row of shape (n,) [V]."""
+    """Row from memory to output voltage, shape (n,) [V]."""
     direct: Row
-    """Row of shape (2,) [V/V]."""
+    """Row from samples to output voltage, shape (2,) [V/V]."""
 
     @model_validator(mode="after")
     def _shapes_agree(self) -> Self:
@@ -66,7 +66,7 @@ class LoopProgram(FrozenModel):
     block_periods: int = Field(default=10, ge=2, le=1000)
     """Number of periods in a block of measured coefficients, under a Hann window."""
     harmonics: int = Field(default=9, ge=1, le=MOST_HARMONICS)
-    """Highest harmonic that is measured."""
+    """Highest harmonic whose coefficient is measured."""
 
 
 class LoopState(StrEnum):
@@ -111,7 +111,7 @@ class LoopFacts(FrozenModel):
     rate_hz: PositiveFloat
     latency_s: NonNegativeFloat
     limit_v: PositiveFloat
-    """Largest output voltage, peak [V]."""
+    """Largest output voltage of the controller, peak [V]."""
     watchdog_s: PositiveFloat
     """Time without a request after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
@@ -119,7 +119,7 @@ class LoopFacts(FrozenModel):
 
 
 class LoopRequest(FrozenModel):
-    """A request from the host."""
+    """A request from the host to the controller."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     ask: Literal["hello", "play", "report", "silence"]

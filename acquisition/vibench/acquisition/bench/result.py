@@ -14,7 +14,7 @@ from ..rig import Rig
 
 
 class Verdict(StrEnum):
-    """Verdict on a finding."""
+    """Verdict on one finding of a bench check."""
 
     OK = "ok"
     WARN = "warn"
@@ -124,7 +124,7 @@ class CheckResult(FrozenModel):
     """Findings of a bench check, with the data needed to decide whether the check is still valid."""
 
     rig: str
-    """Name of the rig."""
+    """Name of the rig that was checked."""
     rig_digest: str
     """SHA-256 of the checked configuration; see `rig_digest`."""
     checked: AwareDatetime
@@ -144,7 +144,7 @@ class CheckResult(FrozenModel):
 
     @property
     def report(self) -> BenchReport:
-        """The findings as a report."""
+        """The findings of this check as a report."""
         return BenchReport(findings=self.findings)
 
     def age_h(self, now: datetime) -> float:

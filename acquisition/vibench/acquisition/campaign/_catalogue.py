@@ -301,7 +301,7 @@ BAD = frozenset(
 
 @dataclass(frozen=True)
 class VerifiedRecording:
-    """Result of verifying one file."""
+    """Result of comparing one file with its seal."""
 
     path: str
     """Path relative to the folder, with ``/``; for a single file, its name."""

@@ -60,9 +60,9 @@ class ReasonCode(StrEnum):
     LIMIT = "limit"
     DISK = "disk"
     PLAN = "plan"
-    """The bench cannot play the plan."""
+    """The bench cannot play the plan of the measurement."""
     FAULT = "fault"
-    """Any other fault."""
+    """Any other fault during the measurement."""
 
 
 _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
@@ -167,11 +167,11 @@ After = Callable[[Finished, Recording], Iterable[Measurement]]
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
-    """Do nothing: the default for ``on_progress``."""
+    """Ignore the progress; the default for ``on_progress``."""
 
 
 def ignore_result(point_result: PointResult) -> None:
-    """Do nothing: the default for ``on_result``."""
+    """Ignore the result; the default for ``on_result``."""
 
 
 # SQLite file of a journal: tables (see docs/campaigns.md), connections, and errors.
@@ -280,7 +280,7 @@ def sentences(path: Path) -> Iterator[None]:
 
 
 class JournalPointState(StrEnum):
-    """State of a point."""
+    """State of a point of a campaign."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -292,7 +292,7 @@ class JournalPointState(StrEnum):
 
 @dataclass(frozen=True)
 class JournalPoint:
-    """One point in the journal."""
+    """One point of a campaign, as stored in the journal."""
 
     name: str
     measurement: Measurement

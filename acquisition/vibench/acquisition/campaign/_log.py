@@ -66,7 +66,7 @@ CampaignListener = Callable[[CampaignEvent], None]
 
 
 def ignore_event(event: CampaignEvent) -> None:
-    """Do nothing: the default for ``on_event``."""
+    """Ignore the event; the default for ``on_event``."""
 
 
 LOG_SUFFIX = ".log.jsonl"

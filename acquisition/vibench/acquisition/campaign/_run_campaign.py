@@ -321,7 +321,7 @@ class ReconnectingBench:
 
     @property
     def bench(self) -> Bench:
-        """The open bench."""
+        """The open bench; it raises an error if the bench is not open."""
         if self._bench is None:
             raise AcquisitionError("the bench is not open: use 'with ReconnectingBench(...) as kept'")
         return self._bench

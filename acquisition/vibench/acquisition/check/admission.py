@@ -32,7 +32,7 @@ class CheckRule(StrEnum):
     FRESH = "fresh"
     """A check of the same configuration must have passed within the last ``check_valid_h`` hours."""
     NOW = "now"
-    """A new check must pass."""
+    """A new check of the bench must pass before the measurement."""
     WAIVED = "waived"
     """No check is required; recordings contain the result of the last check, if there is one."""
 
@@ -153,7 +153,7 @@ Clock = Callable[[], datetime]
 
 
 def utc_now() -> datetime:
-    """Return the computer's time in UTC."""
+    """Return the present time in UTC by the computer's clock."""
     return datetime.now(UTC)
 
 

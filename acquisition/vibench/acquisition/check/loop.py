@@ -19,7 +19,7 @@ _WINDOWS = 20
 
 @dataclass(frozen=True)
 class SineFit:
-    """Sine fitted by least squares."""
+    """Sine fitted to samples by least squares."""
 
     amplitude: float
     uncertainty: float
@@ -107,7 +107,7 @@ class Lasting(Enum):
     """Kinds of quantities whose changes between two checks are limited."""
 
     GAIN = auto()
-    """Gain in decibels."""
+    """A gain, whose change is limited in decibels."""
     LEVEL = auto()
     CLOCK = auto()
 

@@ -28,11 +28,11 @@ class MeasuredDensities:
     """Power spectral densities of one realisation, per spectral line, averaged over ``resolution_hz``."""
 
     drive: Samples
-    """Density of the drive voltage [V2/Hz]."""
+    """Power spectral density of the drive voltage [V2/Hz]."""
     base: Samples
-    """Density of the base acceleration [(m/s2)2/Hz]."""
+    """Power spectral density of the base acceleration [(m/s2)2/Hz]."""
     response: Samples
-    """Density of m0's velocity [(m/s)2/Hz]."""
+    """Power spectral density of m0's velocity [(m/s)2/Hz]."""
     kurtosis: float
     """Kurtosis of the base acceleration; 3 for Gaussian noise."""
 

@@ -30,7 +30,7 @@ class Mode:
     """A damped mode, as fitted to measured transmissibilities."""
 
     frequency_hz: float
-    """Undamped natural frequency [Hz]."""
+    """Undamped natural frequency of the mode [Hz]."""
     frequency_u_hz: float
     """Standard uncertainty of the frequency, from the residuals of the fit [Hz]."""
     damping_ratio: float
@@ -246,7 +246,7 @@ def _search(
 
 @dataclass(frozen=True)
 class Tracked:
-    """Result of tracking at one level."""
+    """Result of resonance tracking at one base level."""
 
     resonance: PhaseResonance
     mode: Mode | None

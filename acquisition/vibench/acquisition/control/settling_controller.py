@@ -46,7 +46,7 @@ class LocatedJump:
 
     @property
     def frequency_hz(self) -> float:
-        """Middle of the bracket [Hz]."""
+        """Middle of the frequency interval that contains the jump [Hz]."""
         return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
 
     def is_jump(self, factor: float) -> bool:
@@ -114,7 +114,7 @@ class SettledState:
     """State of the motion at one frequency, at the end of the wait for settling."""
 
     frequency_hz: float
-    """Commanded frequency [Hz]."""
+    """Commanded drive frequency, by the generator's clock [Hz]."""
     drive_hz: float
     """Drive frequency by the converter's clock [Hz]."""
     setting_vpp: float

@@ -168,12 +168,12 @@ class AFG1022X(ScpiInstrument):
         self._arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Start an armed burst."""
+        """Trigger an armed burst, so that it starts."""
         with self._changing():
             self.command("*TRG")
 
     def end_burst(self) -> None:
-        """Play continuously, without triggers."""
+        """End the burst mode, so that the signal plays continuously."""
         if self.channel == _BURST_CHANNEL:
             with self._changing():
                 self.burst = "OFF"

@@ -262,7 +262,7 @@ class DaqmxDigitizer:
 
     @property
     def identity(self) -> Identity:
-        """Product, serial number and driver version."""
+        """Product and serial number of the device, and version of the driver."""
         if self._identity is None:
             raise InstrumentError(f"{self._config.device} is not open; open it with DaqmxDigitizer.open")
         return self._identity

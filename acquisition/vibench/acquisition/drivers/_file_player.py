@@ -27,7 +27,7 @@ class FilePlayer:
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
         self._recording = recording
         self.sample_rate_hz = recording.sample_rate_hz
-        """Sample rate of the recording."""
+        """Sample rate of the replayed recording [1/s]."""
         self.roles = tuple(channel.role.value for channel in channels)
         """Roles of the channels, in the order of the rows of a block."""
         self._next_sample = 0

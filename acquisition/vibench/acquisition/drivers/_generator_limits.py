@@ -214,11 +214,11 @@ class NoGenerator:
         return _NOTHING_VPP, self.amplitude_limit_vpp
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a sine if a recording is played back; otherwise refuse it."""
         self._take(f"a sine of {frequency_hz:g} Hz at {amplitude_vpp:g} Vpp")
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a waveform if a recording is played back; otherwise refuse it."""
         self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
@@ -226,26 +226,26 @@ class NoGenerator:
         raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot play: this bench has {self.name}")
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a new frequency if a recording is played back; otherwise refuse it."""
         self._take(f"{frequency_hz:g} Hz")
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a new amplitude if a recording is played back; otherwise refuse it."""
         self._take(f"{amplitude_vpp:g} Vpp")
 
     def arm_burst(self, cycles: int) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a burst if a recording is played back; otherwise refuse it."""
         self._take(f"a burst of {cycles} cycles")
 
     def trigger(self) -> None:
-        """Accept the command, or refuse it."""
+        """Accept a trigger if a recording is played back; otherwise refuse it."""
         self._take("a trigger")
 
     def end_burst(self) -> None:
         """Do nothing, because nothing plays."""
 
     def measured_latency_s(self) -> float:
-        """Return zero [s]."""
+        """Return zero as the duration of an amplitude change [s]."""
         return 0.0
 
     def start(self) -> None:

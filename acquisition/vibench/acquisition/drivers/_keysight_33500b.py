@@ -77,7 +77,7 @@ class Keysight33500B(AFG1022X):
         self._arm_burst(cycles)
 
     def end_burst(self) -> None:
-        """Play continuously, without triggers."""
+        """End the burst mode, so that the signal plays continuously."""
         with self._changing():
             self.burst = "OFF"
 

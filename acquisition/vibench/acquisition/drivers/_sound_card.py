@@ -161,7 +161,7 @@ class SoundCardDigitizer:
 
     @property
     def identity(self) -> Identity:
-        """Card, version of PortAudio, and calibration."""
+        """Name of the card, version of PortAudio, and calibration."""
         version = _sounddevice().get_portaudio_version()[1]
         reply = f"{self._device}, {version}, {', '.join(f'{key} {self.options[key]}' for key in _NEEDED)}"
         return Identity("", self._device, "", version, reply)

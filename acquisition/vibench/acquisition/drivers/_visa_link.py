@@ -22,7 +22,7 @@ _MS_PER_S = 1000.0
 
 
 Link = MessageBasedResource
-"""A VISA session."""
+"""An open VISA session with an instrument."""
 
 
 def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:

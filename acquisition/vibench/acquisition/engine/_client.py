@@ -276,7 +276,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         return cls(connect(address, chosen(ConnectionRole, role), patience_s))
 
     def status(self) -> EngineStatus:
-        """Return the state of the engine."""
+        """Return the status of the engine."""
         number, rows = self._rows
         status = self.status_since(number)
         if status.rows_number == number:
@@ -327,7 +327,7 @@ class Attendant:
 
     @property
     def pid(self) -> int:
-        """Number of the attendant's process."""
+        """Process number of the attendant."""
         return self._process.pid
 
     def live(self) -> None:

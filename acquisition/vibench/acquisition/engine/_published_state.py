@@ -108,7 +108,7 @@ class Messages:
 
     @property
     def kept(self) -> tuple[EngineMessage, ...]:
-        """Return the newest messages, oldest first."""
+        """Return the newest messages of the engine, from oldest to newest."""
         return tuple(self._kept)
 
     def info(self, what: str) -> None:
@@ -271,7 +271,7 @@ class PublishedState:
         self._row(point_result.name, point_result.outcome.value, point_result.reason, str(point_result.path))
 
     def failed(self, reason: str) -> None:
-        """Set the running recording to failed."""
+        """Set the state of the running recording to failed."""
         for row in self._status.rows:
             if row.state == "running":
                 self._row(row.name, "failed", reason, row.file)

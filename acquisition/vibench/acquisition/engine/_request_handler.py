@@ -224,7 +224,7 @@ class RequestHandler:
         return plan
 
     def disarm(self) -> None:
-        """Disarm the campaign."""
+        """Disarm the campaign, so that it cannot be started."""
         with self._asking:
             self._disarm()
 

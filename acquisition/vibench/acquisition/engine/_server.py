@@ -71,7 +71,7 @@ class Admission:
         self._thread.start()
 
     def close(self) -> None:
-        """Accept no further connections."""
+        """Stop accepting connections."""
         with suppress(OSError):
             self._wake.send(b"x")
         self._thread.join()
@@ -224,12 +224,12 @@ class Server:
 
     @property
     def address(self) -> EngineAddress:
-        """Address of the server."""
+        """Address and token of the server."""
         host, port = self._listening.getsockname()[:2]
         return EngineAddress(host=host, port=port, token=self._token)
 
     def close(self) -> None:
-        """Accept no further connections."""
+        """Stop accepting connections."""
         self._admission.close()
         self._listening.close()
 

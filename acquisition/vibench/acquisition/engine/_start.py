@@ -31,7 +31,7 @@ class AdoptedEngine(ClosedOnLeaving):
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement
         self.pid = announcement.pid
-        """Number of the process."""
+        """Number of the engine's process."""
         self.address = announcement.address
         self.client = EngineClient.attach(announcement.address, ConnectionRole.ATTENDING)
 
@@ -62,14 +62,14 @@ class EngineProcess(ClosedOnLeaving):
     def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
         self._process = process
         self.pid = process.pid
-        """Number of the process."""
+        """Number of the engine's process."""
         self.address = address
-        """Address for other programs."""
+        """Address of the engine for other programs."""
         self.client = EngineClient.attach(address, ConnectionRole.ATTENDING)
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process still runs."""
+        """Whether the engine's process still runs."""
         return self._process.poll() is None
 
     def leave(self) -> None:

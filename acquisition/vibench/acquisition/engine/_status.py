@@ -51,7 +51,7 @@ class Supervision(StrEnum):
 
 
 class ConnectionRole(StrEnum):
-    """Purpose of a connection."""
+    """Purpose of a client's connection."""
 
     ATTENDING = "attending"
     """The client in charge of the run: if it sends no more requests, the run stops."""
@@ -157,7 +157,7 @@ class RowStatus(FrozenModel):
 
 
 class MessageKind(StrEnum):
-    """Severity of a message."""
+    """Severity of a message to the operator."""
 
     INFO = "info"
     WARNING = "warning"
@@ -241,7 +241,7 @@ class EngineStatus(FrozenModel):
     is_left_alone: bool = False
     """Whether the parent program has ended, the campaign continues, and nobody attends the engine."""
     messages: tuple[EngineMessage, ...] = ()
-    """Newest messages, oldest first."""
+    """Newest messages to the operator, from oldest to newest."""
 
 
 # The live twin's process (decision 0044), started and ended by an engine, which never waits for it. It is a

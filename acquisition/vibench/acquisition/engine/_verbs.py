@@ -99,7 +99,7 @@ class Verb(Generic[A]):
     """Longest time to compute the answer [s]; 0 if the answer is ready at once."""
 
     def message(self, **arguments: object) -> Message:
-        """Return the message of a request."""
+        """Return the message that carries a request."""
         request = validated(arguments, self.request, f"a request to {self.word}")
         return Message(request.model_dump_json().encode())
 
@@ -212,7 +212,7 @@ class EngineVerbs:
 
     @verb("disarm", DONE)
     def disarm(self) -> None:
-        """Disarm the campaign."""
+        """Disarm the campaign, so that it cannot be started."""
 
     @verb("start", DONE, EngineState.ARMED)
     def start(self) -> None:

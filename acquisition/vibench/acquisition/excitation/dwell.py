@@ -28,7 +28,7 @@ class Dwell(FixedSine):
     settle_s: NonNegativeFloat = 3.0
     """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
-    """Time recorded after settling [s]."""
+    """Time for which the settled motion is recorded [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
     """Tones before the dwell, in the order played; if empty, the drive starts with the dwell."""
     lead_s: PositiveFloat = 0.5
@@ -53,7 +53,7 @@ class Dwell(FixedSine):
 
     @property
     def lead_in_s(self) -> float:
-        """Duration of the lead-in [s]."""
+        """Duration of all tones of the lead-in [s]."""
         return len(self.lead_in) * self.lead_s
 
     @property

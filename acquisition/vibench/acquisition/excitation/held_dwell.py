@@ -22,7 +22,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
     settling: Settling = Settling()
     """Criteria for settled motion before the recording."""
     duration_s: PositiveFloat
-    """Time recorded after settling [s]."""
+    """Time for which the settled motion is recorded [s]."""
     update_s: PositiveFloat = 1.0
     """Interval at which the level is measured, and corrected if needed, during the recording [s]."""
 
@@ -38,7 +38,7 @@ class HeldDwell(FixedSine, AbstractFeedback):
 
     @property
     def segment(self) -> Segment:
-        """Segment of the recording after settling."""
+        """Segment of the recording that begins after settling."""
         return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:

@@ -107,7 +107,7 @@ class ExcitationKind:
 
     @property
     def about(self) -> str:
-        """One-line description of the signal."""
+        """One-line description of the kind's signal."""
         return getdoc(self.plan).splitlines()[0]  # type: ignore[union-attr] # each has a docstring
 
     @property

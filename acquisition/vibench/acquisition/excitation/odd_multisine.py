@@ -55,13 +55,13 @@ class OddMultisine(PeriodicNoise):
 
     @property
     def candidates(self) -> Lines:
-        """The odd harmonics in the band."""
+        """The odd harmonics of ``repetition_hz`` in the band."""
         lines = super().candidates
         return np.asarray(lines[lines % 2 == 1], dtype=np.int64)
 
     @property
     def lines(self) -> Lines:
-        """The odd harmonics that are excited."""
+        """The odd harmonics of ``repetition_hz`` that are excited."""
         return np.array(self.excited_lines, dtype=np.int64)
 
     def _drawn(self) -> set[int]:

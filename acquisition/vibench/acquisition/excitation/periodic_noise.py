@@ -23,7 +23,7 @@ from .steps import RmsSetting, Segment, Step, Waveform
 
 
 class BandNoise(AbstractExcitation):
-    """Noise between two frequencies."""
+    """Noise in a band between two frequencies."""
 
     family: ClassVar[Family] = Family.NOISE
     wishes: ClassVar[tuple[str, ...]] = ("resonance_hz", "transmissibility")
@@ -91,7 +91,7 @@ class PeriodicNoise(BandNoise):
 
     @property
     def period_points(self) -> int:
-        """Number of points of one period."""
+        """Number of points in one period of the waveform."""
         return self.points
 
     @property
@@ -101,11 +101,11 @@ class PeriodicNoise(BandNoise):
 
     @property
     def stretches(self) -> int:
-        """Number of realisations."""
+        """Number of noise realisations."""
         return self.realisations
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step for every realisation."""
+        """Yield one step for every noise realisation."""
         lines = np.asarray(self.lines, dtype=np.int64)
         for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed, self.points)):
             yield Step(

@@ -37,7 +37,7 @@ class SignalPreview:
     time_s: Samples
     """Times of the samples, shape (samples,) [s]."""
     volts: Samples
-    """Voltages, shape (samples,) [V]."""
+    """Voltages of the signal, shape (samples,) [V]."""
     frequency_hz: Samples
     """Frequencies of the spectrum, shape (samples // 2 + 1,) [Hz]."""
     spectrum_v: Samples
@@ -49,7 +49,7 @@ class SignalPreview:
 
     @property
     def crest_factor(self) -> float:
-        """Peak value divided by rms value."""
+        """Peak value of the signal divided by its rms value."""
         return self.peak_v / self.rms_v
 
 

@@ -68,7 +68,7 @@ class ResonanceTracking(AbstractFeedback):
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
     """Allowed deviation of the measured base level, relative to the planned level."""
     settling: Settling = Settling()
-    """Criteria for settled motion."""
+    """Criteria by which the motion counts as settled."""
     widest_step_hz: PositiveFloat = 1.0
     """Largest frequency step of the search; smaller than the distance to the next antiresonance [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
@@ -128,7 +128,7 @@ class ResonanceTracking(AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """All levels, in the order played."""
+        """All base levels, in the order played."""
         return tuple(
             BaseLevel(acceleration_m_per_s2=each, tolerance=self.level_tolerance, most_change=_MOST_CHANGE)
             for each in self.accelerations_m_per_s2

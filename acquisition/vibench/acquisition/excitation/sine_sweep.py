@@ -58,11 +58,11 @@ class MovingSine(AbstractExcitation):
     start_hz: FrequencyHz
     """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
     stop_hz: FrequencyHz
-    """Frequency at the end [Hz]."""
+    """Frequency at the end of the sweep [Hz]."""
     duration_s: PositiveFloat
-    """Time from start to stop [s]."""
+    """Duration of the sweep from ``start_hz`` to ``stop_hz`` [s]."""
     spacing: Spacing = Spacing.LINEAR
-    """Course of the frequency over time."""
+    """Course of the frequency over time: linear or logarithmic."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]. The last step may be shorter."""
 
@@ -93,7 +93,7 @@ class MovingSine(AbstractExcitation):
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at one frequency [s]."""
+        """Time that the sweep spends at one frequency [s]."""
         return self.step_s
 
     @property
@@ -118,7 +118,7 @@ class MovingSine(AbstractExcitation):
 
     @property
     def course(self) -> Sweep:
-        """The ideal sweep."""
+        """The ideal sweep, which the steps approximate."""
         return Sweep(self.start_hz, self.stop_hz, self.duration_s, self.spacing)
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:

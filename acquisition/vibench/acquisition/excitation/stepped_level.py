@@ -50,7 +50,7 @@ class SteppedLevel(FixedSine):
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """Lowest level [Vpp]."""
+        """Lowest amplitude setting of the plan [Vpp]."""
         return self.rising_vpp[0]
 
     @property

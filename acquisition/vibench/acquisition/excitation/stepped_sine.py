@@ -17,7 +17,7 @@ MOST_STEPS = 4000
 
 
 class FrequencyGrid(FrozenModel):
-    """Equally spaced frequencies."""
+    """Equally spaced frequencies of a stepped sine."""
 
     start_hz: FrequencyHz
     stop_hz: FrequencyHz

@@ -51,7 +51,7 @@ class SampleSource(Protocol):
 
     @property
     def crest_factor(self) -> float:
-        """Peak value divided by rms value."""
+        """Peak value of the noise divided by its rms value."""
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
         """Return samples ``first`` to ``first + count - 1``, from -1 to 1; identical at every call."""
@@ -138,7 +138,7 @@ class HeldAcceleration:
     """Feedback holds the fundamental of the base motion, with any setting up to the largest allowed."""
 
     amplitude_m_per_s2: float
-    """Peak acceleration of the fundamental [m/s2]."""
+    """Peak acceleration of the base's fundamental [m/s2]."""
     basis: ClassVar[str] = "the level that feedback holds"
 
 
@@ -147,7 +147,7 @@ class RelativeSetting:
     """A sine at a fixed amplitude setting; the base motion results from the shaker's response."""
 
     share: float
-    """Fraction of the plan's ``amplitude_vpp``."""
+    """Amplitude setting as a fraction of the plan's ``amplitude_vpp``."""
     basis: ClassVar[str] = "the rig's linear model"
 
 

@@ -38,7 +38,7 @@ class GaussianBand:
 
     @property
     def crest_factor(self) -> float:
-        """Peak value divided by rms value."""
+        """Peak value of the noise divided by its rms value."""
         return CREST_FACTOR
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
@@ -85,7 +85,7 @@ class StreamedNoise(BandNoise):
     settle_s: NonNegativeFloat = 3.0
     """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
-    """Time recorded after settling [s]."""
+    """Time for which the noise is recorded after settling [s]."""
     seed: int = Field(default=1, ge=0)
     """Seed; the same seed gives the same noise on any machine with the same version of numpy."""
 

@@ -168,7 +168,7 @@ class Guarded:
         return self._let_through("__call__")(*given)
 
     def bare(self) -> Any:
-        """Return the wrapped object."""
+        """Return the instrument inside this wrapper."""
         return self._held
 
     def _let_through(self, member: str) -> Any:

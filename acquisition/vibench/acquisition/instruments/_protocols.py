@@ -47,7 +47,7 @@ class FoundDevice:
     name: str
     """Value for ``daq.device`` in the hardware configuration."""
     product: str
-    """Value for ``daq.product``."""
+    """Value for ``daq.product`` in the hardware configuration."""
     serial: str
     inputs: tuple[str, ...]
     """Names of inputs; the part after the slash is a value for ``daq.channels.physical``."""
@@ -110,9 +110,9 @@ class Spacing(StrEnum):
     """Course of a sweep's frequency over time."""
 
     LINEAR = "linear"
-    """Constant rate in hertz per second."""
+    """The frequency changes at a constant rate in hertz per second."""
     LOGARITHMIC = "logarithmic"
-    """Constant time per octave."""
+    """The frequency takes the same time for every octave."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class GeneratorDescription:
     """Capabilities of a generator model, known before it is opened; plans are checked against them."""
 
     name: str
-    """Name in messages: ``"AFG1022"``."""
+    """Name of the model in messages: ``"AFG1022"``."""
     amplitude_range_vpp: tuple[float, float]
     """Smallest and largest setting at the configured load, peak to peak [V]."""
     highest_sine_hz: float
@@ -161,7 +161,7 @@ class FunctionGenerator(Protocol):
 
     @property
     def identity(self) -> Identity:
-        """Reply to ``*IDN?``."""
+        """Identity of the generator: its reply to ``*IDN?``."""
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
@@ -197,7 +197,7 @@ class FunctionGenerator(Protocol):
         """Start an armed burst or sweep."""
 
     def end_burst(self) -> None:
-        """Play continuously, without triggers."""
+        """End the burst mode, so that the signal plays continuously."""
 
     def measured_latency_s(self) -> float:
         """Return the time of one verified change of amplitude [s]; no step, ramp or stop is shorter."""
@@ -217,7 +217,7 @@ class Digitizer(Protocol):
 
     @property
     def identity(self) -> Identity:
-        """Product, serial, driver version."""
+        """Product and serial number of the converter, and version of its driver."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -264,11 +264,11 @@ class AnalogOutput(Protocol):
 
     @property
     def identity(self) -> Identity:
-        """Product, serial, driver version."""
+        """Product and serial number of the output, and version of its driver."""
 
     @property
     def sample_rate_hz(self) -> float:
-        """Actual sample rate [1/s]."""
+        """Actual sample rate of the output [1/s]."""
 
     @property
     def idle(self) -> IdleOutput:

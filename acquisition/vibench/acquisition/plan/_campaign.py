@@ -27,7 +27,7 @@ class Retryable(StrEnum):
     CHECK_FAILED = "check_failed"
     """The check at low level before the recording failed."""
     LIMIT = "limit"
-    """A measured value exceeded a limit."""
+    """A measured value exceeded a limit of the rig."""
     OVER_RANGE = "over_range"
     """The recording is complete, but an input was near its full scale in a recorded segment."""
 

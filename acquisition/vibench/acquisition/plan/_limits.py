@@ -104,7 +104,7 @@ class LimitCheck:
     limit: float
     unit: str
     source: str
-    """Source of the limit."""
+    """Source of the limit, such as a data sheet."""
     remedy: str
     """Advice on what to change when the limit is exceeded."""
     side: LimitSide = LimitSide.AT_MOST

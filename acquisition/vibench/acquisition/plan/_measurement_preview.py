@@ -52,7 +52,7 @@ class MeasurementPreview:
 
     @property
     def crest_factor(self) -> float:
-        """Peak value divided by rms value."""
+        """Peak value of the signal divided by its rms value."""
         return self.peak_v / self.rms_v
 
 

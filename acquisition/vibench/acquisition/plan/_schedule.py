@@ -93,11 +93,11 @@ class ScanPoint(FrozenModel):
     node: PositiveInt | None = Field(default=None, le=999_999_999)
     """Node number in universal files; if absent, the position in the list, from 1."""
     x_m: float
-    """Coordinate along x [m]."""
+    """Coordinate of the point along x [m]."""
     y_m: float
-    """Coordinate along y [m]."""
+    """Coordinate of the point along y [m]."""
     z_m: float
-    """Coordinate along z [m]."""
+    """Coordinate of the point along z [m]."""
     direction: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """Direction in which the velocity counts as positive."""
 

@@ -24,9 +24,9 @@ class RangeSpacing(StrEnum):
     """Spacing of the values of a range."""
 
     LINEAR = "linear"
-    """Equal differences between values."""
+    """Equal differences between neighbouring values."""
     LOGARITHMIC = "logarithmic"
-    """Equal ratios between values; requires ``count``."""
+    """Equal ratios of neighbouring values; requires ``count``."""
 
 
 class Range(FrozenModel):
@@ -56,7 +56,7 @@ class Range(FrozenModel):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Values in ascending order."""
+        """Values of the range in ascending order."""
         count = self._count()
         match self.spacing:
             case RangeSpacing.LINEAR:

@@ -269,7 +269,7 @@ class Journal:
         return self._events.replace(self._events.rows - 1, cells)
 
     def begin_segment(self, label: str, numbers: Mapping[str, Number], first_sample: int) -> Batch:
-        """Begin a named range of samples."""
+        """Begin a segment: a named range of samples."""
         if self._open is not None:
             raise RecordingError(
                 f"The segment {label!r} cannot begin: {self._open.label!r} is open. End that segment first."
@@ -286,7 +286,7 @@ class Journal:
         return batch
 
     def end_segment(self, last_sample: int) -> Batch:
-        """End the segment that is open."""
+        """End the segment that has begun."""
         if self._open is None:
             raise RecordingError("No segment is open. Begin a segment before ending it.")
         batch = self._segments.replace(self._open.row, self._open.cells(last_sample, is_complete=1))

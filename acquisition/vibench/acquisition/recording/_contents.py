@@ -68,7 +68,7 @@ class _AbstractFacts(BaseModel):
 
 
 class FileFacts(_AbstractFacts):
-    """Attributes of the file."""
+    """Attributes of the recording's file."""
 
     sample_rate_hz: Rate
     requested_sample_rate_hz: Rate
@@ -83,7 +83,7 @@ class FileFacts(_AbstractFacts):
 
 
 class ChannelFacts(_AbstractFacts):
-    """Attributes of a channel."""
+    """Attributes of a channel's dataset."""
 
     physical_channel: str
     quantity: str

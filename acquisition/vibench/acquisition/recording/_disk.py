@@ -27,7 +27,7 @@ class Disk(Protocol):
         """Reserve space in the file, so that later writes to this range do not fail on a full disk."""
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file and release its lock."""
 
 
 class PositionedFile(OpenFile):
@@ -128,7 +128,7 @@ class TroubledDisk:
         self._trouble = trouble
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``."""
+        """Write ``data`` at ``offset`` of the file."""
         self._trouble.meet()
         self._disk.write(offset, data)
 
@@ -143,7 +143,7 @@ class TroubledDisk:
         self._disk.reserve(offset, size)
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file and release its lock."""
         self._disk.close()
 
 

@@ -85,7 +85,7 @@ class AbstractNote(BaseModel):
 
     @property
     def text(self) -> str:
-        """Return the text of the event."""
+        """Return the text of the event that stores this note."""
         return json.dumps(self.numbers)
 
 
@@ -94,7 +94,7 @@ class SettledNote(AbstractNote):
 
     kind: Literal["settled"] = "settled"
     frequency_hz: float
-    """Commanded frequency [Hz]."""
+    """Commanded drive frequency [Hz]."""
     motion: Steadiness
     period: int
     """Period of the motion in drive periods; 0 if the motion is not periodic."""
@@ -177,7 +177,7 @@ class JumpNote(AbstractNote):
     response_after: SixFigures
     how: JumpSearchEnd
     arrived: JumpSide
-    """Branch on which the pass continued."""
+    """Branch of motions on which the pass continued."""
 
 
 class ResonanceNote(AbstractNote):
@@ -191,7 +191,7 @@ class ResonanceNote(AbstractNote):
     """Frequency of the phase resonance; None where no resonance was found."""
     frequency_u_hz: SixFigures | None
     at_hz: SixFigures
-    """Frequency of the recorded segment."""
+    """Drive frequency in the recorded segment [Hz]."""
     phase_deg: SixFigures
     response_ii: SixFigures
     base_m_per_s2: SixFigures
@@ -239,7 +239,7 @@ class HeldResponseNote(AbstractNote):
 
     kind: Literal["held_response"] = "held_response"
     frequency_hz: float
-    """Commanded frequency [Hz]."""
+    """Commanded drive frequency [Hz]."""
     response_m: SixFigures
     response_ii: SixFigures
     base_m_per_s2: SixFigures
@@ -261,7 +261,7 @@ class BranchPointNote(AbstractNote):
 
     kind: Literal["branch_point"] = "branch_point"
     point: int
-    """Number of the point, from 0."""
+    """Number of the point along the branch, from 0."""
     frequency_hz: SixFigures
     base_m: SixFigures
     base_u_m: SixFigures = 0.0
@@ -307,7 +307,7 @@ class BranchStabilityNote(AbstractNote):
 
 
 class BranchEndNote(AbstractNote):
-    """How a branch ended."""
+    """How the measurement of a branch ended."""
 
     kind: Literal["branch_end"] = "branch_end"
     points: int

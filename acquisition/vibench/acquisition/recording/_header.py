@@ -144,7 +144,7 @@ class ChannelHeader:
     """Voltage at count zero, from the converter's calibration [V]."""
     physical_offset: float = 0.0
     coupling: str = "AC"
-    """Input coupling, ``"AC"`` or ``"DC"``."""
+    """Coupling of the input, ``"AC"`` or ``"DC"``."""
     iepe_current_a: float = 0.0
     sensitivity: float | None = None
     """Sensitivity from the calibration sheet, in ``sensitivity_unit``."""
@@ -187,12 +187,12 @@ class ChannelHeader:
 
     @property
     def scale_factor(self) -> float:
-        """Physical value of one count."""
+        """Physical value of one count of the converter, without offset."""
         return self.physical_per_volt * self.step_v
 
     @property
     def add_offset(self) -> float:
-        """Physical value of count zero."""
+        """Physical value at count zero of the converter."""
         return self.physical_per_volt * self.volts_at_zero_count + self.physical_offset
 
     def attributes(self) -> dict[str, Attribute]:

@@ -190,7 +190,7 @@ class Recording(RecordingDescription):
     """One recording as it was when opened. Close it, or use it in a ``with`` block."""
 
     samples: int
-    """Valid samples per channel."""
+    """Number of valid samples per channel."""
     expected_samples: int | None
     channels: tuple[ChannelHeader, ...]
     plan: Mapping[str, Any]
@@ -339,7 +339,7 @@ class Recording(RecordingDescription):
 
     @property
     def results(self) -> dict[str, SavedResult]:
-        """Return saved results by name."""
+        """Return the results saved in the recording, by name."""
         try:
             return read_results(self._open.file)
         except DAMAGE as error:
@@ -350,7 +350,7 @@ class Recording(RecordingDescription):
 
     @property
     def result_names(self) -> tuple[str, ...]:
-        """Return the names of saved results."""
+        """Return the names of the results saved in the recording."""
         return tuple(result_groups(self._open.file))
 
     def save_results(

@@ -34,7 +34,7 @@ class ResultArray:
     """One array of a result, with its unit and the names of its axes."""
 
     values: NDArray[Any]
-    """Real or complex numbers, any shape."""
+    """Real or complex numbers, in an array of any shape."""
     unit: str = "1"
     axes: tuple[str, ...] = ()
     """Name of the axis array of each dimension (``("frequency",)``); empty if this array is an axis."""

@@ -63,7 +63,7 @@ class SealDepth(StrEnum):
 
 
 class SealState(StrEnum):
-    """Result of a seal check."""
+    """Result of comparing a recording with its seal."""
 
     INTACT = "intact"
     DAMAGED = "damaged"

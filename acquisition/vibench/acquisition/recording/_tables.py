@@ -45,7 +45,7 @@ REJECTED = "average rejected"
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened during the recording."""
+    """An event during the recording, at one sample."""
 
     sample: int
     unix_time_s: float
@@ -193,7 +193,7 @@ def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
 
 
 def events(columns: Columns) -> tuple[Event, ...]:
-    """Return the rows of ``/events``."""
+    """Return the events in the table ``/events``."""
     return tuple(
         Event(int(row[0]), float(row[1]), decode(row[2]), decode(row[3]))
         for row in zip(*(columns[column.name] for column in layout.EVENTS.columns), strict=True)
@@ -201,7 +201,7 @@ def events(columns: Columns) -> tuple[Event, ...]:
 
 
 def segments(columns: Columns) -> tuple[Segment, ...]:
-    """Return the rows of ``/segments``."""
+    """Return the segments in the table ``/segments``."""
     return tuple(
         Segment(
             label=decode(label),
@@ -225,7 +225,7 @@ def _numbers(text: str) -> dict[str, Number]:
 
 
 def overloads(columns: Columns) -> tuple[Overload, ...]:
-    """Return the rows of ``/overloads``."""
+    """Return the overloads in the table ``/overloads``."""
     return tuple(
         Overload(decode(channel), int(first), int(last))
         for channel, first, last in zip(
@@ -235,7 +235,7 @@ def overloads(columns: Columns) -> tuple[Overload, ...]:
 
 
 def gaps(columns: Columns) -> tuple[Gap, ...]:
-    """Return the rows of ``/gaps``."""
+    """Return the gaps in the table ``/gaps``."""
     return tuple(
         Gap(int(first), int(last))
         for first, last in zip(*(columns[column.name] for column in layout.GAPS.columns), strict=True)

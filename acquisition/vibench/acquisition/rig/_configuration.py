@@ -150,14 +150,14 @@ class OutputConfig(FrozenModel):
     """Time written in advance [s]. It is the longest tolerated pause of this computer, and the delay of an
     early ramp down."""
     source: str = Field(min_length=1)
-    """Source of ``limit_v`` and ``sample_rate_hz``."""
+    """Source of the values ``limit_v`` and ``sample_rate_hz``."""
 
 
 _LARGEST = 1e250
 """Largest value of a shaker parameter, in SI units; products of several must not overflow."""
 HIGH_Z: Literal["high-z"] = "high-z"
 SOURCE_OHM = 50.0
-"""Output impedance of a function generator."""
+"""Output impedance of a function generator [ohm]."""
 
 
 Options = dict[str, str | int | float]
@@ -215,7 +215,7 @@ class AmplifierConfig(FrozenModel):
     gain_db: float = Field(ge=-60, le=60)
     """Voltage gain at the present position of the knob [dB]."""
     clip_v: PositiveFloat
-    """Largest output voltage, peak [V]."""
+    """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: Sourced
     """Setting of the current limiter, rms [A]."""
     low_cut_hz: NonNegativeFloat = 0.0
@@ -233,7 +233,7 @@ class AmplifierConfig(FrozenModel):
 
     @property
     def gain(self) -> float:
-        """Output voltage per input voltage [V/V]."""
+        """Voltage gain: output voltage per input voltage [V/V]."""
         return float(10 ** (self.gain_db / 20))
 
 
@@ -287,7 +287,7 @@ class ChannelConfig(FrozenModel):
     sensor: str | None = None
     """Name of an entry point of ``vibench.sensors``; if absent, the default of the role."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the sensor."""
+    """Further settings of the sensor's plug-in."""
     calibrated: date
     """Date of the converter's last calibration."""
     uncertainty: StatedUncertainty | None = None
@@ -300,10 +300,10 @@ class DaqConfig(FrozenModel):
     driver: str = "daqmx"
     """Name of an entry point of ``vibench.digitizers``, and of ``vibench.outputs`` for an output."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver."""
+    """Further settings of the converter's driver."""
     product: str
     device: str
-    """Device name in the driver: ``"cDAQ1Mod1"``."""
+    """Name of the device in its driver: ``"cDAQ1Mod1"``."""
     server: str | None = None
     """Address of a gRPC device server, ``"host:port"``; if absent, the converter is on this computer."""
     sample_rate_hz: PositiveFloat
@@ -361,13 +361,13 @@ class ControllerConfig(FrozenModel):
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver."""
+    """Further settings of the controller's driver."""
     rate_hz: float = Field(ge=1_000, le=25_600)
     """Sample rate of the controller [samples/s]; 1 to 20 kHz are usual."""
     latency_s: float = Field(ge=0, le=5e-3)
     """Measured time from a sample to the resulting voltage [s]."""
     limit_v: PositiveFloat
-    """Largest output voltage, peak [V]."""
+    """Largest output voltage of the controller, peak [V]."""
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None

@@ -254,10 +254,10 @@ def _quote(text: str) -> str:
 
 
 class CalibrationRule(StrEnum):
-    """Effect of an expired calibration."""
+    """What happens if a calibration has expired."""
 
     ENFORCED = auto()
-    """The bench is not opened."""
+    """The bench is not opened if a calibration has expired."""
     WAIVED = auto()
     """The bench is opened. Every recording contains the calibration dates."""
 

@@ -24,7 +24,7 @@ class BaseQuantity(StrEnum):
     """A quantity of shaker or specimen that the model predicts."""
 
     AMPLIFIER_VOLTAGE = "amplifier_voltage"
-    """Voltage at the amplifier's output [V]."""
+    """Voltage at the output of the amplifier [V]."""
     CURRENT = "current"
     """Current in the coil [A]."""
     FORCE = "force"

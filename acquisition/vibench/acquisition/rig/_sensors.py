@@ -123,7 +123,7 @@ class SensorConfig(FrozenModel):
     model: str
     serial: str = ""
     full_scale_v: PositiveFloat
-    """Largest output voltage, peak [V]."""
+    """Largest output voltage of the sensor, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
     """Upper -3 dB frequency, first order [Hz]; if absent, far above the measured band."""
     resonance_hz: PositiveFloat | None = None
@@ -225,12 +225,12 @@ class Role(StrEnum):
 
     @property
     def place(self) -> str:
-        """Place of the measurement: ``"base"``, ``"m0"``."""
+        """Place that the channel measures: ``"base"``, ``"m0"``."""
         return self.value.partition("_")[0]
 
     @property
     def quantity(self) -> str:
-        """Measured quantity: ``"voltage"``, ``"acceleration"``."""
+        """Quantity that the channel measures: ``"voltage"``, ``"acceleration"``."""
         return self.value.partition("_")[2]
 
     @property

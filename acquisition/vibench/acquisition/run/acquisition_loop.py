@@ -17,12 +17,12 @@ class AcquisitionLoop:
     """Reads and records blocks. The number of samples read is the clock, so waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
-        """``advance`` is called after every block."""
+        """Create a loop that calls ``advance`` after every block of samples."""
         self._advance = advance
         self._digitizer = digitizer
         self._sink = sink
         self.segment: Segment | None = None
-        """Segment that is being recorded."""
+        """Segment that is being recorded; None outside segments."""
         self.samples = 0
         """Number of samples recorded so far."""
         self.lost_samples = 0
@@ -31,7 +31,7 @@ class AcquisitionLoop:
 
     @property
     def elapsed_s(self) -> float:
-        """Time recorded so far [s]."""
+        """Duration of the samples recorded so far [s]."""
         return self.samples / self._digitizer.sample_rate_hz
 
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:

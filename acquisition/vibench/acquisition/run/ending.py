@@ -22,7 +22,7 @@ class Progress:
     """Segment of the recording that contains the block."""
     block: Block
     elapsed_s: float
-    """Time recorded so far [s]."""
+    """Duration of the samples recorded so far [s]."""
     total_s: float
     """Planned duration of the whole recording [s]."""
     amplitude_vpp: float

@@ -47,9 +47,9 @@ class BaseMotion:
     """Motion of the base at each sample of a block of samples."""
 
     velocity: Samples
-    """Velocity at each sample [m/s]."""
+    """Velocity of the base at each sample [m/s]."""
     displacement: Samples
-    """Displacement at each sample [m]."""
+    """Displacement of the base at each sample [m]."""
 
 
 class BaseTracker:

@@ -35,7 +35,7 @@ class Heard(Protocol):
     """Object that receives every block that is read."""
 
     def append(self, block: Block) -> None:
-        """Receive the next block."""
+        """Receive the next block of samples."""
 
 
 class GlideWatch:

@@ -396,7 +396,7 @@ def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[P
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Do nothing: the default for ``on_progress``."""
+    """Ignore the progress; the default for ``on_progress``."""
 
 
 def run_measurement(

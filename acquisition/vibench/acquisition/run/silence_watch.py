@@ -195,7 +195,7 @@ class SilenceWatch:
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
-        """Add the next samples."""
+        """Add the next samples of all channels."""
         drive = self._drive(block.volts)
         self._residue_v = _half_peak_to_peak(drive)
         self._loudest_v = max(self._loudest_v, self._residue_v)
@@ -206,7 +206,7 @@ class SilenceWatch:
 
     @property
     def is_silent(self) -> bool:
-        """Whether the newest samples are silent."""
+        """Whether the drive is silent in the newest samples."""
         return self._residue_v <= self._silent_v
 
     def text(self) -> str:
@@ -277,7 +277,7 @@ class DriveGuard(ClosedOnLeaving):
         self._watchdog = Watchdog(self._look, "drive guard")
 
     def begin(self) -> None:
-        """Note the start of the drive."""
+        """Note that the drive has started."""
         DRIVES_ON.begin(self)
         self._still_s, self._has_begun = 0.0, True
 

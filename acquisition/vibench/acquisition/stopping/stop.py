@@ -46,12 +46,12 @@ class Cause(StrEnum):
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
-    """The program abandoned the run."""
+    """The program that ran the measurement abandoned it."""
     LIMIT = "limit"
     INSTRUMENT = "instrument"
     DISK = "disk"
     FAULT = "fault"
-    """Any other fault."""
+    """Any other fault during the run."""
 
 
 LEVELS: Mapping[Cause, StopLevel] = {
@@ -227,4 +227,4 @@ class MemoryReserve:
 
 
 MEMORY_RESERVE = MemoryReserve()
-"""Reserved memory of this process."""
+"""Memory reserve of this process."""

@@ -69,7 +69,7 @@ class DaqmxSystem:
         return {"task": Session(name=name), "new_session_initialized": not exists}
 
     def clear(self, request: Any) -> Fields:
-        """End and delete a task."""
+        """End a task and delete it."""
         self.task(request.task.name).abort()
         del self.tasks[request.task.name]
         self.rig.changed.notify_all()

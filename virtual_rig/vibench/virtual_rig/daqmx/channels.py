@@ -63,7 +63,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def volts_per_count(self) -> float:
-        """Quantisation step [V]."""
+        """Quantisation step of the input [V]."""
         return float(self.range_v / 2 ** (self.side.bits - 1))
 
     @property

@@ -43,7 +43,7 @@ class Rates:
 
 @dataclass(frozen=True)
 class AnalogInputs:
-    """Inputs of a device."""
+    """Capabilities of a device's inputs."""
 
     count: int
     ranges_v: tuple[float, ...]
@@ -65,7 +65,7 @@ class AnalogInputs:
 
 @dataclass(frozen=True)
 class AnalogOutputs:
-    """Outputs of a device."""
+    """Capabilities of a device's outputs."""
 
     count: int
     range_v: float
@@ -79,7 +79,7 @@ class AnalogOutputs:
 
 @dataclass(frozen=True)
 class Device:
-    """One device of the system."""
+    """One device of the simulated DAQmx system."""
 
     name: str
     product_type: str

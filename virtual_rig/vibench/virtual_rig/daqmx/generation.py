@@ -27,7 +27,7 @@ class OutputBuffer:
 
     @property
     def size(self) -> int:
-        """Number of samples per channel."""
+        """Size of the buffer in samples per channel."""
         return int(self._ring.shape[1])
 
     @property

@@ -163,7 +163,7 @@ class OnDemandPace:
         """Do nothing, because time advances only on request."""
 
     def close(self) -> None:
-        """Do nothing."""
+        """Do nothing, because there is no clock to stop."""
 
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:
         """Advance time at once; wait only for events from other calls, such as a trigger.
@@ -210,7 +210,7 @@ class WallPace:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the clock."""
+        """Stop the clock and the thread that advances the rig."""
         self._closing.set()
         if self._thread is not None:
             self._thread.join()

@@ -34,7 +34,7 @@ class TdmsLog:
         self._began: np.datetime64 | None = None
 
     def begin(self) -> None:
-        """Create the file of a run."""
+        """Create the TDMS file of a run."""
         self._began = None
         try:
             self._path.write_bytes(b"")

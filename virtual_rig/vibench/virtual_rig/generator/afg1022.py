@@ -187,7 +187,7 @@ def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Chan
 
 
 def modulation_switch(mode: RunMode) -> Command:
-    """Return the command of a modulation."""
+    """Return the command that switches a modulation off, or queries its state."""
     return setting(
         f"[SOURce#:]{mode.value}:STATe", "IVI; on: not simulated",
         lambda s: s.mode is mode, partial(without_mode, mode),

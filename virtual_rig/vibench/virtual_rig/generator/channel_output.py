@@ -99,7 +99,7 @@ class ChannelSettings:
     amplitude_vpp: float = 2.0
     """Amplitude in open circuit, peak to peak [V]; the default is 1 Vpp into 50 ohm."""
     offset_v: float = 0.0
-    """Offset in open circuit [V]."""
+    """Offset voltage in open circuit [V]."""
     phase_deg: int = 0
     duty_percent: float = 50.0
     mode: RunMode = RunMode.CONTINUOUS
@@ -115,7 +115,7 @@ class ChannelSettings:
 
     @property
     def declared_share(self) -> float:
-        """Displayed voltage relative to open-circuit voltage."""
+        """Ratio of displayed voltage to open-circuit voltage."""
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.declared_load_ohm)
 
     @property

@@ -24,7 +24,7 @@ NO_TIMES: Samples = np.empty(0)
 
 @dataclass(frozen=True)
 class SteadyPhase:
-    """Phase at a constant frequency."""
+    """Phase of a signal with constant frequency."""
 
     frequency_uhz: int
     offset: float
@@ -75,7 +75,7 @@ class SweptPhase:
     """Time of the trigger [s]; ``math.inf`` while waiting for it."""
     anchor_s: float
     offset: float
-    """Phase at ``anchor_s`` [cycles]."""
+    """Phase at the time ``anchor_s`` [cycles]."""
 
     def phase(self, time_s: float) -> float:
         """Return the phase at one instant [cycles, 0..1)."""

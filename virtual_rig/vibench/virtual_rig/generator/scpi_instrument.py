@@ -305,7 +305,7 @@ _RECEIVE_BYTES = 65536
 
 
 class ScpiDevice(Protocol):
-    """The device of a socket."""
+    """The device that a socket makes available."""
 
     def execute(self, message: bytes) -> Reply:
         """Execute one complete message, and return the reply."""
@@ -331,7 +331,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
         self.device = device
         self.closing = threading.Event()
         self.port = int(self.server_address[1])
-        """The port of the server."""
+        """TCP port of the server."""
         self.resource_name = f"TCPIP0::{LOOPBACK}::{self.port}::SOCKET"
         """The VISA address of the socket."""
         self._thread = threading.Thread(target=self.serve_forever, name="scpi-socket", daemon=True)

@@ -263,7 +263,7 @@ _NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)\s*(?P<
 
 
 def text(parameter: bytes) -> str:
-    """Return a parameter as text."""
+    """Return a parameter of a command as text."""
     try:
         return parameter.decode("ascii")
     except UnicodeDecodeError:
@@ -327,7 +327,7 @@ def numbers(parameter: bytes, order: str) -> NDArray[np.int32]:
 
 
 def as_block(data: bytes) -> bytes:
-    """Return data as a definite-length block."""
+    """Return data as an IEEE 488.2 block of definite length."""
     count = str(len(data))
     return f"#{len(count)}{count}".encode("ascii") + data
 

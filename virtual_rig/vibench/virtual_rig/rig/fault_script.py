@@ -30,7 +30,7 @@ from ..usb.usbtmc import UsbTmcInstrument
 from ..world.world import World
 
 Heal = Callable[[], None]
-"""Function that ends one fault."""
+"""Function that ends one fault of the rig."""
 # Calls at which a program first accesses the device: setting a task's clock, and starting the task.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
 _READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
@@ -191,7 +191,7 @@ class ScriptedFault(FrozenModel):
     """Start and duration of a fault, and the parameters of the method of `RigFaults` that ``fault`` names."""
 
     at_s: NonNegativeFloat
-    """Rig time since switch-on [s]."""
+    """Start of the fault in rig time since switch-on [s]."""
     for_s: PositiveFloat | None = None
     """Duration in rig time [s]; absent: the fault is permanent, or ends by itself."""
     fault: str

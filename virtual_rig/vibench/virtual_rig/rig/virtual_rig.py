@@ -101,7 +101,7 @@ class VirtualRig:
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self.visa_resource = self._usb.identification.resource_name
-        """VISA name of the generator."""
+        """VISA resource name of the generator."""
         self._running: _Running | None = None
 
     @property

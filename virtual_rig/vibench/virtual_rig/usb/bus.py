@@ -183,12 +183,12 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
     # Enumeration and descriptors
 
     def enumerate_devices(self) -> list[_Port]:
-        """Return all connected devices."""
+        """Return all devices connected to the virtual bus."""
         with self._lock:
             return list(self._ports)
 
     def get_device_descriptor(self, dev: _Port) -> SimpleNamespace:
-        """Return the device descriptor."""
+        """Return the USB descriptor of a device."""
         return SimpleNamespace(
             bLength=_DEVICE_BYTES,
             bDescriptorType=usb.util.DESC_TYPE_DEVICE,
@@ -278,11 +278,11 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         self.release_interface(dev_handle, 0)
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:  # noqa: ARG002 - there is one
-        """Accept the only configuration."""
+        """Accept the only USB configuration of the device."""
         self._present(dev_handle)
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        """Return the only configuration."""
+        """Return the only USB configuration of the device."""
         self._present(dev_handle)
         return 1
 
@@ -294,7 +294,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
                 raise usb.core.USBError("Resource busy", errno=errno.EBUSY)
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
-        """Release the interface."""
+        """Release the claimed interface of the device."""
         with self._lock:
             if self._owners.get(dev_handle.port) is dev_handle:
                 del self._owners[dev_handle.port]

@@ -27,7 +27,7 @@ BULK_IN = 0x82
 
 @dataclass(frozen=True)
 class Identification:
-    """Identity of a device at enumeration."""
+    """Identity that a USB device reports at enumeration."""
 
     vendor_id: int
     product_id: int
@@ -84,7 +84,7 @@ class _Flight:
     """Pending data between host and instrument, lost when the cable or the instrument was out of order."""
 
     message: bytes = b""
-    """Received parts of an incomplete message."""
+    """Parts received so far of an incomplete message."""
     reply: bytes = b""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
@@ -174,7 +174,7 @@ class UsbTmcInstrument:
             return self._hand_over(length)
 
     def control(self, setup: Setup) -> bytes:
-        """Answer a class request (4.2.1)."""
+        """Answer a class request (USBTMC 4.2.1)."""
         with self._lock:
             self._check_cable()
             if setup.request not in _REQUESTS:

@@ -59,7 +59,7 @@ class Decimator:
 
     @property
     def reach(self) -> int:
-        """Number of weights per sample."""
+        """Number of filter weights per sample."""
         return int(self.table.shape[1])
 
     def centre(self, sample: int) -> float:

@@ -59,7 +59,7 @@ class Disturbance:
 
     first_step: int
     stop_step: int
-    """The first step after the disturbance."""
+    """Number of the first step after the disturbance."""
     level: float
     """Level as a fraction of full scale, -1 to 1."""
 

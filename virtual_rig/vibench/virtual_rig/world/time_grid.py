@@ -31,7 +31,7 @@ class TimeGrid:
 
     @property
     def step_s(self) -> float:
-        """One step of rig time [s]."""
+        """Length of one step in rig time [s]."""
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:

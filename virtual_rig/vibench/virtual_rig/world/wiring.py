@@ -1,4 +1,4 @@
-"""Connections of the converter's inputs."""
+"""Cables and other connections of the converter's inputs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class Signal(IntEnum):
 
 
 class Coupling(StrEnum):
-    """Coupling of an input."""
+    """Coupling of a converter's input."""
 
     AC = "AC"
     DC = "DC"
@@ -33,7 +33,7 @@ class Input:
     physical_channel: str
     """Name of the input at the converter (``"cDAQ1Mod1/ai0"``), which the wiring maps to a signal."""
     range_v: float
-    """Full scale, plus and minus [V]."""
+    """Full scale of the input, plus and minus [V]."""
     coupling: Coupling
     iepe_current_a: float = 0.0
     """Excitation current of an IEPE sensor [A]; a sensor that needs it gives no signal without it."""

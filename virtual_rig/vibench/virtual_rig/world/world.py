@@ -185,7 +185,7 @@ class World:
 
     @property
     def time_s(self) -> float:
-        """Current rig time [s]."""
+        """Rig time that the world has simulated so far [s]."""
         return self._step * self._grid.step_s
 
     def advance(self, duration_s: float) -> None:
