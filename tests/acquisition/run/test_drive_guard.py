@@ -8,7 +8,16 @@ from time import monotonic
 
 import pytest
 
-from vibench.acquisition import AcquisitionError, InstrumentLost, StopLevel, StopSwitch, open_recording
+from tests.changed import changed
+from vibench.acquisition import (
+    AcquisitionError,
+    InstrumentLost,
+    StopLevel,
+    StopSwitch,
+    open_bench,
+    open_recording,
+    run_measurement,
+)
 from vibench.acquisition.errors import RunStalled
 from vibench.acquisition.host.beside import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState
@@ -84,6 +93,17 @@ def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
             break
     assert run.switch.request is None
     assert terminal_v(virtual) > 0.5
+
+
+def test_silence_of_another_generator_confirms_no_stop(recording, rig, tmp_path):
+    """One script may drive two benches, each in its own thread."""
+    north, _ = recording
+    other = changed(rig, generator={"resource": "USB0::0x0699::0x0353::C010001::INSTR"})
+    with open_bench(other) as south:
+        short = changed(PLAN, excitation={"duration_s": 0.2})
+        assert run_measurement(south, short, tmp_path / "south.h5").state is RunState.FINISHED
+    assert terminal_v(north) > 0.5
+    assert DRIVES_ON
 
 
 class Output:

@@ -349,7 +349,7 @@ class Run(ClosedOnLeaving):
 
     def _begin(self, coming: Iterable[Phase]) -> None:
         """Start sampling, and with it an analogue output that shares the digitizer's trigger."""
-        self._guard.begin()
+        self._guard.begin(self._bench.rig.generator.resource or self._bench.rig.daq.device)
         self._drive.arm(coming)
         self._bench.digitizer.start()
 

@@ -276,9 +276,9 @@ class DriveGuard(ClosedOnLeaving):
         self._has_begun = self._is_cut = self._is_leaving = self._has_failed = False
         self._watchdog = Watchdog(self._look, "drive guard")
 
-    def begin(self) -> None:
-        """Note that the drive has started."""
-        DRIVES_ON.begin(self)
+    def begin(self, generator: str = "") -> None:
+        """Note the start of the drive of a ``generator``."""
+        DRIVES_ON.begin(self, generator)
         self._still_s, self._has_begun = 0.0, True
 
     def advance(self) -> None:

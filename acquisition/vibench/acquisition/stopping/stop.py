@@ -158,19 +158,20 @@ class DrivesOn:
     """Drives that have started and are not yet confirmed as off."""
 
     def __init__(self) -> None:
-        self._drives: set[object] = set()
+        self._drives: dict[str | None, object] = {}
         self._has_advanced = False
 
     def __bool__(self) -> bool:
         return bool(self._drives)
 
-    def begin(self, drive: object) -> None:
-        """Note that a drive may be on, and forget earlier drives that were not confirmed as off."""
-        self._drives = {drive}
+    def begin(self, drive: object, generator: str = "") -> None:
+        """Note that a drive may be on, and forget an earlier drive of this generator that is unconfirmed."""
+        self._drives[generator] = drive
 
     def confirm_silence(self, drive: object) -> None:
         """Note that the output of a drive was read back as off. May be called at any time."""
-        self._drives.discard(drive)
+        generators = {each: generator for generator, each in tuple(self._drives.items())}
+        self._drives.pop(generators.get(drive), None)
 
     def note_advance(self) -> None:
         """Note that the run of a drive is still reading blocks."""
