@@ -247,8 +247,8 @@ class MotionBenchmark:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
-                    "`quick` is sufficient: no level reduces the scatter of Response I between starts "
-                    f"({self.levels[0].response_i_scatter:.1%} at `quick`)."
+                    "`quick` is sufficient: no level reduces the scatter of Response I between initial "
+                    f"conditions ({self.levels[0].response_i_scatter:.1%} at `quick`)."
                 )
 
     @property
@@ -265,11 +265,11 @@ class MotionBenchmark:
         price = f"`reference` takes {reference.cost / quick.cost:.1f} times the time of `quick`"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
-                return f"Each level reduces the error; {price}."
+                return f"Each level reduces the state error; {price}."
             case [Accuracy.STANDARD]:
-                return f"Only `reference` reduces the error; {price}."
+                return f"Only `reference` reduces the state error; {price}."
             case [Accuracy.REFERENCE]:
-                return f"`standard` reduces the error, `reference` does not; {price}."
+                return f"`standard` reduces the state error, `reference` does not; {price}."
             case _:
                 return f"All levels are about equally accurate; {price}."
 

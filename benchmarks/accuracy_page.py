@@ -45,8 +45,8 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "`standard` is the default accuracy level of a simulation. Use `quick` for a first look, and",
         "`reference` to check a result. In a periodic motion, the error of the state is at most",
         f"{', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}. An error of 1 means 100 µm in a",
-        "displacement or 0.1 m/s in a velocity. In chaos, no level predicts a single motion; only averages",
-        "are meaningful.",
+        "displacement or 0.1 m/s in a velocity. In chaos, no accuracy level predicts a single motion; only",
+        "averages are meaningful.",
     )
     yield from _promises(benchmark)
     first, software = benchmark.motions[0], json.loads(benchmark.software)
@@ -54,19 +54,19 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "",
         "## How it was measured",
         "",
-        "Made by `python benchmarks/accuracy_page.py`; do not edit by hand. `error_curves.py`,",
-        "`error_targets.py` and `work_precision.py` in the same folder add sections.",
-        f"Machine: {benchmark.machine}; vibench {software['vibench']}. The tables below show:",
+        "`python benchmarks/accuracy_page.py`, then `error_curves.py`, `error_targets.py` and",
+        "`work_precision.py` make this page; do not edit it by hand.",
+        f"The tables below (vibench {software['vibench']}; {benchmark.machine}) show:",
         "",
         "- speed: simulated seconds per second of one core;",
-        "- state error: the largest error of the six components, in the units above. The true state is an",
-        "  independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
-        "- Response I and II errors: relative differences from level `reference`;",
+        "- state error: the largest error of the six components of the state, in the units above. The true",
+        "  state is an independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
+        "- Response I and II errors: relative differences from the Responses at level `reference`;",
         "- the largest Lyapunov exponent, with its standard error;",
-        "- scipy's solvers at a relative tolerance of 1e-6.",
+        "- speed and state error of scipy's solvers at relative tolerance 1e-6.",
         "",
-        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers after about",
-        f"{first.solver_span_s:.1g} s.",
+        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers",
+        f"after about {first.solver_span_s:.1g} s.",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -82,12 +82,12 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "",
         "## Sensitive dependence on the start",
         "",
-        "In these cases, a tiny change of the initial conditions (the *start*) may lead to another final",
-        "motion. The table compares the predicted share of starts that reach each motion with",
-        f"{lotteries[0].starts} further runs, from starts a millionth of the gap apart.",
-        "Each run simulates at most 300 s, so a chaotic or undecided motion may still change.",
-        "`periodic, 1` repeats after one drive period. In 19 of 20 predictions, all intervals contain the",
-        "true shares, even if motions change. *Relative time* compares a prediction with a single run.",
+        "In the cases below, a tiny change of the initial conditions (the *start*) may lead to another final",
+        "motion. The table compares the predicted share of starts that reach each motion with the share in",
+        f"{lotteries[0].starts} further runs, whose starts differ by a millionth of the gap.",
+        "`periodic, 1` is a motion that repeats after one drive period. In 19 of 20 predictions, all",
+        "intervals contain the true shares. *Relative time* is a prediction's computing time over that of a",
+        "single run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -124,13 +124,13 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "## Transients, from rest",
         "",
-        "In a transient, a small error may grow a thousandfold. The promised state error is the one in",
-        "periodic motion, times this growth. Each cell has four numbers:",
+        "In a transient, a small error may grow a thousandfold. The promised state error is the promised",
+        "error in periodic motion, times this growth. Each cell has four numbers:",
         "",
         "1. state error after 0.1 s, against the independent solution;",
         "2. in brackets, the promised state error;",
-        "3. relative difference of the responses in the second half of the run from level `reference`;",
-        "4. in brackets, the stated error of these responses, from a stricter run.",
+        "3. relative difference of the Responses in the second half of the run from level `reference`;",
+        "4. in brackets, the stated error of these Responses, from a stricter run.",
         "",
         f"| motion | growth of a small error | {' | '.join(Accuracy)} |",
         "|---|---|---|---|---|",
@@ -159,7 +159,7 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
     for level in found.levels:
         yield _level(level)
     solvers = "; ".join(map(_solver, found.solvers))
-    yield from ("", f"scipy's speed (state error): {solvers}.")
+    yield from ("", f"scipy's speed [s/s] (state error): {solvers}.")
 
 
 def _level(level: LevelFigures) -> str:
@@ -198,13 +198,13 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
     names: dict[str, list[str]] = {}
     for each in benchmark.motions:
         for level, before in each.without_gain:
-            pair = f"{level.accuracy.value} is no better than {before.accuracy.value}"
+            pair = f"{level.accuracy.value} is no more accurate than {before.accuracy.value}"
             names.setdefault(pair, []).append(each.motion.name)
     if names:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
         yield from (
             "",
-            f"In these motions, the error falls by less than a factor of {LEAST_GAIN:g} from level to level:",
+            f"In these motions, a level reduces the state error by less than a factor of {LEAST_GAIN:g}:",
             "",
             *lines,
         )

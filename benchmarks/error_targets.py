@@ -59,9 +59,9 @@ HEADING, LAST = "## Requested errors", "## Other solvers"
 INTRODUCTION = """Random predictions with a requested error fall into three groups:
 
 - *periodic*: the motion repeats.
-- *named window*: the motion does not repeat. Its responses depend on the window, stated in the result.
+- *named window*: the motion does not repeat. The responses depend on the window that the result states.
 - *start lost*: the motion depends sensitively on the initial conditions (the *start*). The result is the mean
-  over several starts in a named window, with its uncertainty."""
+  response over several starts in a named window, with its uncertainty."""
 ON_THE_PAGE = ("1 %", "0.01 %", "all")
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
@@ -213,14 +213,14 @@ def costs_of(rows):
         for kind in KINDS
     )
     shares = (f"{np.median(own):.1f} for *{kind}*" for kind, own in ratios if own)
-    yield f"The median ratio of these times is {whole}, {', '.join(shares)}."
+    yield f"The median time ratio (default run over 1 %) is {whole}, {', '.join(shares)}."
     costs = [
         {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == KINDS[0]}
         for row in rows
     ]
     ratios = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
-    ratio = f"{np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)} scenes)"
-    yield f"In periodic motion, an error of 1e-6 takes {ratio}."
+    ratio = f"{np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)} cases)"
+    yield f"In periodic motion, a requested error of 1e-6 takes {ratio}."
 
 
 def report(rows):
@@ -250,7 +250,7 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"The {len(rows)} scenes include all contact laws. The time limit is {time_s:g} s on a busy machine",
+        f"The time limit of the {len(rows)} predictions is {time_s:g} s on a busy machine",
         f"({SHORT * time_s:g} s with *start lost*, if the requested error is {100.0 * SMALL:g} % or less).",
         "*Covered* responses differ from the true value by at most the stated error plus the error of the",
         "true value. True values come from level `reference`; with *start lost*, from the mean over other",

@@ -4,12 +4,11 @@
 (numbalsoda is built from source and needs a Fortran compiler). A peer that is not installed is omitted,
 and the page says so.
 
-Every solver starts in the same settled state. Its error is the difference from the independent solution
-after 0.2 s (in chaos, 0.03 s). Its cost is processor time divided by simulated time, in the fastest of
-several runs of 3 s (scipy: 0.3 s), without preparation such as compilation. scipy has a compiled right-hand
-side; numbalsoda is compiled completely. heyoka uses Taylor series, with terminal events at the stops. "At its
-best", its equations are transformed to suit the series. "Eight at a time" is its batch mode, with the time
-divided by eight.
+Every solver starts in the same settled state. A solver's error is the difference from the independent
+solution after 0.2 s (in chaos, 0.03 s). A solver's cost is processor time divided by simulated time, in the
+fastest of several runs of 3 s (scipy: 0.3 s), without preparation such as compilation. Of the solver heyoka,
+"at its best" means equations transformed to suit Taylor series, and "eight at a time" means batch mode, with
+the time divided by eight.
 """
 
 import argparse
@@ -297,13 +296,13 @@ def write_section(page, curves):
         "",
         f"Measured with vibench {version('vibench')}.{absent}",
         "",
-        "The first row has simulated seconds per second, and the error in brackets. Other cells have:",
+        "The first row has vibench's simulated seconds per second, its error in brackets. Other cells have:",
         "",
         "1. the solver's time over vibench's time, for the same error (`never`: no tolerance reaches it);",
-        "2. the same at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
+        "2. this ratio of times at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
         "3. in brackets, the solver's error at this tolerance.",
         "",
-        "![Error over cost of each solver, for six motions](images/work_precision.png)",
+        "![Error over cost of each solver](images/work_precision.png)",
         "",
         *table_of(curves),
     )
