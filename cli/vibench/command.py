@@ -17,7 +17,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class RunningProgram:
-    """Running program, announced by a file whose name contains its process id and start time."""
+    """Running program that has announced itself by a file, named by its process id and start time."""
 
     def __init__(self, path: str, pid: str, start: str, is_alive: Callable[[], bool]) -> None:
         self.path = path
@@ -31,7 +31,7 @@ class RunningProgram:
             self._facts = b""
 
     def fact(self, name: str) -> str:
-        """Return a part of the announcement; empty if unknown."""
+        """Return a field of the program's announcement; empty if unknown."""
         import json
 
         try:
@@ -40,7 +40,7 @@ class RunningProgram:
             return ""
 
     def name(self) -> str:
-        """Return what the program does, and its process id, in printable characters."""
+        """Return the program's task and process id, in printable characters."""
         what = self.fact("what") or "a program of another user"
         shown = (each if each.isprintable() else each.encode("unicode_escape").decode() for each in what)
         return f"{''.join(shown)}, process {self.pid}"
@@ -99,7 +99,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
 
 
 def running_programs() -> Iterator[RunningProgram]:
-    """Yield the programs announced on this computer; raise OSError if one runs on another computer."""
+    """Yield the announced running programs; raise OSError if one of them is on another computer."""
     folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
     boot, space = _own_place()
     for name in sorted(os.listdir(folder)):  # noqa: PTH208
@@ -130,7 +130,7 @@ def _own_place() -> tuple[str, str]:
 
 
 def _is_process(pid: str, start: str) -> bool:
-    """Return whether the process with this start time, as in proc(5), runs."""
+    """Return whether the process with this id and start time (see proc(5)) is running."""
     try:
         with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
             state, *others = file.read().rpartition(")")[2].split()
@@ -140,7 +140,7 @@ def _is_process(pid: str, start: str) -> bool:
 
 
 def _is_locked(path: str) -> bool:
-    """Return whether a file is locked, as by the program that created it while this runs."""
+    """Return whether a file is locked; the program that created the file locks it while running."""
     import fcntl
 
     try:

@@ -58,9 +58,9 @@ class Place:
     panel: Panel
     function: str
     extras: tuple[str, ...] = ()
-    """Extras (optional dependencies) that the command needs; one that includes others comes first."""
+    """Optional dependencies that the command needs; list an extra before the extras that it includes."""
     space_mb: int = 300
-    """Address space that libraries and threads of the command need [MB]."""
+    """Address space that the libraries and threads of the command need [MB]."""
     advice: str = ""
     """What the user should do if the command cannot run."""
     help: str = ""
@@ -78,7 +78,7 @@ class Place:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from its file, because importing takes long."""
+        """First line of the function's docstring, read from its source because importing is slow."""
         module, name = self.function.split(":")
         source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
@@ -93,7 +93,7 @@ class LateCommand(TyperCommand):
         self._place = place
 
     def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the line is not shortened
-        """Return the line for the list of commands."""
+        """Return the line that describes this command in the list of commands."""
         return self._place.summary
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
@@ -162,7 +162,7 @@ def _is_number(text: str) -> bool:
 
 
 def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
-    """Return the class of a group that has these commands, in this order."""
+    """Return the class of a command group that has these commands, in this order."""
 
     class LateCommands(SectionedGroup):
         def __init__(self, **settings: Any) -> None:
@@ -177,7 +177,7 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space [MB] for simulating or analysing (775 measured), and for opening a bench (1807 measured)."""
+"""Address space [MB] of commands that simulate or analyse (measured: 775), or open a bench (1807)."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -237,7 +237,7 @@ class LogLevel(StrEnum):
 
     WARNING = "warning"
     INFO = "info"
-    """Also log the messages that recordings store."""
+    """Also log the messages that are stored in recordings."""
     DEBUG = "debug"
     """Also log the messages to instruments and their replies."""
 
@@ -296,7 +296,7 @@ def vibench(
 
 
 def main() -> None:
-    """Run the command line; for an error that the user can fix, print a sentence and exit with 1 or 3."""
+    """Run the command line; print an error that the user can fix as a sentence, and exit with 1 or 3."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; no log about ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
@@ -328,7 +328,7 @@ def _disk_trouble(error: Exception) -> str:
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Return a message if memory or open files ran out, which may be the cause of another error."""
+    """Return a message if the program has run out of memory or open files, which can cause other errors."""
     if error is None:
         return ""
     text = str(error)
@@ -352,7 +352,7 @@ DISK_ERRORS = {
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }
-"""Messages for the disk errors that a user can fix, by error number."""
+"""Messages to the user about disk errors that the user can fix, keyed by the error number."""
 _NO_MEMORY = (
     os.strerror(errno.ENOMEM),
     "can't start new thread",
@@ -360,15 +360,15 @@ _NO_MEMORY = (
     "without setting an exception",
     "without exception set",
 )
-"""Error messages of the operating system, Python and the loader when memory has run out."""
+"""Error messages by which the system, Python and the loader report that memory has run out."""
 
 
 NAME_SHOWN = 80
-"""Number of characters that are shown of a name that is too long."""
+"""Number of characters that are shown of a file name that is too long."""
 
 
 def complain(error: BaseException) -> None:
-    """Print the sentence of an error, then those of the errors that followed it."""
+    """Print the message of an error, then the messages of the errors that followed it."""
     errors.print(Text("error:", style="bold red"), str(error))
     for note in getattr(error, "__notes__", ()):
         errors.print(f"  {note}")

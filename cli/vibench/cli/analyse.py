@@ -46,7 +46,7 @@ from .specimen_option import SpecimenOption, read_specimen
 
 
 class DrivenBy(StrEnum):
-    """Input that drives the simulation overlaid on a measurement."""
+    """Base motion or drive signal that the overlaid simulation uses as its input."""
 
     VOLTAGE = "voltage"
     BASE = "base"
@@ -246,7 +246,7 @@ def _analyse(
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
-    """Write a report for each other channel that measures a motion."""
+    """Write one more report for each channel that measures another motion."""
     from vibench.analysis.report import write_report
 
     for role, results in others.items():
@@ -260,7 +260,7 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 def hidden_motions(
     results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
-    """Yield the estimated motion of m1 for each recording; print an error where that fails."""
+    """Yield the estimated motion of m1 for each recording; print an error if the estimate fails."""
     for facts in results.facts if hidden is not _Hidden.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:
@@ -275,7 +275,7 @@ def hidden_motions(
 def fit_specimen(
     paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
-    """Return the specimen fitted to recordings; options for the report have no effect on it."""
+    """Return the specimen fitted to recordings; the fit does not depend on the report's options."""
     measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)
     return update_model(measured, also_free, observer)
 

@@ -101,7 +101,7 @@ def new(
     ] = "lab_rig",
     answers: Annotated[Path | None, option("Answers, in place of questions.", "FILE.toml")] = None,
 ) -> None:
-    """Set up a bench: ask questions, write its file, check wiring, noise, a first 5 mV, gains and signs.
+    """Set up a bench: ask questions, write its file, check wiring, noise, gains and signs (first at 5 mV).
 
     The report is stored beside the file. Exit code 1 if a finding forbids switching the amplifier on.
     """

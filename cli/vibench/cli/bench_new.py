@@ -40,12 +40,12 @@ from .paths import free_path
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
-"""Answers that mean that a cable is not plugged in."""
+"""Answers of the operator that mean that a cable is not plugged in."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Content of a file of answers: values of the configuration, operator, wiring and knobs."""
+    """Content of an answer file: configuration values, operator, wired connectors, confirmed knobs."""
 
     given: Mapping[str, str]
 
@@ -56,7 +56,7 @@ class Answers:
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """The usual questions, and one for every other value that the file of answers contains."""
+        """Return the usual questions, plus one for each other configuration value in the answer file."""
         usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
@@ -90,7 +90,7 @@ class Answers:
 
 
 def _name_in_a_comment(answer: str) -> str:
-    """Return the name without line ends and other unprintable characters, for use in a comment."""
+    """Return a name without line ends and unprintable characters, for a comment in the TOML file."""
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 

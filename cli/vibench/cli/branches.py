@@ -109,7 +109,7 @@ def branches(
 def _drive(
     amplitude: str | None, frequency: str | None, like: Path | None
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return the measured curves to overlay, and the fields of the request for range and level."""
+    """Return the measured curves to overlay, and the request's fields for parameter range and level."""
     if like is not None:
         if amplitude is not None:
             raise InvalidRequest(
@@ -139,7 +139,7 @@ def _drive(
 def _resonance(
     amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return no curves, and the fields of the request that follow a phase resonance over amplitude."""
+    """Return no measured curves, and the request's fields that follow a phase resonance over amplitude."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
             f"--resonance {resonance} is followed over the amplitude; also give --amplitude START:STOP, and "

@@ -102,7 +102,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Return the fields of the request for the base motion; without options, there is no drive."""
+    """Return the request's fields for the base motion; without these options the base is at rest."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(
@@ -136,7 +136,7 @@ def _is_above(first: str, second: str) -> bool:
 
 
 def _run_in_words(run: ChainRun) -> str:
-    """Return a run as one line, with values of the first and of the last cell."""
+    """Return the result of one run as a line of text, with values of the first and the last cell."""
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "

@@ -37,7 +37,7 @@ LOOK_S = 1.0
 
 
 class Analyst:
-    """Analyses recordings in another process; results keep the order in which recordings were submitted."""
+    """Analyses recordings in another process and returns results in the order of submission."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
@@ -56,7 +56,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for each; raise AnalysisError if the process has ended."""
+        """Yield the results in order, waiting for each; raise AnalysisError if the process died."""
         for number in range(self.submitted):
             while number == len(self._parts):
                 self._pool.poll(LOOK_S)
@@ -78,7 +78,7 @@ class Analyst:
 
 @contextmanager
 def second_process(name: str, draws: int) -> Iterator[Analyst]:
-    """Start an analysis process; after an error, analyses that are not finished are dropped."""
+    """Yield an analyser in a new process; after an error, drop the unfinished analyses."""
     pool = Pool(1)
     try:
         yield Analyst(pool, name, draws)

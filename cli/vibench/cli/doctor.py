@@ -42,7 +42,7 @@ SECRET = frozenset({TOKEN_VARIABLE})
 
 
 def doctor(as_json: AsJson = False) -> None:
-    """Report what this installation consists of; nothing is changed."""
+    """Report versions, folders, libraries and instruments of this installation, without changing it."""
     sections = {
         "vibench": installation(),
         "libraries": dict(libraries()),
@@ -78,7 +78,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version; for a missing one, the extra that installs it."""
+    """Yield each library with its version or, if it is missing, with the extra that installs it."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
@@ -97,7 +97,7 @@ def libraries() -> Iterator[tuple[str, str]]:
 
 
 def engine() -> Iterator[tuple[str, str]]:
-    """Load the native engine, which tests itself; yield its path, processor family and test result."""
+    """Load and self-test the native engine; yield its path, processor family and test result."""
     try:
         loaded = native_engine()
     except (EngineError, OSError, subprocess.CalledProcessError) as error:

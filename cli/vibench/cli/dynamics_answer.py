@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 SHOWN = 24
-"""Largest number of rows printed on the terminal; JSON and file contain all rows."""
+"""Largest number of result rows printed on the terminal; JSON and file contain all rows."""
 
 
 def room_for(file: str, out: Path | None) -> None:
@@ -35,7 +35,7 @@ def room_for(file: str, out: Path | None) -> None:
 def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
-    """Compute all parts, and report each with its number; Ctrl-C stops after the current part.
+    """Compute all parts of a result, report each finished part, and stop after the current one at Ctrl-C.
 
     Return the parts, the elapsed time [s], and whether all parts were computed.
     """
@@ -78,7 +78,7 @@ def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
 
 
 def leave(*, is_complete: bool) -> None:
-    """Exit with the code `STOPPED` if the result is incomplete."""
+    """Exit with the code `STOPPED` if the computation was stopped before all parts were finished."""
     if not is_complete:
         errors.print("stopped: the result contains what was computed until then")
         raise typer.Exit(ExitCode.STOPPED)

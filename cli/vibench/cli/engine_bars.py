@@ -54,7 +54,7 @@ class EngineBars:
         self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
-        """Draw what has changed since the last status."""
+        """Draw the changes since the last status."""
         for row in status.rows:
             self._row(row)
         for message in status.messages:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Numbers of the figures that show measurements and so need recordings."""
+"""Numbers of the paper's figures that show measurements, which are drawn from recordings."""
 
 
 def figure(
@@ -79,7 +79,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
-    """Return the function that draws measured figures; the recordings are analysed only once."""
+    """Return the function that draws figures of measurements; it analyses the recordings only once."""
     if not wanted:
         return lambda _: iter(())
     if folder is None:

@@ -13,14 +13,14 @@ from .options import option
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
-"""Package that runs in a new process; it is not imported, because commands must work without Qt."""
+"""Package to run in a new process; importing it here would make all commands need Qt."""
 
 
 def gui(
     bench: BenchPath = None,
     screenshots: Annotated[Path | None, option("Save a picture of each page, and exit.", "DIR")] = None,
 ) -> None:
-    """Open the window, to check a bench, plan and run tests, watch them, and compare results."""
+    """Open the window, in which you check a bench, plan, run and watch tests, and compare results."""
     command = [sys.executable, "-m", WINDOW]
     if bench is not None:
         command += ["--bench", str(named(bench, "hardware_configs"))]

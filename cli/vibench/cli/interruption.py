@@ -8,7 +8,7 @@ from types import FrameType
 
 @contextmanager
 def watch_interrupt() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether Ctrl-C was pressed since."""
+    """Yield a function that returns whether Ctrl-C was pressed since this context was entered."""
     before = signal.getsignal(signal.SIGINT)
     pressed: list[int] = []
 

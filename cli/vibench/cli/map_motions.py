@@ -114,7 +114,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print caption and motions and, for a map of initial states, its boundary and the effect of kicks."""
+    """Print the map's caption and motions; for initial states, also the basin boundary and kick effects."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")

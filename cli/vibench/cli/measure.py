@@ -62,7 +62,7 @@ def print_estimate(
     shares: Sequence["TimeShare"] = (),
     ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
-    """Print number of recordings, time, size, free space, and the expected uncertainty of the results."""
+    """Print a campaign's number of recordings, time, size, free space, and expected uncertainty."""
     match form:
         case Form.JSON:
             document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
@@ -111,7 +111,7 @@ def estimate_text(expected: CampaignEstimate) -> str:
 
 
 def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | None, float]]:
-    """Return expected and longest recording time [s] of each measurement that has `until`."""
+    """Return the expected and the longest recording time [s] of each measurement that sets `until`."""
     waiting = [each for each in campaign.measurements if each.until is not None]
     found = vibench.analysis.expected_recorded_s
     return {each.name: (found(each, rig), vibench.analysis.recorded_s(each)) for each in waiting}
@@ -153,7 +153,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the messengers for command and mail; raise ConfigurationError if one cannot be used."""
+    """Return the senders of messages by command and by mail; raise ConfigurationError if one fails."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))

@@ -44,14 +44,12 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""Text about the allowed values, by type of pydantic's error."""
-_EXAMPLES = {"error": "; for 1 % give 1%"}
-"""Example of an allowed value, by field."""
+"""Description of the allowed values, by pydantic's type of error."""
 
 
 @dataclass(frozen=True)
 class Fields:
-    """Annotation of a `RequestOptions` parameter: the fields that become options, in this order."""
+    """Annotation of a `RequestOptions` parameter; lists the model's fields that become options, in order."""
 
     names: tuple[str, ...]
     panel: str | None = None
@@ -65,12 +63,12 @@ class RequestOptions(Generic[Request]):
     typed: Mapping[str, Any]
 
     def request(self, **others: object) -> Request:
-        """Return the request with other fields set by the command; raise InvalidRequest if invalid."""
+        """Return the request after the command has set other fields; raise InvalidRequest if forbidden."""
         return validated(self.model, {**others, **self.typed})
 
 
 def validated(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request with these values; raise InvalidRequest with the first value not allowed."""
+    """Return a request with these values; raise InvalidRequest that names the first forbidden value."""
     from pydantic import ValidationError
 
     try:
@@ -100,7 +98,7 @@ def option(
     min: int | None = None,  # noqa: A002
     max: int | None = None,  # noqa: A002
 ) -> OptionInfo:
-    """Return an option that is not a field of a model; ``name`` if it is not that of the parameter."""
+    """Return an option that is not a model's field; ``name`` if it differs from the parameter's name."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(
         *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max
@@ -130,7 +128,7 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return the type without limits and ``| None``; str for a union, whose text the model reads."""
+    """Return a field's type without limits and ``| None``; return str for a union, which the model parses."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):
@@ -142,7 +140,7 @@ def _plain(annotation: Any) -> Any:
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command's function with a signature for typer in which every field is an option.
 
-    A switch has no value, and also no ``--no-name`` unless that is declared.
+    A switch has no value; its opposite ``--no-name`` exists only if the command declares it.
     """
     signature = inspect.signature(function, eval_str=True)
     parameters: list[inspect.Parameter] = []

@@ -23,11 +23,11 @@ class ExitCode(IntEnum):
     DONE = 0
     """The command did everything that was requested."""
     FAILED = 1
-    """There was an error, a forbidden value, or a failed part; standard error says which."""
+    """An error, a forbidden value, or a failed part of the result; standard error explains it."""
     MISUSED = 2
     """A command or an option is unknown or missing."""
     STOPPED = 3
-    """The command was stopped, without a failure; ``--resume`` continues its work."""
+    """The user stopped the command before it had finished; ``--resume`` continues its work."""
 
 
 LONGEST_LINE = 1800
@@ -65,7 +65,7 @@ def words(text_format: str) -> "TextColumn":
 
 
 def bold(text: object) -> Text:
-    """Return bold text in which brackets have no meaning."""
+    """Return bold text for the console, in which brackets do not start markup."""
     return Text(printable(str(text)), style="bold")
 
 

@@ -30,7 +30,7 @@ AllowExternal = Annotated[
 
 
 def external_data(allowed: bool) -> AbstractContextManager[None]:
-    """Return a context in which HDF5 files may refer to other files, if that is allowed."""
+    """Return a context in which HDF5 files may link to other files, if the user allows this."""
     if not allowed:
         return nullcontext()
     from vibench.sim.hdf5_files.door import allow_external_data
@@ -105,7 +105,7 @@ def require_suffix(path: Path, suffix: str) -> None:
 
 
 def free_path(path: Path) -> Path:
-    """Return the path if nothing is there, otherwise with -2, -3, ... before the suffix."""
+    """Return the path if no file exists there; otherwise add -2, -3, ... before its suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

@@ -16,11 +16,11 @@ SHOWN_FAILURES = 5
 Workers = Annotated[int | None, option("Threads; by default one per processor.", "N", min=1)]
 Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
-"""For each failed point, its values on the axes and the reason."""
+"""The values on the axes of each failed point, and the reason of the failure."""
 
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
-    """Print failures or, after a stop, the number of finished points; then exit with an error code."""
+    """Print failed points or, after a stop, the number of finished points; exit with an error code."""
     if print_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:

@@ -40,7 +40,7 @@ from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
-"""Largest number of rows printed on the terminal; JSON and file contain all rows."""
+"""Largest number of result rows printed on the terminal; JSON and file contain all rows."""
 
 
 def predict(
@@ -73,7 +73,7 @@ def predict(
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
     options: Annotated[RequestOptions[Study], Fields(("window_s", "accuracy"))],
 ) -> None:
-    """Predict the responses of m0 and of p over frequency."""
+    """Predict Responses I and II of m0, and of the motion p of m1, over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, which it needs; give both")
     require_suffix(out or Path(), ".h5")
@@ -140,7 +140,7 @@ def predict(
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
-    """Refuse options whose values a requested error or time determines."""
+    """Refuse options whose values follow from a requested error or computing time."""
     targets = [name for name in ("error", "time_s") if name in typed]
     others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
     if targets and others:
@@ -151,7 +151,7 @@ def _refuse_beside_target(typed: Collection[str]) -> None:
 
 
 def _refine(scene: Scene) -> ScenePrediction:
-    """Solve one scene with a target, and print each better result."""
+    """Solve one scene with a target error or time, and print each more accurate result."""
     from vibench.sim import refine_scene
 
     for found in refine_scene(scene):
@@ -179,7 +179,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Explain how the points are solved, with a paragraph for successive points solved alike."""
+    """Describe how the points are solved, in one paragraph per run of points with the same method."""
     from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -193,7 +193,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on successive points solved alike; details are those of the point with largest p.
+    """Return a paragraph on neighbouring points with one method; details are from the point of largest p.
 
     Each entry has frequency [Hz], plan and computing time [s]; the time is NaN if it includes the start of
     the process.
@@ -213,7 +213,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
 
 
 def _table(title: str, headings: Sequence[str], caption: str | None = None) -> Table:
-    """Return an empty table without a frame."""
+    """Return an empty console table without a frame."""
     rows = Table(title=title, caption=caption, box=SIMPLE_HEAD, padding=0, show_edge=False)
     for heading in headings:
         rows.add_column(heading, justify="right")
@@ -249,7 +249,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return how many starts reach the point's motion, such as 5/8; "lost" or empty if unknown."""
+    """Return how many initial conditions lead to the point's motion, as 5/8; "lost" or empty if unknown."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
@@ -260,7 +260,7 @@ def _share_text(point: ScenePrediction) -> str:
 
 
 def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
-    """Return a table of the motions at points that have several; None if there are none."""
+    """Return a table of the coexisting motions at points that have several; None if no point has."""
     several = [
         (point, motion)
         for point in points
@@ -285,7 +285,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return a text on points with sensitive dependence on the start, and their additional starts."""
+    """Return a text on points that depend sensitively on initial conditions, and their extra runs."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ServedPace(StrEnum):
-    """Speed at which a served rig runs."""
+    """Speed at which a served virtual rig runs, compared with real time."""
 
     WALL = "wall"
     FREE = "free"
@@ -34,7 +34,7 @@ def serve_rig(
     ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:
-    """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
+    """Serve the virtual rig to programs that use pyvisa or nidaqmx, until Ctrl-C is pressed."""
     from vibench.virtual_rig import DiskFaults, VirtualRig
 
     stop = threading.Event()

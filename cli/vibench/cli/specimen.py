@@ -97,7 +97,7 @@ _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m
 
 
 def _heading(name: str) -> str:
-    """Return a heading for the name of a quantity in code: ``"gaps [m]"`` for ``gaps_m``."""
+    """Return the table heading for a quantity's name in code: ``"gaps [m]"`` for ``gaps_m``."""
     ending = next((each for each in _UNITS if name.endswith(each)), "")
     words = name.removesuffix(ending).replace("_", " ")
     return f"{words} [{_UNITS[ending]}]" if ending else words

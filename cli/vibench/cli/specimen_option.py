@@ -13,7 +13,7 @@ from .output import print_warnings
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
 """Fields that are options of every command with a specimen."""
 AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Axes of a study that have a single value here, and the field of `SpecimenChoice` for this value."""
+"""Study axes that have a single value in these commands, each with its field of `SpecimenChoice`."""
 SpecimenOption = Annotated[
     str | None, option("Specimen file, or a name listed by `vibench specimen`.", "NAME|FILE.toml")
 ]
@@ -21,7 +21,7 @@ Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
 def read_specimen(specimen: str | None) -> SpecimenTable:
-    """Return the specimen by name or file, by default the paper's; raise InvalidRequest if unknown."""
+    """Return the specimen with this name or file, by default the paper's; raise InvalidRequest if unknown."""
     if specimen is None:
         return usual_specimen()
     try:

@@ -49,7 +49,7 @@ def spectrum(
 
 
 def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
-    """Return the request's fields for the drive; a single point is an axis with one frequency."""
+    """Return the request's fields for the drive; a single frequency becomes an axis with one value."""
     if amplitude.stop is not None and frequency.stop is not None:
         raise InvalidRequest(
             "--amplitude and --frequency were both given as ranges; give one of them as one number"

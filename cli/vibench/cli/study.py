@@ -68,7 +68,7 @@ def study(
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
-    """Return a summary of the results as a JSON document; the values themselves are in the file."""
+    """Return a summary of a study's results as a JSON document; the HDF5 file contains the values."""
     return {
         "file": str(out),
         "points": results.study.grid.size,
@@ -84,7 +84,7 @@ _DIGEST = 16
 
 
 class KeptStudies:
-    """Solver that stores each study in a folder, in a file named by a hash of the study."""
+    """Solver that stores each study's results in a folder, in a file named by a hash of the study."""
 
     def __init__(self, folder: Path, workers: int | None) -> None:
         self._folder = folder
@@ -92,7 +92,7 @@ class KeptStudies:
         self._failed = 0
 
     def __call__(self, study: Study) -> StudyResults:
-        """Solve the points of a study that are missing in its file; return its results."""
+        """Solve the points of a study that its file does not contain; return the results of all points."""
         self._folder.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
         with watch_interrupt() as is_stopped, study_bar(study.grid.size) as observer:
@@ -113,6 +113,6 @@ class KeptStudies:
         return results
 
     def complain(self) -> None:
-        """Exit with an error code if any study has failed points; all other results are stored."""
+        """Exit with an error code if any study has failed points; the other points are stored."""
         if self._failed > 0:
             raise typer.Exit(ExitCode.FAILED)

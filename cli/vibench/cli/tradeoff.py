@@ -1,4 +1,4 @@
-"""`vibench tradeoff`: error against computing time of every method, for a scene or four cases."""
+"""`vibench tradeoff`: error against computing time of every method, for a scene or the paper's cases."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

@@ -40,17 +40,17 @@ from .watch import Pid
 
 NICE = 5
 POLL_S = 0.01
-"""Interval between two polls during a run [s]."""
+"""Interval between two polls of the engine during a run [s]."""
 IDLE_S = 0.2
-"""Interval between two polls if there is no run [s]."""
+"""Interval between two polls of the engine if there is no run [s]."""
 PIECE_S = 0.1
 """Duration of the samples that are processed and reported at once [s]."""
 LATEST_S = 3.0
-"""Largest delay behind the measurement [s]; above it, the twin skips samples."""
+"""Largest delay of the twin behind the measurement [s]; beyond it, the twin skips samples."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
-"""Largest error of the forecast that is displayed, over the smaller gap."""
+"""Largest error of a displayed forecast of p, as a fraction of the smaller gap."""
 
 
 @dataclass
@@ -60,7 +60,7 @@ class _Following:
     specimen: Specimen
     live: LiveTwin
     rows: tuple[int, int]
-    """Row numbers of base acceleration and m0 velocity among the channels."""
+    """Row numbers of the base acceleration and the m0 velocity in the array of samples."""
     run_id: int = -1
     plan: str = ""
     missed: int = 0
@@ -69,7 +69,7 @@ class _Following:
     is_kept: bool = False
 
     def look(self) -> float:
-        """Process and report new samples; return the time until the next call [s]."""
+        """Process and report new samples; return the time to wait before the next call [s]."""
         status = self.client.status()
         if status.state not in DRIVING or status.run is None or not _shows_m0(status):
             return IDLE_S
@@ -113,7 +113,7 @@ class _Following:
         self.client.tell_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Store parameters and usual level, once known, as a baseline for checking later runs."""
+        """Store the estimated parameters and usual residual once, as a baseline for checking later runs."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return
@@ -156,12 +156,12 @@ class _Following:
 
 
 def _shows_m0(status: EngineStatus) -> bool:
-    """Return whether the vibrometer measures m0; in a scan it measures other points."""
+    """Return whether the vibrometer measures m0; in a scan, the vibrometer measures other points."""
     return status.bench is not None and "m0_velocity" in [each.role for each in status.bench.channels]
 
 
 def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the forecast and its errors, up to the largest error to display; empty if there is none."""
+    """Return the forecast and its errors while they are small enough to display; empty if none is."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error

@@ -27,7 +27,7 @@ def verify(
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check every recording of a folder against its seal, including all samples, and the journals."""
+    """Check all recordings of a folder, including every sample, and the journals against their seals."""
     with external_data(allow_external):
         found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
     counts = Counter(each.verdict for each in found)

@@ -32,7 +32,7 @@ Pid = Annotated[int | None, option("Process id; by default the only engine.", "N
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
-    """Watch an engine from any terminal of the same user; Ctrl-C does not affect the engine."""
+    """Watch an engine from any terminal of the same user; Ctrl-C ends only the watching."""
     if as_json:
         engines = [each for each in announced_engines() if pid in (None, each.pid)]
         others = [each for each in programs_without_engine() if pid in (None, each.pid)]
@@ -109,7 +109,7 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
 
 
 def release(pid: Pid = None) -> None:
-    """Continue a run that was held with vibench stop --level hold, or in the window."""
+    """Continue a measurement that `vibench stop --level hold` or the window has put on hold."""
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
         # A hold may have been requested but not yet have taken effect, such as in a pause; release it too.
