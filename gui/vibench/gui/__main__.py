@@ -36,7 +36,7 @@ ELSEWHERE = "or run without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
-    """Return why no window can be shown, and what to do, as a sentence; empty if a window is possible."""
+    """Return why Qt cannot show a window, and what the user can do; empty if Qt can show one."""
     try:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - tests whether Qt can be loaded
     except ImportError as error:
@@ -56,7 +56,7 @@ def display_trouble() -> str:
 
 
 def _plugin_trouble() -> str:
-    """Load Qt's X11 plugin to name a missing library; Qt itself reports only the failure."""
+    """Load Qt's X11 plugin only to learn which library is missing; Qt itself does not name the library."""
     found = find_spec("PySide6")
     folders = [] if found is None else list(found.submodule_search_locations or [])
     for plugin in (Path(folder, "Qt", "plugins", "platforms", "libqxcb.so") for folder in folders):
@@ -90,7 +90,7 @@ NO_WINDOW = 1
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Open the window; return the exit code after it is closed."""
+    """Open the window, wait until the user closes it, and return the exit code."""
     options = _options(arguments)
     # Make pyqtgraph use PySide6 too. One thread for linear algebra suffices, because matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")

@@ -10,7 +10,7 @@ from vibench.sim.background import Job, Pool
 
 POLL_MS = 20
 LONGEST_S = 900.0
-"""Longest duration of a job [s]; then it is stopped."""
+"""Time limit of a job [s]; a job that takes longer is stopped."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
@@ -45,7 +45,7 @@ class Background(Pool, QObject):
         return begun
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Deliver the results that have arrived."""
+        """Call the listeners of all jobs whose results have arrived."""
         super().poll(wait_s)
         if not self.is_busy:
             self._timer.stop()
@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Computes the newest of many requests: each is started after a short pause, unless replaced before."""
+    """Computes only the newest of many requests; a request starts after a short pause without another."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class LatestRequest(QObject, Generic[Question, Answer]):
         return self._wanted is not None or self._job is not None
 
     def ask(self, question: Question) -> None:
-        """Request this instead of the request that is waiting."""
+        """Replace the waiting request by this one."""
         self._wanted = question
         self._timer.start()
 

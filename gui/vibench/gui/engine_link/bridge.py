@@ -41,7 +41,7 @@ from ..background.background import in_next_pass
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Frequency band displayed if the plan is unknown, because another window armed it."""
+"""Frequency band of plots if this window does not know the plan, because another window armed it."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
@@ -59,7 +59,7 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
 
 
 def warm_up() -> None:
-    """Process a test signal of 3 s, so that libraries are loaded before the first plot of a run."""
+    """Process a test signal of 3 s in advance, so that the first plot of a run need not load libraries."""
     roles = ("drive_voltage", "base_acceleration", "m0_velocity")
     channels = [LiveChannel(role, "V", 1.0, 1.0) for role in roles]
     view = LiveView(channels, WARM_RATE_HZ, band_hz=WHOLE_BAND_HZ)
@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 
 def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Return the measurement of the campaign that makes the recording ``name``; None if there is none."""
+    """Return the measurement of the campaign that records the file ``name``; None if there is none."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)
@@ -85,7 +85,7 @@ Listener = Callable[[Any], None]
 
 
 class Urgency(IntEnum):
-    """Order in which waiting requests are sent; the smallest number first."""
+    """Priority of waiting requests to the engine; the request with the smallest number is sent first."""
 
     STOP = 0
     ORDER = 1
@@ -116,7 +116,7 @@ class EngineLine:
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
         self.attendant: Attendant | None = None
-        """Reports to the engine that the window is alive; None before an engine exists."""
+        """Process that reports to the engine that the window is alive; None before an engine exists."""
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -132,11 +132,11 @@ class EngineLine:
         on_answer: Listener,
         on_refusal: Callable[[AcquisitionError], None],
     ) -> None:
-        """Queue a request by urgency; `drain` later calls one of the two listeners."""
+        """Queue a request by its priority; `drain` later calls the listener for its result or its error."""
         self._calls.put(_Call(urgency, next(self._numbers), question, on_answer, on_refusal))
 
     def drain(self) -> None:
-        """Call, in this thread, the listeners of all answers received so far."""
+        """Call, in the window's thread, the listeners of all replies received so far."""
         while True:
             try:
                 tell = self._answers.get_nowait()
@@ -179,14 +179,14 @@ class EngineLine:
 
 
 def _ignore(_: object) -> None:
-    """Ignore an answer; the next status shows what a command has changed."""
+    """Ignore the engine's reply; the next status shows what a command has changed."""
 
 
 CATCH_UP_S = 2.0
-"""Longest part of the signal that is fetched after a pause [s]; older samples are only in the file."""
+"""Longest stretch of samples fetched from the engine after a pause [s]; older ones are in the file."""
 
 PIECE_S = 0.2
-"""Duration of the samples that are processed at once [s], four times the arrivals between two frames."""
+"""Duration of samples processed in one pass [s]: four times what arrives between two frames."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -202,7 +202,7 @@ class Bridge(QObject):
     noticed = Signal(object)
     armed = Signal(object)
     adopted = Signal(object)
-    """`CampaignRequest` of a running engine that was taken over from another window."""
+    """Plan of a running engine that this window took over from another window."""
     advanced = Signal()
     """Emitted when a requested step is done: bench opened, plan armed, or run started."""
     recording_ended = Signal(object)
@@ -215,7 +215,7 @@ class Bridge(QObject):
         self.status: EngineStatus | None = None
         """Newest status of the engine; None without an engine."""
         self.view: LiveView | None = None
-        """Newest samples of the run; None before the first run and after another plan was armed."""
+        """Newest samples of the run; None before the first run, and once another plan has been armed."""
         self._view_run = 0
         self.rig: Rig | None = None
         self.campaign: Campaign | None = None
@@ -246,7 +246,7 @@ class Bridge(QObject):
         return None if self._line is None else self._line.pid
 
     def tick(self) -> None:
-        """Deliver the answers received, then request the next status and samples."""
+        """Deliver the engine's replies, then request the next status and samples."""
         if self._line is None:
             return
         self.beat()
@@ -269,7 +269,7 @@ class Bridge(QObject):
         self._order(lambda client: _open(client, rig, confirmations))
 
     def adopt(self, announcement: Announcement | None) -> None:
-        """Take over an engine, with its campaign, that another window left running; then emit `adopted`."""
+        """Take over an engine and its campaign that another window left running; then emit `adopted`."""
         if announcement is None or self._line is not None:
             return
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
@@ -299,7 +299,7 @@ class Bridge(QObject):
         self._order(lambda client: client.arm_request(request), keep)
 
     def stop(self, level: StopLevel, reason: str) -> None:
-        """Hold or end the run; this request overtakes all waiting requests."""
+        """Hold or end the run; the engine receives this request before all waiting requests."""
         if self._line is not None:
             self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._refused)
 
@@ -372,7 +372,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Process one piece and schedule the next; all pieces at once would block the event loop."""
+        """Process one batch of samples and schedule the next; all at once would block the event loop."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:
@@ -427,7 +427,7 @@ _ADVANCES = frozenset(
         (EngineState.ARMED, EngineState.RUNNING),
     }
 )
-"""Changes of state after which an earlier error message no longer applies."""
+"""Changes of the engine's state after which an earlier error message no longer applies."""
 
 
 def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:

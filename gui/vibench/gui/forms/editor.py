@@ -81,7 +81,7 @@ class Choice(QComboBox):
         self.setMinimumContentsLength(self.LETTERS)
 
     def replace_items(self, items: Iterable[str], chosen: str = "") -> None:
-        """Replace the entries without emitting a signal, and choose one; by default the first."""
+        """Replace the entries and choose one, by default the first, without emitting a signal."""
         with QSignalBlocker(self):
             self.clear()
             self.addItems(list(items))
@@ -95,7 +95,7 @@ class Choice(QComboBox):
             super().keyPressEvent(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the box, then its border."""
+        """Draw the combo box, then its border."""
         super().paintEvent(event)
         draw_edge(self)
 
@@ -113,7 +113,7 @@ class _LineOnEach(QStyledItemDelegate):
     def initStyleOption(
         self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> None:
-        """Add the description."""
+        """Add the description to the data for drawing the entry."""
         super().initStyleOption(option, index)
         line = index.data(Qt.ItemDataRole.ToolTipRole)
         option.text = f"    {option.text}:  {line}" if line else option.text
@@ -143,7 +143,7 @@ class ChoiceEditor:
             self._box.setCurrentIndex(place)
 
     def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
-        """Group the values under headings; ``lines`` has heading and description for each value."""
+        """Group the choices under headings; ``lines`` has the heading and description of each choice."""
         blocked, chosen = self._box.blockSignals(True), self.content()
         self._box.clear()
         model = self._box.model()
@@ -227,7 +227,7 @@ class ListEditor:
         self._line.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
-        """Text shown last, and its values in full precision."""
+        """Text shown last, and its numbers in full precision."""
         self.widget = self._line
 
     @property
@@ -266,7 +266,7 @@ class ListEditor:
 
 
 def unwrap_optional(annotation: Any) -> tuple[Any, bool]:
-    """Return a type without ``Annotated`` and ``| None``, and whether it allowed None."""
+    """Return a field's type without ``Annotated`` and ``| None``, and whether it allowed None."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):

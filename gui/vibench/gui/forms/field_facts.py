@@ -43,7 +43,7 @@ class FieldFacts:
     """Allowed range, such as ``"above 0, at most 60 s"``; empty without limits."""
     explanation: str
     examples: tuple[str, ...] = ()
-    """Suggested texts; other texts may be typed."""
+    """Suggested texts; the user may also type other texts."""
 
     @property
     def shown_unit(self) -> str:
@@ -57,13 +57,13 @@ class FieldFacts:
 
     @property
     def tooltip(self) -> str:
-        """Explanation and limits."""
+        """Explanation of the field, followed by its limits."""
         limits = f"Allowed: {self.limits}" if self.limits else ""
         return "\n".join(part for part in (UNITS.convert(self.explanation), limits) if part)
 
     @property
     def label_with_unit(self) -> str:
-        """Label with unit, with which a complaint begins."""
+        """Label with unit, as it stands at the beginning of a complaint about the field."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Return the limits as text; a unit that can be chosen follows each one, other units only the last."""
+    """Return the limits as text; a unit that users can choose follows each number, others only the last."""
     each = f" {unit}" if unit in CHOICES else ""
     texts = ", ".join(_limit_texts(field, each))
     return texts if each or not texts else f"{texts} {unit}".strip()

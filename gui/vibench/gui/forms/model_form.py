@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return the model's complaints by field, without those that only follow from another complaint."""
+    """Return the model's complaints by field, without those that are consequences of another complaint."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -77,7 +77,7 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Return the content as in a file; leave out empty fields, unless empty differs from the default."""
+        """Return the content as in a file; leave out empty fields whose default is also empty."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         values = {
             name: value
@@ -121,7 +121,7 @@ class ModelForm(QWidget):
 
     @property
     def is_read(self) -> bool:
-        """Whether all typed texts can be read, here and in inner forms."""
+        """Whether all texts typed into this form and its inner forms can be read."""
         return all(
             row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
             for row in self._rows.values()
@@ -160,7 +160,7 @@ class ModelForm(QWidget):
 
 
 class GroupEditor:
-    """Editor of an inner model, which may have several kinds."""
+    """Editor of an inner model; the user chooses its kind if there are several."""
 
     def __init__(
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
@@ -184,7 +184,7 @@ class GroupEditor:
 
     @property
     def kind_choice(self) -> Choice | None:
-        """Combo box for the kind; None if there is only one kind."""
+        """Combo box in which the user chooses the kind; None if there is only one kind."""
         return None if self._kind is None else self._kind.widget
 
     @property
@@ -213,7 +213,7 @@ class GroupEditor:
         fresh: Mapping[str, Mapping[str, Any]],
         lines: Mapping[str, tuple[str, str]],
     ) -> None:
-        """Set the values with which a newly chosen kind starts, and describe the kinds in the list.
+        """Set the initial values of a newly chosen kind, and describe the kinds in the list.
 
         ``usual`` fills empty fields of every kind. ``fresh`` has values by kind, which replace those typed
         for another kind. ``lines`` has the heading and the description of each kind.
@@ -278,7 +278,7 @@ class OptionalGroupEditor(GroupEditor):
 
 
 _DRAWN = frozenset({"excited_lines", "detection_lines"})
-"""Fields that the plan fills with random numbers; another kind does not take them over."""
+"""Fields that a plan fills with random numbers; changing the kind of excitation drops their values."""
 
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
@@ -363,7 +363,7 @@ class ValidatedForm(QWidget, Generic[Model]):
         return self._warning.text()
 
     def show_value(self, value: Model) -> None:
-        """Show another value."""
+        """Replace the displayed value."""
         self.form.show_content(value.model_dump(mode="json"))
 
     def _take(self) -> None:

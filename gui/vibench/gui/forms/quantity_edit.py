@@ -87,22 +87,22 @@ def _short(text: str) -> str:
 
 
 def _scale(number: str, prefix: str) -> float:
-    """Shift the decimal point in the text, so that 45 µm is exactly 45e-6."""
+    """Multiply a number's text by a power of ten; text arithmetic makes 45 µm exactly 45e-6."""
     mantissa, _, exponent = number.lower().partition("e")
     return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
 
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""SI value from which on a quantity is shown without a unit prefix."""
+"""Absolute SI value at and above which a quantity is shown without a unit prefix."""
 _DIGITS = 6
 """Number of displayed digits of a long number; the stored value keeps all."""
 MOST_WHOLE = 1 << 53
 """Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0
-"""Factor of change above which the user must confirm a value, because the unit is often wrong."""
+"""Factor of change above which the user must confirm a new value, because the unit is often wrong."""
 STEP = 0.05
-"""Relative change per step of the arrow keys; such steps never reach zero."""
+"""Relative change of the value per step of the arrow keys; such steps never reach zero."""
 
 
 class QuantityEdit(QAbstractSpinBox):
@@ -121,7 +121,7 @@ class QuantityEdit(QAbstractSpinBox):
         self.complaint = ""
         """Why the typed text cannot be read; empty if it can."""
         self._value_to_confirm: float | int | None = None
-        """Value that a second Return will confirm; None if there is none."""
+        """Value that becomes valid when the user presses Return again; None if there is none."""
         self._is_confirmed = False
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -147,7 +147,7 @@ class QuantityEdit(QAbstractSpinBox):
         self.set_value(None)
 
     def stepBy(self, steps: int) -> None:
-        """Change by five per cent per step, or by one for integers."""
+        """Change the value by five per cent per step, or by one for integers."""
         self._take()
         if self._value is None:
             return
@@ -179,7 +179,7 @@ class QuantityEdit(QAbstractSpinBox):
             event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Take a second Return as confirmation; leaving the field does not confirm."""
+        """Take a second Return as confirmation of the value; leaving the field does not confirm it."""
         self._is_confirmed = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
         super().keyPressEvent(event)
         self._is_confirmed = False

@@ -47,7 +47,7 @@ class Settings:
 
     @property
     def complaint(self) -> str:
-        """Message that the file cannot be written; empty if it can."""
+        """Error message if the settings file cannot be written; empty if it can."""
         self._store.sync()
         if self._store.status() is QSettings.Status.NoError:
             return ""
@@ -62,7 +62,7 @@ class Settings:
         return value if isinstance(value, str) and value else otherwise
 
     def number(self, key: SettingKey, otherwise: float, low: float, high: float) -> float:
-        """Return a stored number, limited to ``low`` and ``high``; ``otherwise`` if none is valid."""
+        """Return a stored number, limited to ``low`` and ``high``; ``otherwise`` if none is stored."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:
@@ -108,7 +108,7 @@ class Selection(QObject):
         """Test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
         self.prediction: MeasurementPrediction | None = None
-        """Predicted response of the specimen to this test; None until it is computed."""
+        """Predicted response of the specimen to the current test; None until it is computed."""
 
     def choose_rig(self, rig: Rig | None) -> None:
         """Select another rig."""
@@ -139,10 +139,10 @@ class AppContext(QObject):
     """Services of every page; pages refer to each other by name only."""
 
     folder_chosen = Signal(object)
-    """Folder of new recordings, after it was changed."""
+    """Emitted with the folder of new recordings after the user has changed it."""
     noticed = Signal(object)
     page_requested = Signal(str)
-    """Name of the page to show."""
+    """Emitted with the name of the page to show."""
     recording_requested = Signal(object)
     """Path of a recording to open on the Files page."""
     recording_made = Signal(object)
@@ -170,18 +170,18 @@ class AppContext(QObject):
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
-        """Worker for previews, which must not wait behind long jobs."""
+        """Worker process for previews, which must not wait behind long jobs."""
         UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
 
     def choose_theme(self, theme: Theme) -> None:
-        """Change the colours and store the choice."""
+        """Change the colour theme and store the choice."""
         self.theme = theme
         self.settings.keep_text(SettingKey.THEME, theme.name)
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
-        """Change the displayed unit of each quantity, keyed by its SI unit, and store the choice."""
+        """Change the displayed units and store the choice; ``chosen`` has the displayed unit by SI unit."""
         UNITS.choose(chosen)
         self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen.values()))
 

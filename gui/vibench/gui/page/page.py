@@ -76,7 +76,7 @@ class DisplayedResult:
 
     @property
     def is_current(self) -> bool:
-        """Whether the result is up to date, absent, or marked as outdated."""
+        """Whether the page is consistent: the result is up to date, absent, or marked as outdated."""
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
 
@@ -84,7 +84,7 @@ class Themed(Protocol):
     """A part of a page that draws with the theme's colours."""
 
     def retheme(self, theme: Theme) -> None:
-        """Change the colours."""
+        """Change the colours to those of a theme."""
 
 
 class Page(QWidget):
@@ -127,7 +127,7 @@ class Page(QWidget):
                 cast(Themed, part).retheme(theme)
 
     def enter(self) -> None:
-        """Prepare the page to be shown."""
+        """Prepare the page before the window shows it."""
 
     def left(self) -> None:
         """Store the user's input; called when another page is shown or the window closes."""
@@ -143,7 +143,7 @@ class PageParts(QSplitter):
         self.setChildrenCollapsible(False)
 
     def show_parts(self, first: QWidget, second: QWidget, sizes: tuple[int, int] = (0, 0)) -> None:
-        """Add the parts with the user's last sizes, or with ``sizes``; zeros mean natural sizes."""
+        """Add the two parts with the user's last sizes, or with ``sizes``; zeros mean natural sizes."""
         self.addWidget(first)
         self.addWidget(second)
         if any(sizes):
@@ -181,7 +181,7 @@ class SideAndPicture(PageParts):
     """
 
     WIDEST_SIDE = 0.55
-    """Largest default share of the page's width for the left part."""
+    """Largest width of the left part over the page's width, unless the user moves the divider."""
 
     def __init__(
         self,
@@ -199,7 +199,7 @@ class SideAndPicture(PageParts):
         self.show_parts(column(title_of(page), (self.side, 1), *feet), pictures)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Set the left part to its natural width, unless the user has moved the divider."""
+        """Give the left part its natural width, unless the user has moved the divider."""
         super().resizeEvent(event)
         self._divide()
 
@@ -221,7 +221,7 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """Undo history: states of a plan and the current position; ``show`` displays a state."""
+    """Undo history: earlier and later states of a plan; ``show`` displays one of them on the page."""
 
     def __init__(self, show: Callable[[State], None]) -> None:
         self._show = show
@@ -229,18 +229,18 @@ class History(Generic[State]):
         self._now = -1
 
     def note(self, state: State) -> None:
-        """Append a state; states that were undone are discarded."""
+        """Append a state of the plan; states that the user has undone are discarded."""
         if self._states and self._states[self._now] == state:
             return
         self._states = [*self._states[: self._now + 1], state][-MOST_KEPT:]
         self._now = len(self._states) - 1
 
     def undo(self) -> None:
-        """Show the previous state, if there is one."""
+        """Show the previous state of the plan, if there is one."""
         self._go(-1)
 
     def redo(self) -> None:
-        """Show the next state, if there is one."""
+        """Show the next state of the plan, if there is one."""
         self._go(1)
 
     def _go(self, step: int) -> None:

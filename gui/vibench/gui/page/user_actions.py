@@ -102,7 +102,7 @@ class UserActions(QObject):
             self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
 
     def _may(self, verb: str, *states: EngineState) -> bool:
-        """Return whether a command is possible now; if not, warn before the engine reports an error."""
+        """Return whether a command is possible in the engine's state; if not, warn the user."""
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._context.warn(

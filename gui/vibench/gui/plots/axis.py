@@ -33,7 +33,7 @@ class Scale(Enum):
 
 
 class Blankness(Enum):
-    """Whether an axis shows numbers."""
+    """Whether the numbers of an axis are shown."""
 
     WRITTEN = auto()
     BLANK = auto()
@@ -75,11 +75,11 @@ FREQUENCY = PlotAxis("Frequency", "Hz")
 LOG_FREQUENCY = PlotAxis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
 TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
-"""Smallest distance between labels on a vertical axis, in font heights."""
+"""Smallest distance between numbers on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Spacing that tells `tickStrings` that these ticks have no number."""
+"""Special tick spacing by which `tickStrings` recognises ticks without a number."""
 _WIDE = "2000"
-"""Text as wide as the widest label on a logarithmic horizontal axis, with margins."""
+"""Text as wide as the widest number on a logarithmic horizontal axis, with margins."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
@@ -128,7 +128,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Hide numbers and label, because the plot below shows them for both."""
+        """Hide numbers and label; the plot below shows them for both plots."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
@@ -203,7 +203,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
     """Return a larger step and the ticks at its multiples, of which there are at most ``most``.
 
-    A scale needs two numbers. If fewer are left, return the outermost two ticks of the step before.
+    An axis needs two numbers. If fewer are left, return the two outermost ticks of the smaller step.
     """
     wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):
@@ -234,7 +234,7 @@ def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]
 
 
 def _even(low: float, high: float) -> list[float]:
-    """Return the logarithms of evenly spaced round numbers."""
+    """Return the decimal logarithms of evenly spaced round numbers in a range."""
     rough = (high - low) / 6
     decade = 10 ** floor(log10(rough))
     step = next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough)

@@ -53,7 +53,7 @@ SIGNS = {
     Dash.LONG: "━━ ━━",
 }
 _LONG = [9.0, 4.0]
-"""Lengths of dashes and gaps of `Dash.LONG`, in line widths."""
+"""Alternating lengths of dashes and gaps of `Dash.LONG`, in line widths."""
 
 
 def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
@@ -136,7 +136,7 @@ class Band:
         self.item.setData(np.concatenate((x[there], x[back])), np.concatenate((below[there], above[back])))
 
     def at(self, across: float) -> tuple[float, float] | None:
-        """Return the bounds at the point nearest to ``across``; None if they are not finite."""
+        """Return the bounds at the horizontal coordinate nearest to ``across``; None if not finite."""
         x, below, above = self._edges
         if x.size == 0:
             return None

@@ -31,7 +31,7 @@ class Markers(QObject):
         return tuple(sorted(self._values)) if self._are_shown else ()
 
     def draw_in(self, plots: Iterable[Plot]) -> None:
-        """Draw the markers in these plots, after their earlier lines were removed."""
+        """Draw the markers in these plots, and remove the lines in earlier plots."""
         self._plots = tuple(plots)
         self.lines = [[plot.upright(_MARKER, value) for plot in self._plots] for value in self._values]
         for number, lines in enumerate(self.lines):
@@ -51,7 +51,7 @@ class Markers(QObject):
         self._place()
 
     def put(self, number: int, value: float) -> None:
-        """Move a marker."""
+        """Move one marker to a value in all plots."""
         self._values[number] = value
         self._place()
 

@@ -22,9 +22,9 @@ from .reading import Reading
 from .upright_marks import Rules, Stripes
 
 ROOM = 0.15
-"""Empty margin at both ends when the range of an axis is set, over the range of the data."""
+"""Margin at both ends when an axis is fitted to the data, over the range of the data."""
 LEAST_USED = 0.5
-"""Share of the axis that the data must fill; otherwise the range is reduced."""
+"""Smallest share of an axis that its data may fill before the axis range is reduced."""
 
 Range = tuple[float, float]
 
@@ -143,7 +143,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """All lines and sets of points, with their names for the legend; a name may be empty."""
         self.bands: list[Band] = []
         self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
-        """Function that returns more text for the cursor reading at a point."""
+        """Function that returns additional text for the cursor reading at a point of the plot."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self.theme = theme
@@ -295,7 +295,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def keep_in_view(
         self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
     ) -> None:
-        """Set the ranges to these extremes if necessary; redrawing an axis takes long."""
+        """Fit the axes to the data's extremes, but only if necessary, because redrawing an axis is slow."""
         if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
             return
         self._follows = True
@@ -350,7 +350,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         event.ignore()
 
     def leaveEvent(self, event: QEvent) -> None:
-        """Hide the reading."""
+        """Hide the cursor reading."""
         super().leaveEvent(event)
         # Keep the reading while a context menu is open, because its actions use the position.
         if QApplication.activePopupWidget() is None:
@@ -405,7 +405,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self._holds_points or any(getattr(each, "image", None) is not None for each in items)
 
     def _look_for_points(self, *_: object) -> None:
-        """Look whether any curve has points; if not, show the hint and hide the numbers.
+        """If no curve has points, show the hint and hide the numbers of the axes.
 
         Call this before painting, because a change during painting would cause another painting.
         """
@@ -414,7 +414,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _show_units(self) -> None:
-        """Show names and reading in other units, unless the plot is closed."""
+        """Show axis labels and cursor reading in the chosen units, unless the plot is closed."""
         if self.plotItem is not None:
             self._relegend()
             self.reading.again()

@@ -33,7 +33,7 @@ class Reading:
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None
         self.place: tuple[float, float] | None = None
-        """Values at the crosshair; None while it is hidden."""
+        """Values (x, y) at the crosshair; None while the crosshair is hidden."""
 
     @property
     def text(self) -> str:
@@ -48,7 +48,7 @@ class Reading:
             line.setPen(pg.mkPen(theme.accent, style=Qt.PenStyle.DashLine))
 
     def follow(self, place: QPointF) -> None:
-        """Read at the pointer, given in the scene; hide the crosshair outside the axes or while dragging."""
+        """Show the reading at the pointer's scene position; hide it outside the axes or during dragging."""
         box = self._plot.getViewBox()
         is_pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
         if box.sceneBoundingRect().contains(place) and not is_pressed:
@@ -57,7 +57,7 @@ class Reading:
             self.hide()
 
     def show_at(self, point: QPointF) -> None:
-        """Read at a point given in the coordinates of the axes."""
+        """Show the reading at a point, given in axis coordinates (logarithms on a logarithmic axis)."""
         self._at = point
         drawn, scales = (point.x(), point.y()), self._plot.scales
         for line, at in zip(self._create_lines()[:2], drawn, strict=True):
@@ -84,7 +84,7 @@ class Reading:
         self._show_text("   ".join(parts))
 
     def again(self) -> None:
-        """Read again, after the curves have changed."""
+        """Update the reading after the curves have changed."""
         if self.place is not None:
             self.show_at(self._at)
 
@@ -103,7 +103,7 @@ class Reading:
         self._place_marks()
 
     def rescale(self) -> None:
-        """Move the mark to its values again, after a change of the scale."""
+        """Draw the mark at its values again, after the axis has changed between linear and logarithmic."""
         self.hide()
         self._place_marks()
 
@@ -116,7 +116,7 @@ class Reading:
                 line.hide()
 
     def forget(self) -> None:
-        """Hide the reading, and drop the lines, which the plot has deleted."""
+        """Hide the reading, and forget the crosshair lines that the plot has deleted."""
         self.hide()
         self._lines, self._marked = (), None
 

@@ -59,7 +59,7 @@ class SignalCurve:
 
 
 SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
-"""Item role for the length of the bar; 1 is the whole width."""
+"""Item role under which a table cell stores the length of its bar; 1 is the cell's whole width."""
 OVER = "#b3261e"
 NEAR = "#a06a00"
 WELL = "#00694d"

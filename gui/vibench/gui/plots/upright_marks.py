@@ -24,7 +24,7 @@ class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         self.setZValue(_BEHIND)
 
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
-        """Switch to pixels; return the visible rectangle, and scale and shift from values to columns."""
+        """Let the painter draw in pixels; return the visible rectangle, and scale and shift to columns."""
         to_pixels = painter.transform()
         visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
@@ -51,7 +51,7 @@ class Stripes(_UprightMarks):
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Fill every pixel column that has a stripe once, so that overlaps are not darker."""
+        """Fill every pixel column that has a stripe exactly once, so that overlaps are not darker."""
         visible, scale, shift = self._begin(painter)
         width = max(1, round(visible.width()))
         edges = np.clip(np.floor(self._bands * scale + shift - visible.left()), -1, width).astype(int)

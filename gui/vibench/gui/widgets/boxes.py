@@ -34,7 +34,7 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""Widget or layout, alone or with its share of the free space; a number alone is an empty share."""
+"""Widget or layout, alone or with its stretch factor; a number alone is empty space that stretches."""
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
@@ -182,7 +182,7 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 
 _WIDEST = 0.8
-"""Largest width of a hint, over the width of its area."""
+"""Largest width of a hint's text, over the width of the empty area."""
 
 
 def hint_in_list(view: QAbstractItemView, text: str) -> None:
@@ -252,7 +252,7 @@ class ElidedLabel(QLabel):
 
 
 LEAST_S = 1.0
-"""Elapsed time from which on the remaining time is estimated [s]."""
+"""Elapsed time after which a progress bar begins to estimate the remaining time [s]."""
 
 
 class ProgressBar(QProgressBar):
@@ -265,7 +265,7 @@ class ProgressBar(QProgressBar):
         self.show_share(0.0, text)
 
     def show_share(self, share: float, text: str) -> None:
-        """Show the finished share, 0 to 1 (more counts as 1), with a text."""
+        """Show the finished share of the work, 0 to 1 (larger values count as 1), with a text."""
         self.setValue(round(1000 * min(1.0, share)))
         self.setFormat(text)
 
@@ -289,7 +289,7 @@ class TimedBar(ProgressBar):
         self.show_done(0, 0)
 
     def begin(self) -> None:
-        """Restart the clock."""
+        """Restart the measurement of the elapsed time."""
         self._begun_s = monotonic()
 
     def show_done(self, done: int, total: int) -> None:

@@ -25,9 +25,9 @@ class Notice:
     done: str = ""
     """What was done about it."""
     next_step: str = ""
-    """What the user should do next."""
+    """Advice to the user on what to do next."""
     code: str = ""
-    """Error class, to search for in the documentation."""
+    """Name of the error class, for which the user can search in the documentation."""
     details: str = ""
 
     @property

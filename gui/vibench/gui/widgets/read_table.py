@@ -58,7 +58,7 @@ def _offered(table: QTableView, text: str, clipboard_text: Callable[[], str]) ->
 
 
 _WIDEST_LETTERS = 36
-"""Largest width of the columns that fit their content, in letters; longer text is wrapped."""
+"""Largest width of a column that fits its content, in letters; longer text is wrapped."""
 _LEAST_LETTERS = 14
 """Smallest width of the wide column, in letters; if there is less space, the table scrolls."""
 _ROW_ROOM = 8

@@ -13,7 +13,7 @@ Colour = str
 
 
 class Tone(StrEnum):
-    """Importance of a state, shown by a colour and also by a word or a symbol."""
+    """Importance of a state or message; it selects the colour."""
 
     CALM = "calm"
     GOOD = "good"

@@ -21,7 +21,7 @@ from .boxes import plain_lines, plain_tip
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
-"""Choice that shows displacements in µm on axes, elsewhere with a prefix that suits the value."""
+"""Name of the choice that shows displacements in µm on axes, and elsewhere with a suitable prefix."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "m": (AUTOMATIC, "µm", "mm", "m"),
     "m/s": ("mm/s", "m/s"),
@@ -29,7 +29,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
 }
 """Units that the user can choose, by SI unit; the first is the default."""
 POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}
-"""Powers of ten by prefix; three characters are used for "micro"."""
+"""Powers of ten by unit prefix; three different characters stand for "micro"."""
 _FITTED = ("p", "n", "µ", "m", "", "k", "M")
 PREFIXED = frozenset({"m", "V", "Vpp", "s", "A", "N", "Hz", "W"})
 """Units that get a prefix for small and large values."""
@@ -70,7 +70,7 @@ def plain_unit(unit: str) -> str:
 
 
 def prefixed_unit(unit: str, value: float) -> ShownUnit:
-    """Return a unit with the prefix that suits the value, whatever unit the user has chosen."""
+    """Return an SI unit with the prefix that suits the value, regardless of the user's choice."""
     si = plain_unit(unit)
     is_plain = si not in PREFIXED or value == 0.0 or _PLAIN_FROM <= abs(value) < _PLAIN_TO
     place = 0 if is_plain else floor(log10(abs(value)) / 3)
@@ -166,7 +166,7 @@ def _with_breaks(word: re.Match[str]) -> str:
 
 
 UNITS = DisplayUnits()
-"""The units of the whole program; all pages show the same unit."""
+"""The displayed units of the whole program; all pages use the same ones."""
 
 
 class SentenceLabel(QLabel):

@@ -18,7 +18,7 @@ from ..widgets.units import SentenceLabel
 
 
 class StatusField(StrEnum):
-    """Field of the status line, from left to right."""
+    """Fields of the status line, from left to right."""
 
     RIG = "rig"
     OVERRUNS = "overruns"
@@ -71,7 +71,7 @@ class StatusLine(QFrame):
     def show_fields(
         self, texts: Mapping[StatusField, str], marked: frozenset[StatusField] = frozenset()
     ) -> None:
-        """Show a text in each field; ``marked`` fields need attention."""
+        """Show a text in each field of the status line; ``marked`` are the fields that need attention."""
         for field, label in self.labels.items():
             text = texts.get(field, "")
             tone = Tone.CAUTION.value if field in marked else ""
@@ -91,7 +91,7 @@ class StateIndicator:
     word: str
     tone: Tone
     detail: str = ""
-    """Text that changes while the state lasts, such as elapsed time and level."""
+    """Text that changes during the state, such as elapsed time and drive level."""
     is_ramping: bool = False
     """Whether the drive is already ramping down, so that STOP can only shorten the ramp."""
 
@@ -197,7 +197,7 @@ ORDERED = "Limits, folder and instruments are being checked"
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a state
-    """Return the indicator for the engine's state; ``is_ordering``: a command is still running."""
+    """Return the indicator for the engine's state; ``is_ordering`` is True while a command is running."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):

@@ -13,7 +13,7 @@ from vibench.sim.operating_system.this import read_at
 
 EVERY_MS = 20
 BOUND_S = 0.1
-"""Delay from which on users notice it; longer delays are logged [s]."""
+"""Delay of the event loop that users notice [s]; longer delays are logged."""
 SPAN_S = 10.0
 """Period for which the longest delay is reported [s]."""
 MOST_NOTED = 20
@@ -104,7 +104,7 @@ class EventLoopMonitor(QObject):
             self._noted.append(Wait(own_s, busy_s, datetime.now().astimezone(), self._about()))
 
     def _clocks(self) -> tuple[float, float, float]:
-        """Return time, processor time of this thread, and its time of waiting for a processor [s]."""
+        """Return clock time, and this thread's processor time and time of waiting for a processor [s]."""
         return monotonic(), thread_time(), self._delays.read_s()
 
     def _forget(self) -> None:
@@ -123,13 +123,13 @@ class _Delays:
             self._file = -1
 
     def read_s(self) -> float:
-        """Return this waiting time since the start of the thread [s]."""
+        """Return how long this thread has waited for a processor since its start [s]."""
         if self._file < 0:
             return 0.0
         return 1e-9 * int(read_at(self._file, 100, 0).split()[1])
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the operating system's file with the waiting time."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

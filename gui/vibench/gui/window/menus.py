@@ -116,7 +116,7 @@ class SettingsDialog(QDialog):
 
 
 LONGEST_S = 60
-"""Longest time that collecting the versions may take [s]."""
+"""Time limit for collecting the versions of this installation [s]."""
 
 
 class Reader(QDialog):
@@ -206,7 +206,7 @@ class AbortKey(QObject):
         application.installEventFilter(self)
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Emit `pressed` for an abort key; let every event pass."""
+        """Emit `pressed` for an abort key; pass every event on to its widget."""
         kind = event.type()
         if kind is QEvent.Type.KeyRelease:
             self._last_seen = None
@@ -217,7 +217,7 @@ class AbortKey(QObject):
         return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
-        """Return whether this is another key press; Qt delivers one press several times."""
+        """Return whether an event is a new key press; Qt delivers the same press several times."""
         seen = (event.timestamp(), event.key())
         is_new = seen != self._last_seen
         self._last_seen = seen
@@ -226,7 +226,7 @@ class AbortKey(QObject):
 
 @dataclass(frozen=True)
 class MenuAction:
-    """Menu entry: its menu, its key, and what the list of keys says about it."""
+    """Menu entry: its menu, its key, and its description in the list of keys."""
 
     menu: str
     text: str
@@ -334,7 +334,7 @@ def _open(window: "Window") -> None:
 
 
 def choose_folder(parent: QWidget, context: AppContext) -> None:
-    """Ask for the folder of new recordings."""
+    """Ask the user for the folder of new recordings."""
     chosen = QFileDialog.getExistingDirectory(parent, "Folder for recordings", str(context.folder))
     if chosen:
         context.choose_folder(Path(chosen))

@@ -43,7 +43,7 @@ def _font() -> QFont:
 
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
-    """Show the window until it is closed; return the exit code. ``starting`` is closed when it is shown."""
+    """Show the window until it is closed; return the exit code. ``starting``, a label, is then closed."""
     app = application(["vibench"])
     stored = Settings(settings or default_settings_path())
     context = AppContext(stored)

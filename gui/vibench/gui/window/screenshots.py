@@ -46,7 +46,7 @@ SHOWN = Measurement(
         amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, settle_s=0.5, hold=Hold.DISPLACEMENT
     ),
 )
-"""The paper's sweep through the range with impacts, ten times as fast."""
+"""The paper's sine sweep through the frequency range with impacts, ten times as fast."""
 SHOWN_AT_S = 17.0
 SHOWN_TOO = Measurement(
     name="dwell",
@@ -59,7 +59,7 @@ MAP = {"columns": 61, "rows": 41}
 MOTION = (300.0, 20e-6)
 """Frequency [Hz] and amplitude [m] of the motion shown beside the map."""
 BRANCHES = {"start": 88.0, "stop": 101.0, "places": 3}
-"""Search for branches: frequency range [Hz] around the first resonance, and number of frequencies."""
+"""Frequency range [Hz] of the search for branches, and its number of frequencies."""
 CHAIN = {"start_hz": 200.0, "stop_hz": 220.0, "step_hz": 10.0, "duration_s": 1.0, "settle_s": 1.0}
 
 
@@ -107,7 +107,7 @@ def _open_and_check(window: Window) -> None:
 
 
 def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
-    """Arm and start a measurement; call ``during`` once the masses collide."""
+    """Arm and start a measurement; call ``during`` as soon as the masses collide."""
     bridge, test = window.context.bridge, window.pages[TEST]
     assert isinstance(test, TestPage)
     test.form.show_value(measurement)
@@ -127,7 +127,7 @@ def _elapsed_s(window: Window) -> float:
 
 
 def _fill(window: Window) -> None:
-    """Simulate and map the default scenes, overlay them on the measurement, and open a campaign."""
+    """Simulate and map the default scenes, overlay the simulation on the measurement, open a campaign."""
     compare, simulation, queue, maps = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE, MAPS))
     assert isinstance(compare, ComparePage)
     assert isinstance(simulation, SimulatePage)

@@ -96,7 +96,7 @@ class NavigationBar(QListWidget):
         return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
 
     def choose(self, name: str) -> None:
-        """Select the page ``name``, which is shown already."""
+        """Select the page ``name`` in the list, because the window already shows it."""
         self.setCurrentRow(self._names.index(name))
 
     def show_done(self, done: dict[str, bool]) -> None:
@@ -136,7 +136,7 @@ SPAN_S = 1.0
 MOST_DROPPED = 20
 """Largest number of files that are opened when dropped together."""
 TICK_MS = 50
-"""Interval between updates [ms]; a shorter one would use a whole core, a longer one looks jerky."""
+"""Interval between updates of the window [ms]; shorter would use a whole core, longer looks jerky."""
 
 
 class Window(QMainWindow):
@@ -177,7 +177,7 @@ class Window(QMainWindow):
         return page
 
     def show_page(self, name: str) -> None:
-        """Show the page ``name`` and store the choice."""
+        """Show the page ``name``, and store it as the page to open next time."""
         page = self.pages.get(name)
         if page is None or page is self._stack.currentWidget():
             return
@@ -332,7 +332,7 @@ class Window(QMainWindow):
             in_next_pass(self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Focus the next step on the visible page, because otherwise STOP would have the focus."""
+        """Focus the button for the next step on the visible page; otherwise STOP would have the focus."""
         super().showEvent(event)
         self.navigation.setFocus()
         self.page.enter()

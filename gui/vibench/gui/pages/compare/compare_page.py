@@ -43,7 +43,7 @@ def export_comparison(
 
 
 class AnalysisPanel(QGroupBox):
-    """Analysis options, the button that applies them, and the progress bar."""
+    """Box with the analysis options, the button that applies them, and the progress bar."""
 
     wanted = Signal()
     """Request to analyse all recordings again with the current options."""
@@ -69,7 +69,7 @@ class AnalysisPanel(QGroupBox):
         return self.form.value
 
     def show_progress(self, done: int, total: int) -> None:
-        """Show how many recordings are analysed; when all are, hide the bar."""
+        """Show how many recordings have been analysed; hide the bar once all have been."""
         self._bar.show_done(done, total)
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < total)

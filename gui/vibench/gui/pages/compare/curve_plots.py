@@ -112,7 +112,7 @@ class NumberTable(ReadTable):
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
     def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-        """Show these columns and rows instead of the present ones."""
+        """Replace the displayed columns and rows."""
         self.setColumnCount(len(headings))
         self.setHorizontalHeaderLabels(list(headings))
         self.show_rows(rows)
@@ -170,9 +170,9 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Dash patterns by origin of a curve: first for transmissibility and Response I, second for Response II."""
+"""Dash patterns by origin of a curve, in the order: transmissibility or Response I, then Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Curves that are ticked at first. Response II is not, because without contact it equals Response I."""
+"""Kinds of curves that are visible at first; Response II is not, as it equals I without contact."""
 _SWATCH = (28, 12)
 
 
@@ -218,7 +218,7 @@ class CurveList(QListWidget):
         return curve_style(sources.index(curve.source), dash)
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
-        """Replace the curves of a source by new ones."""
+        """Replace the curves of one recording or prediction by new curves."""
         ticked = {each.name for each, _ in self.ticked()}
         known = {each.name for each in self._curves}
         others = [each for each in self._curves if not _is_of(each, source)]
@@ -245,7 +245,7 @@ class CurveList(QListWidget):
                 self.item(row).setCheckState(state)
 
     def retheme(self, theme: Theme) -> None:
-        """Redraw the samples of the line styles in other colours."""
+        """Redraw the line samples of all curves in the colours of another theme."""
         self._theme = theme
         with QSignalBlocker(self):
             for row, each in enumerate(self._curves):
@@ -303,7 +303,7 @@ _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """Choice of a curve and its reference; at first the second and the first visible curve."""
+    """Two lists to choose a curve and its reference; by default the second and the first visible curve."""
 
     changed = Signal()
 
@@ -321,11 +321,11 @@ class PairBox(QGroupBox):
 
     @property
     def summary(self) -> str:
-        """The difference in words, or why there is none."""
+        """The difference of the two curves in words, or why there is none."""
         return self._summary.text()
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
-        """Offer these curves; the selection is kept if possible."""
+        """Offer these curves for the choice; keep the selected ones if possible."""
         self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
@@ -341,7 +341,7 @@ class PairBox(QGroupBox):
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Return the difference and describe it in words; None if the curves cannot be compared."""
+        """Return the difference of the two curves and describe it; None if they cannot be compared."""
         pair = self.pair()
         self._summary.setText("")
         if pair is None:

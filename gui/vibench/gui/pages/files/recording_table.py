@@ -48,12 +48,12 @@ from ...widgets.theme import Theme
 Levels = dict[str, tuple[OverviewLevel, ...]]
 
 NOTE = "note"
-"""Name of the stored result that contains a note; further notes are numbered."""
+"""Name under which a recording stores a note of the user; further notes are numbered."""
 
 
 @dataclass(frozen=True)
 class ListedRecording:
-    """Row of the table."""
+    """One recording as a row of the table."""
 
     path: Path
     catalogue_entry: CatalogueEntry
@@ -82,9 +82,9 @@ class ListedCampaign:
 
     name: str
     states: tuple[JournalPointState, ...]
-    """State of each point."""
+    """State of each measurement of the campaign."""
     files: frozenset[Path]
-    """Recording of the last attempt at each point."""
+    """Recording of the last attempt at each measurement."""
 
     @property
     def text(self) -> str:
@@ -143,7 +143,7 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the plan's notes, then the later ones from oldest to newest; or an error text."""
+    """Return the plan's notes, then the notes added later, oldest first; an error text if unreadable."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     try:
@@ -175,7 +175,7 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 
 def state_text(state: str) -> str:
-    """Return symbol and word for a state, which can be read without colour."""
+    """Return symbol and word for a recording's state, which can be read without colour."""
     return f"{_symbol(state)} {state}"
 
 
@@ -250,7 +250,7 @@ class CampaignChoice(Choice):
         self.hide()
 
     def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
-        """Offer these campaigns; the selection is kept."""
+        """Offer these campaigns for the choice, and keep the selected one."""
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
@@ -280,7 +280,7 @@ THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
 Cell = tuple[str, str | float]
-"""Text of a cell, and the value by which it is sorted."""
+"""Text of a table cell, and the value by which its column is sorted."""
 
 
 class RecordingModel(QAbstractTableModel):
@@ -295,7 +295,7 @@ class RecordingModel(QAbstractTableModel):
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """Show another list; thumbnails of files in both lists are kept. The same list changes nothing."""
+        """Replace the list of recordings, keeping thumbnails of files in both; do nothing if it is equal."""
         if entries == self.entries:
             return
         self.beginResetModel()
@@ -373,7 +373,7 @@ class _ChosenRows(QSortFilterProxyModel):
     _only: frozenset[Path] | None = None
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show only the rows of these files; None shows all."""
+        """Show only the rows of these files; None shows all rows."""
         self.beginFilterChange()
         self._only = paths
         self.endFilterChange()
@@ -431,7 +431,7 @@ class RecordingTable(QTableView):
         self._sorted.setFilterFixedString(text)
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show only the rows of these files; None shows all."""
+        """Show only the rows of these files; None shows all rows."""
         self._sorted.show_only(paths)
 
     def chosen_paths(self) -> tuple[Path, ...]:
@@ -440,7 +440,7 @@ class RecordingTable(QTableView):
         return tuple(index.data(PATH_ROLE) for index in rows)
 
     def choose(self, *paths: Path) -> None:
-        """Select the rows of these files and no others; if there are none, nothing changes."""
+        """Select the rows of these files only; if none of them is listed, keep the selection."""
         indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
         wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
         if not wanted:

@@ -115,11 +115,11 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         self._erase(hint)
 
     def _request_for(self, recording: Recording, low_s: float, high_s: float) -> Request | str:
-        """Return the request for a time range [s], or text why there is none."""
+        """Return the request to compute a time range [s], or a text why it cannot be computed."""
         raise NotImplementedError
 
     def _draw(self, found: Found) -> None:
-        """Draw a result."""
+        """Draw a computed result."""
         raise NotImplementedError
 
     def _erase(self, hint: str) -> None:
@@ -195,18 +195,18 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Widths of the spectral lines that can be chosen [Hz]; None: by the length of the visible range."""
+"""Spacings of spectral lines that users can choose [Hz]; None: chosen from the visible time range."""
 _BAR_EM = 4
 """Width of the colour scale with its label, in font heights."""
 _SHOWN_DB = 80.0
-"""Range of the colours, from the strongest spectral line down [dB]."""
+"""Range of the colour scale below the strongest spectral line [dB]."""
 
 
 class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
     """Spectrogram: frequency over time; colours show the power spectral density in dB."""
 
     zoomed = Signal(float, float)
-    """Time range after a zoom with the mouse [s]."""
+    """Emitted with the time range [s] after a zoom with the mouse."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__("Spectrogram", background, recording_spectrogram)
@@ -336,7 +336,7 @@ class _Image:
         return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
 
     def show_picture(self, found: DensityPicture) -> None:
-        """Draw a spectrogram; the colours cover a fixed range below its strongest line."""
+        """Draw a spectrogram; its colours cover a fixed level range below the strongest spectral line."""
         bottom, top = map(self._plot.scales[1].drawn, found.frequency_hz)
         left, right = found.time_s
         self.item.setImage(found.decibel, autoLevels=False)

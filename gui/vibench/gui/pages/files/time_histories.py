@@ -27,9 +27,9 @@ SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
 """Largest number of plots kept for reuse; creating a plot takes ten times as long as drawing it."""
 _LABEL_AT = 0.1
-"""Height of segment names over the height of the plot; low, because the channel name is at the top."""
+"""Vertical position of segment names, over the plot's height; low, as the channel name is at the top."""
 _NAMED_SHARE = 0.08
-"""Shortest segment, over the length of the recording, whose name is drawn."""
+"""Shortest named segment: its length over the length of the recording."""
 
 
 @dataclass(eq=False)
@@ -61,7 +61,7 @@ class RecordingTimeHistories(PlotStack):
         self._history_of(channel)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
-        """Show a whole recording, or none."""
+        """Show a recording over its whole length; None clears the plots."""
         for history in self._histories:
             self._layout.removeWidget(history.plot)
             history.plot.hide()
@@ -138,7 +138,7 @@ class RecordingTimeHistories(PlotStack):
         event.accept()
 
     def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
-        """Return the plot of a channel; a plot of another recording is reused if possible."""
+        """Return a channel's plot; reuse a plot of an earlier recording if possible."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             up = PlotAxis("", plain_unit(channel.unit))

@@ -40,11 +40,11 @@ from ...widgets.units import SentenceLabel
 
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
-"""Style of marks on the map, whose colours do not depend on the theme."""
+"""Style of marked points and levels on the map; map colours do not depend on the theme."""
 HINT = "Kinds of motion over frequency and amplitude, drawn while computed. Click a point to see its motion."
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
-"""Quantile at which the colour scale ends; it begins at one minus this quantile."""
+"""Quantile of the values at which the colour scale ends; the scale begins at one minus this quantile."""
 
 
 class MapPlot(QWidget):
@@ -121,7 +121,7 @@ def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
 
 
 def _spread(values: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return RGBA colours of values, on a scale from a low to a high quantile."""
+    """Return RGBA colours of values; the colour scale spans a low to a high quantile of the values."""
     known = values[np.isfinite(values)]
     low, high = np.quantile(known, [1.0 - SHARPEST, SHARPEST]) if known.size else (0.0, 1.0)
     share = np.clip((values - low) / max(float(high - low), 1e-12), 0.0, 1.0)
@@ -162,13 +162,13 @@ class MotionView(QWidget):
         fill_box(QVBoxLayout(self), self.caption, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
-        """Clear the plots and show why."""
+        """Clear the plots and show the reason as text."""
         self.caption.setText(why)
         for curve in self.curves:
             curve.clear()
 
     def show_motion(self, motion: SettledMotion) -> None:
-        """Draw a motion."""
+        """Draw the motion at one point of the map."""
         self.caption.setText(motion.text)
         shown = motion.time_s <= SHOWN_PERIODS / motion.frequency_hz
         is_low = (motion.line_hz > 0.0) & (motion.line_hz < HIGHEST_MULTIPLE * motion.frequency_hz)
@@ -183,9 +183,9 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Height of the map, in thousandths of the page; the plots of the motion have the rest."""
+"""Height of the map in thousandths of the page's height; the motion's plots get the remaining height."""
 DIGITS = 5
-"""Significant digits of the ranges that a zoom writes into the form."""
+"""Significant digits of the parameter ranges that a zoom writes into the form."""
 
 
 class MapsPage(Page):
@@ -220,7 +220,7 @@ class MapsPage(Page):
 
     @property
     def summary(self) -> str:
-        """Text below the map."""
+        """Text below the map about the state of its computation."""
         return self._state.text()
 
     @property
@@ -366,4 +366,4 @@ def _legend_entry(name: str, colour: str) -> str:
 
 
 def _ignore(_error: BaseException) -> None:
-    """Ignore an error: noise and dwells have no level over frequency; Compare reports unreadable files."""
+    """Ignore that a file has no level over frequency (noise, dwell); Compare reports unreadable files."""

@@ -59,7 +59,7 @@ def with_sweep(
 
 
 def without(campaign: Campaign, number: int) -> Campaign | None:
-    """Return the campaign without one of its entries; None if no entry is left."""
+    """Return the campaign without one test or sweep; None if none is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -70,7 +70,7 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
 
 
 def move_up(campaign: Campaign, number: int) -> Campaign:
-    """Return the campaign with one entry moved up by one row; tests stay before sweeps."""
+    """Return the campaign with one test or sweep moved up by one row; tests stay before sweeps."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     kind, place = (
         (measurements, number) if number < len(measurements) else (sweeps, number - len(measurements))
@@ -167,20 +167,20 @@ def point_rows(
 
 @dataclass(frozen=True)
 class CampaignPreview:
-    """Summary of a campaign: entries, levels, existing recordings, duration and size."""
+    """Summary of a campaign: entries, drive levels, existing recordings, duration and file size."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     levels: Mapping[str, str]
-    """Level of each recording, as text."""
+    """Drive level of each recording, as text."""
     complete: frozenset[str]
-    """Recordings that are complete in the folder."""
+    """Names of the recordings that already exist, complete, in the folder."""
     duration_s: float
     size_bytes: float | None
     """Size of the files [bytes]; None without a rig, which defines the sample rate."""
 
 
 def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
-    """Return entries, levels, duration and size of a campaign, and which recordings exist in its folder."""
+    """Return a campaign's entries, drive levels, duration and size, and the recordings in its folder."""
     campaign, rig, folder = request
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))

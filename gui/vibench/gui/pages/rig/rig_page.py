@@ -87,7 +87,7 @@ class RigChoice(QWidget):
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
-        """Select a file, after adding it to the list if it is not in it."""
+        """Select a file in the list; add the file to the list if it is missing."""
         if path not in self._paths:
             self._add(path)
         row = self._paths.index(path)
@@ -178,7 +178,7 @@ def finding_name(finding: Finding) -> str:
 
 
 def measured_text(finding: Finding) -> str:
-    """Return the measured value with a unit prefix: ``"20 µV"`` for 1.997e-05 V."""
+    """Return a finding's measured value with a unit prefix: ``"20 µV"`` for 1.997e-05 V."""
     number = finding.number
     if number is None or not isfinite(number):
         return finding.value
@@ -190,7 +190,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Return the expected value, with advice what to do if the measured value differs."""
+    """Return a finding's expected value, with advice what to do if the measured value differs."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 
@@ -271,7 +271,7 @@ class RigPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens hardware configurations; while a bench is open, it refuses."""
+        """Function that opens hardware configurations, or shows a message while a bench is open."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:

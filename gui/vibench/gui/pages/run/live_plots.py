@@ -23,7 +23,7 @@ from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
 
 Curves = Mapping[str, pg.PlotDataItem]
-"""Curves, by the name of the field of a result that each curve shows."""
+"""Curves of the plot, keyed by the result's field that each curve shows."""
 
 
 def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
@@ -118,9 +118,9 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""Time axis. It does not scroll, because a scrolling axis would be repainted in every frame."""
+"""Common time axis; it stands still, because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Limits of the number of columns in which a signal is drawn; one per pixel leaves no gap."""
+"""Smallest and largest number of columns in which a signal is drawn; one per pixel leaves no gap."""
 UP_EM = 4.0
 USUAL_SPAN_S = 2.0
 """Time range shown when the window opens [s]."""
@@ -215,7 +215,7 @@ class TransmissibilityPlot(QWidget):
         fill_box(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw the current estimates."""
+        """Draw the current estimates of transmissibility and coherence."""
         found = view.frequency_response()
         if found is None:
             return
@@ -224,7 +224,7 @@ class TransmissibilityPlot(QWidget):
         self._coherence.setData(found.frequency_hz, found.coherence)
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Draw a prediction behind the estimates; None clears it."""
+        """Draw the predicted transmissibility behind the estimates; None clears the prediction."""
         show_predicted(self._predicted, seen)
 
     def clear(self) -> None:
@@ -286,7 +286,7 @@ _UP = PlotAxis("m0 velocity", "m/s", short="v")
 
 
 def extent(values: NDArray[np.floating]) -> tuple[float, float]:
-    """Return the smallest and largest value."""
+    """Return the smallest and the largest value of an array."""
     return float(values.min()), float(values.max())
 
 
@@ -309,7 +309,7 @@ class PortraitPlot(QWidget):
         fill_box(QHBoxLayout(self), (self.orbit, 1), (self.section, 1), margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw the newest periods."""
+        """Draw the newest drive periods of the motion of m0."""
         found = view.portrait()
         if found is None or found is self._shown:
             return
@@ -331,7 +331,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Number of shades of the forecast; the faintest is where its error reaches a quarter of the gap."""
+"""Number of shades of the forecast curve; the faintest one marks an error of a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."

@@ -59,11 +59,11 @@ from .live_plots import (
 
 
 class LivePicture(Enum):
-    """Plot of the Run page that is updated during a run."""
+    """Name of a plot of the Run page that is updated during a run."""
 
     FREQUENCY_RESPONSE = auto()
     HISTORY = auto()
-    """Responses over the drive frequency at that time."""
+    """Measured responses over the drive frequency at the time of measurement."""
     ENVELOPE = auto()
     SPECTRUM = auto()
     PORTRAIT = auto()
@@ -88,7 +88,7 @@ KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
     },
     {},
 )
-"""Live plots by kind of excitation; the second table has kinds that differ from their family."""
+"""Live plots by family of excitation; the second table has the kinds that differ from their family."""
 
 _ROW = 1.9
 """Height of the meter of one channel, in font heights."""
@@ -132,7 +132,7 @@ class LevelMeters(QWidget):
         return self.sizeHint()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Paint every row."""
+        """Paint the level meter of every channel."""
         painter = QPainter(self)
         if not self._rows:
             paint_hint(painter, self.rect(), "Channel levels appear while a test runs.", self._theme.muted)
@@ -169,7 +169,7 @@ class WatchCard(QGroupBox):
 
     mark_wanted = Signal(str)
     reject_requested = Signal()
-    """Request to exclude the current average of a noise test from all results."""
+    """Emitted to exclude the current average of a noise test from all results."""
     twin_requested = Signal(object)
 
     def __init__(self, theme: Theme) -> None:
@@ -211,7 +211,7 @@ class WatchCard(QGroupBox):
         return SPANS_S[self.span.currentIndex()]
 
     def wish_mark(self) -> None:
-        """Request a mark in the recording, with the text of the field."""
+        """Ask the engine for a time mark in the recording, with the typed text."""
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
@@ -234,7 +234,7 @@ class WatchCard(QGroupBox):
             self.progress.setFormat("the last run has ended")
 
     def show_view(self, view: LiveView) -> None:
-        """Show impacts and levels."""
+        """Show the impact count of the run and the levels of its channels."""
         self.impacts.setText(f"{view.impacts}")
         self.meters.show_view(view)
 
@@ -295,11 +295,11 @@ class ArmCard(QGroupBox):
         self._armed: tuple[str, ...] = ()
         """Description of the armed plan; empty if nothing is armed."""
         self._read: tuple[str, ...] = ()
-        """Description whose end was visible, so that the user may have read it."""
+        """Description that the user has scrolled to its end, and so may have read."""
 
     @property
     def is_read(self) -> bool:
-        """Whether the end of the description was visible, which is required for starting."""
+        """Whether the user has scrolled to the description's end; only then can the run be started."""
         words = self._words
         end = QPoint(0, words.height() - 1)
         is_whole = words.height() >= words.heightForWidth(words.width())
@@ -309,7 +309,7 @@ class ArmCard(QGroupBox):
 
     @property
     def words(self) -> str:
-        """Text that is displayed."""
+        """Description that is displayed."""
         return self._words.text()
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
@@ -347,7 +347,7 @@ class ArmCard(QGroupBox):
 
 
 LAYOUT_ROUNDS = 4
-"""Number of layout passes after which the scroll bar fits the wrapped text."""
+"""Number of layout passes that Qt needs until the scroll bar fits the wrapped text."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
@@ -426,7 +426,7 @@ class RunPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Plots and numbers, with their run as input; none while they are frozen or hidden."""
+        """Plots and numbers, with the displayed run as input; none while the plots are frozen or hidden."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
         return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)

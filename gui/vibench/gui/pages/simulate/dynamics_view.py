@@ -33,7 +33,7 @@ Shown_contra = TypeVar("Shown_contra", contravariant=True)
 
 
 class AnswerPicture(Protocol[Shown_contra]):
-    """Plots that can draw a result, complete or partial."""
+    """Widget with plots that can draw a complete or partial result."""
 
     @property
     def widget(self) -> QWidget:
@@ -45,7 +45,7 @@ class AnswerPicture(Protocol[Shown_contra]):
 
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
-    """Kind of tab: type of its request, and functions that describe the result."""
+    """Description of one kind of tab: type of its request, and functions that describe the result."""
 
     name: str
     request: type[Request]

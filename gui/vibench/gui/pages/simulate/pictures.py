@@ -32,11 +32,11 @@ DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
 _FIRST_SPECIAL_COLOUR = 1
-"""Colour number of the first kind of event; colour 0 is for motions with the drive's period."""
+"""Colour number of the first kind of event in `_SPECIAL`; 0 is for motions with the drive's period."""
 
 
 class _PairPicture:
-    """Two pairs of plots, one pair over frequency and one over level, of which one pair is visible."""
+    """Two pairs of plots, one over frequency and one over drive level; only one pair is visible."""
 
     def __init__(self, theme: Theme, titles: tuple[str, str], axes: tuple[PlotAxis, PlotAxis], hint: str):
         self.widget = QStackedWidget()
@@ -144,11 +144,11 @@ PLACE = PlotAxis("Cell, from the base", short="Cell")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
 _GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
-"""Value at which smaller transmissibilities are drawn."""
+"""Lowest drawn transmissibility; smaller ones are drawn at this value."""
 _MOST_TRACES = 32
 """Largest number of cells whose motion is drawn; in longer chains, evenly spaced cells."""
 _HEIGHT = 0.45
-"""Height of the largest motion, over the distance of two cells."""
+"""Drawn height of the largest motion, over the drawn distance of two cells."""
 
 
 class ChainPicture:
@@ -226,7 +226,7 @@ _HINTS = (
     "Difference of the two models, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
-"""Value at which smaller differences are drawn, because zero has no logarithm."""
+"""Lowest drawn difference; smaller ones are drawn at this value, because zero has no logarithm."""
 
 
 class AnswerPlots(QWidget):

@@ -111,7 +111,7 @@ class SimulatePage(Page):
         self.simulator.begin(request)
 
     def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Set the form to frequencies around a drive frequency [Hz], and the time signal to that one."""
+        """Set the form to frequencies around a drive frequency [Hz], at which the time signal is shown."""
         content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
         content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
         content["step_hz"] = 0.01 * frequency_hz

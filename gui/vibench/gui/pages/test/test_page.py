@@ -91,7 +91,7 @@ FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     },
     {},
 )
-"""Starting values by kind of test; they replace the values of the kind before."""
+"""Starting values by kind of test; they replace the values of the previous kind."""
 
 
 class TestForm(ValidatedForm[Measurement]):
@@ -192,7 +192,7 @@ class PredictionPlot(Plot):
 
 
 _FLOOR = 1e-5
-"""Level over the strongest spectral line below which lines are rounding errors."""
+"""Ratio to the strongest spectral line below which a spectral line is only rounding error."""
 _LEAST_HZ = 1.0
 """Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
@@ -239,7 +239,7 @@ class LimitTable(ReadTable):
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
-        """Show the loads checked against the rig's limits."""
+        """Show the predicted loads of the rig beside their limits."""
         units = [prefixed_unit(check.unit, check.limit) for check in checks]
         self.show_rows(
             [
@@ -285,7 +285,7 @@ _SHOWN = {
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     """Return a summary in words: excitation, loads with their limits, duration and file size.
 
-    ``refusal`` says why feedback control would not hold the motion; it is empty if it would.
+    ``refusal`` says why feedback control cannot stabilise the motion; it is empty if it can.
     """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
@@ -317,7 +317,7 @@ def _load(check: LimitCheck, name: str) -> str:
 
 Asked = tuple[Measurement | None, Rig | None] | None
 NAMELESS = {"name": "test", "notes": ""}
-"""Name and notes used in predictions, because a prediction does not depend on them."""
+"""Fixed name and notes of predicted tests; tests that differ only in name or notes share a prediction."""
 LOOK_MS, PREDICT_MS = 200, 900
 """Delays from the last edit to the preview, and to the simulation [ms]."""
 
@@ -363,7 +363,7 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether the test is valid and within all limits, and feedback would hold its motion."""
+        """Whether the test is valid, within all limits, and feedback control can stabilise its motion."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
@@ -378,7 +378,7 @@ class TestPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Loads, plots and prediction, each with test and rig as inputs."""
+        """Table of loads, plots and prediction, each with test and rig as inputs."""
         wanted = self._inputs
         return (
             DisplayedResult(self.summary, self._summary_of, wanted),
@@ -557,7 +557,7 @@ class TestPage(Page):
 
 
 def _stored_test(text: str) -> Measurement | None:
-    """Return the test from stored text; None if it is not valid in this version."""
+    """Return the test from the settings' text; None if this version does not allow it."""
     try:
         return validated(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):

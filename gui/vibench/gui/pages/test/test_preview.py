@@ -34,7 +34,7 @@ class TestPrediction:
     recorded_s: float | None
     """Predicted recording time of a test with `until` [s]; None if unknown, or without `until`."""
     refusal: str
-    """Why feedback on this rig would not hold the motion; empty if it would."""
+    """Why feedback control on this rig cannot stabilise the motion; empty if it can."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
