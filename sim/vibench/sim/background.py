@@ -26,7 +26,7 @@ NICE = 10
 MOST_BYTES = 6 << 30
 """Memory limit of a worker process [bytes], where the operating system supports one."""
 MOST_WAITING = 200
-"""Largest number of unread messages of a worker, which then waits until `Pool.poll` reads them."""
+"""Number of unread messages at which a worker waits until `Pool.poll` reads them."""
 GRACE_S = 2.0
 """Time that a cancelled job has to end before its process is killed [s]."""
 
@@ -37,24 +37,24 @@ class Progress:
 
     done: int
     of: int
-    """Total amount of work, in the unit of ``done``; 0 if unknown."""
+    """Total amount of work of the job, in the unit of ``done``; 0 if unknown."""
     left_s: float | None = None
-    """Expected remaining time [s]; None if unknown."""
+    """Expected remaining time of the job [s]; None if unknown."""
     note: str = ""
 
 
 Observer = Callable[[Progress], None]
 """Function that receives progress reports; called in the thread that does the work."""
 Cancelled = Callable[[], bool]
-"""Function that returns True if the work should end early; polled several times per second by the work."""
+"""Function that returns True if a job should end early; the job calls it several times per second."""
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Ignore a progress report."""
+    """Ignore a progress report; default for callers that show no progress."""
 
 
 def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
-    """Report that a stage begins; return a function that reports its progress from (done, of)."""
+    """Report that a stage begins; return the function that reports its finished and total amount of work."""
     observer(Progress(0, 0, note=note))
     return lambda done, of: observer(Progress(done, of, note=note))
 
@@ -80,9 +80,9 @@ class Job:
     longest_s: float
     is_wanted: bool = True
     is_answered: bool = False
-    """Whether the result or the error has been delivered."""
+    """Whether the job's result or error has been delivered to its owner."""
     end_s: float = math.inf
-    """Time of `monotonic` at which the process is killed if the job still runs [s]."""
+    """Value of `monotonic` at which the process is killed if the job is still running [s]."""
     cancel: Callable[[], None] = _ignore
 
     @property
@@ -91,7 +91,7 @@ class Job:
         return self.is_answered or not self.is_wanted
 
     def drop(self) -> None:
-        """Cancel the job and ignore its further messages."""
+        """Cancel the job and ignore all further messages from it."""
         if not self.is_over:
             self.is_wanted, self.end_s = False, monotonic() + GRACE_S
             self.cancel()
@@ -141,7 +141,7 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; ``tell(part)`` triggers ``on_part``."""
+        """Call ``function(question, tell, cancelled)`` in a worker; each ``tell(part)`` calls ``on_part``."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:

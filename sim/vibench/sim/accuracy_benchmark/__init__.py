@@ -1,6 +1,6 @@
 """Error against computing time for one scene and every suitable method, measured on this machine.
 
-`vibench.sim.accuracy_benchmark.curve` computes these points.
+`vibench.sim.accuracy_benchmark.curve` computes the points of this curve.
 
 >>> from vibench.sim import Harmonic, Scene, Target, gong2025
 >>> from vibench.sim.accuracy_benchmark.curve import scene_curve

@@ -21,7 +21,7 @@ from ..specimen.state import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Relative tolerances of the harmonic balance with many harmonics, one curve point each."""
+"""Relative tolerances of the harmonic balance with many harmonics; each gives one point of the curve."""
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,19 @@ class CurvePoint:
 
     method: str
     time_s: float
-    """Processor time [s]."""
+    """Processor time that the method takes for the scene [s]."""
     error: float
-    """Largest relative error of the responses I and II of x and p."""
+    """Largest relative error among the Responses I and II of x and p."""
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method estimates its error; else ``error`` is the deviation from the refined result."""
+    """Whether the method estimates its own error; if not, ``error`` is measured from the refined result."""
     is_chosen: bool = False
     """Whether `refine_scene` returns this result for the scene's requested error and time."""
 
 
 Answer = tuple[Floats, float | None]
-"""Responses I and II of x, then of p; and their largest relative error, None if it is not estimated."""
+"""Responses I and II of x, then of p, and the largest of their relative errors (None: not estimated)."""
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:

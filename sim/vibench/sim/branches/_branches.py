@@ -34,13 +34,13 @@ INTERPOLATED = 0.06
 """Largest distance of a branch from the chord between two neighbouring points, over the chord's length;
 follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
-"""Distance, in scaled states, that `lies_on` allows in addition for rounding."""
+"""Distance between scaled states that `lies_on` allows in addition, for rounding errors."""
 LENGTHS = 10.0
-"""Length of the parameter range in the scaled units of branch following."""
+"""Length of the whole parameter range in the scaled units of branch following."""
 
 
 class BranchOrigin(StrEnum):
-    """Method by which a branch was found."""
+    """Way in which the first motion of a branch was found."""
 
     SEARCH = "a motion found from rest, between the stops or from a random state"
     SYMMETRY_BREAKING = "switched to where a symmetry breaks"
@@ -51,7 +51,7 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """A branch with the kind of its motions, its origin and its computing time."""
+    """A branch of periodic motions with their period and symmetry, the branch's origin and computing time."""
 
     branch: Branch
     shape: OrbitShape
@@ -61,16 +61,16 @@ class FoundBranch:
     has_twin: bool
     """Whether the mirror images of the motions form another branch."""
     elapsed_s: float = 0.0
-    """Time for finding and following the branch [s]."""
+    """Computing time for finding and following the branch [s]."""
 
     @property
     def is_isolated(self) -> bool:
-        """Whether the branch is closed, so that no sweep from other branches reaches it."""
+        """Whether the branch is a closed curve, which sweeps along other branches do not reach."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
 def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
-    """Return whether a branch contains any of the states, shape (n, 6), at one drive."""
+    """Return whether a branch contains any of the given states, shape (n, 6), at the given drive."""
     branch, value = found.branch, parameter_value(path, drive)
     scales = state_scales(specimen, drive)
     along = branch.parameters
@@ -92,13 +92,13 @@ M = TypeVar("M")
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """Motion from which a branch is followed if no known branch contains it."""
+    """Periodic motion from which a new branch is followed, if no known branch contains the motion."""
 
     motion: M
     origin: BranchOrigin
     drive: Harmonic
     states: Floats
-    """States once per drive period, of the motion and (if known) of its mirror image, shape (n, 6)."""
+    """States of the motion and (if known) of its mirror image, once per drive period, shape (n, 6)."""
 
 
 def branches_from(
@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches from starts on no known branch, and branches leaving these, until a time limit."""
+    """Yield branches from motions on no known branch, and branches that leave these, until a time limit."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -132,11 +132,11 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distances of the first guess from the state at a bifurcation, over the gap, when switching branches."""
+"""Tried distances of the first guess from the state at a bifurcation, over the gap, to switch branches."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distances of the parameter from the bifurcation at which branches are switched, over the range."""
+"""Tried distances of the parameter from a bifurcation, over its range, to switch branches."""
 LEFT = 1e-4
-"""Distance from the branch being left, over the gap, above which a motion lies on the new branch."""
+"""Distance from the old branch, over the gap, above which a motion counts as being on the new branch."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,
@@ -201,7 +201,7 @@ def _branch_switches(
     bounds: tuple[float, float],
     search: MotionSearch,
 ) -> Iterator[BranchStart[PeriodicOrbit]]:
-    """Yield a motion on each branch that leaves this branch at a bifurcation."""
+    """Yield one motion on each branch that leaves a given branch at a bifurcation."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
@@ -248,7 +248,7 @@ def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
 
 
 UPDATES_TO_HOLD = 10.0
-"""Smallest number of loop updates, per growth by a factor of e, with which a loop stabilises a motion."""
+"""Fewest control-loop updates while a perturbation grows by e, for the loop to stabilise the motion."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:

@@ -19,16 +19,16 @@ from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats, Vector
 
 SETTLED = 1e-3
-"""Relative change of the state per period below which Newton's iteration is started."""
+"""Relative change of the state per period of the motion, below which Newton's iteration is started."""
 SAME_MOTION = 1e-5
-"""Relative distance of states at the same drive phase below which two motions are the same."""
+"""Relative distance of states at the same drive phase, below which two motions count as the same."""
 SIMPLER = 1e-6
-"""Relative distance below which a motion counts as one of half the period, or as its own mirror image."""
+"""Relative distance of states below which a motion repeats after half its period or is symmetric."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
-"""Largest abs(p) of random starts, over each gap."""
+"""Largest abs(p) of random initial states, over the gap on the same side."""
 RANDOM_REACH = 3.0
-"""Largest x and z of random starts, over the gap or over the motion without stops, whichever is larger."""
+"""Largest x and z of random initial states, over the larger of gap and amplitude without stops."""
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,16 @@ class MotionSearch:
     """Settings of the search for periodic motions."""
 
     places: int = 8
-    """Number of evenly spaced values of the parameter at which to search, including the ends."""
+    """Number of evenly spaced parameter values at which to search, including both ends of the range."""
     starts: int = 12
-    """Number of random starts at each value, in addition to rest and the motion between the stops."""
+    """Number of random initial states at each value, besides rest and the linear motion without contact."""
     settling_periods: int = 300
     most_periods: int = 4
-    """Longest period of a motion, in drive periods."""
+    """Longest period of a motion that the search finds, in drive periods."""
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Time limit for the whole search and all branches [s]; the branch in progress is then cut off."""
+    """Computing time limit for the search and all branches [s]; the branch in progress is then cut off."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -110,7 +110,7 @@ def orbit_states(orbit: PeriodicOrbit) -> Floats:
 
 
 def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Vector]:
-    """Yield the starts: rest, the motion without contact if it exists, then random states."""
+    """Yield the initial states: rest, the linear motion if it never reaches a stop, then random states."""
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
@@ -138,7 +138,7 @@ def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) 
 
 
 def _free_state(specimen: Specimen, drive: Harmonic) -> Vector:
-    """Return the state at time zero of the motion without stops under A0 sin(w t)."""
+    """Return the state at time zero of the steady motion without stops, driven by U = A0 sin(w t)."""
     phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
     return np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
 
@@ -162,7 +162,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Return the simplest motion of ``periods`` drive periods found by shooting from a state, or None."""
+    """Return the simplest periodic motion of ``periods`` drive periods, by shooting from a state, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:
@@ -177,7 +177,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return a motion as a fixed point of the map over the shortest possible time."""
+    """Return a motion as a fixed point over its shortest period, or half of it if the motion is symmetric."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(

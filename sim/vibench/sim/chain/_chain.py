@@ -21,7 +21,7 @@ MOST_CELLS = 1000
 
 @dataclass(frozen=True)
 class Chain(Strict):
-    """Chain of cells, which may differ in all parameters."""
+    """Chain of cells; each cell may have different parameters."""
 
     cells: tuple[Specimen, ...]
     """Cells from the base to the free end; (k0, c0) couple cell 0 to the base, and cell i to cell i - 1."""
@@ -38,7 +38,7 @@ class Chain(Strict):
 
     @property
     def size(self) -> int:
-        """Number of cells."""
+        """Number of cells of the chain."""
         return len(self.cells)
 
     @property
@@ -48,17 +48,17 @@ class Chain(Strict):
 
     @property
     def stiffness_matrix(self) -> Matrix:
-        """Stiffness matrix K without contact, shape (3 cells, 3 cells) [N/m]."""
+        """Stiffness matrix K of the chain without contact, shape (3 cells, 3 cells) [N/m]."""
         return _assemble([cell.stiffnesses for cell in self.cells])
 
     @property
     def damping_matrix(self) -> Matrix:
-        """Damping matrix C, shape (3 cells, 3 cells) [N s/m]."""
+        """Damping matrix C of the chain without contact, shape (3 cells, 3 cells) [N s/m]."""
         return _assemble([cell.dampings for cell in self.cells])
 
     @cached_property
     def natural_frequencies_hz(self) -> NDArray[np.float64]:
-        """Undamped natural frequencies without contact, ascending, shape (3 cells,) [Hz]."""
+        """Undamped natural frequencies of the chain without contact, ascending, shape (3 cells,) [Hz]."""
         root = np.sqrt(self.masses)
         values = np.linalg.eigvalsh(self.stiffness_matrix / np.outer(root, root))
         return np.asarray(np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), dtype=np.float64)
@@ -82,7 +82,7 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
 
 
 def _assemble(links: list[Triple]) -> Matrix:
-    """Return the matrix of all springs or dampers from links i = 0, 1, 2 (k_i or c_i) of every cell."""
+    """Return the stiffness or damping matrix of a chain from k_i or c_i, i = 0, 1, 2, of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))
     for cell, (outer, inner, middle) in enumerate(links):

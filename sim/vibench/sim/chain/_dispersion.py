@@ -25,7 +25,7 @@ TOUCHING = 1e-9
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the ratio of the motion of a unit to that of the unit before, for the outgoing or decaying wave.
+    """Return the ratio of the motions of successive units, for the outgoing or decaying wave.
 
     Raises ValueError when a frequency is not positive.
 
@@ -68,13 +68,13 @@ class SeenFromOutside(NamedTuple):
     stiffness: Complex
     """Force on m0 over its displacement without the link, S(w) - w^2 m0 [N/m]."""
     inner: Complex
-    """Ratio y / x."""
+    """Ratio y / x: displacement of m1 over that of m0."""
     middle: Complex
-    """Ratio z / x."""
+    """Ratio z / x: displacement of m2 over that of m0."""
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
-    """Return a cell without contact reduced to its m0; finite even at the resonance of m1 on its spring."""
+    """Return the response of a cell without contact to its m0; finite even where m1 resonates alone."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping

@@ -24,7 +24,7 @@ MOST_WINDOWS = 10**11
 
 
 class ChainRun:
-    """Run of a chain, with its state, samples and observations."""
+    """Integration of a chain in progress, with its current state, samples and observations."""
 
     def __init__(
         self,
@@ -84,11 +84,11 @@ class ChainRun:
         )
 
     def watch(self, what: Watch) -> None:
-        """Set the quantities to observe from now on."""
+        """Set the quantities of the motion to observe from now on."""
         self._motion["watch"] = what
 
     def advance(self, until_s: float) -> Outcome:
-        """Advance to a time [s] and return the outcome; do nothing if the time has already passed."""
+        """Integrate the chain to a time [s] and return the outcome; do nothing if that time has passed."""
         self._motion["until"] = until_s
         return Outcome(native_engine().call("follow_chain", self._motion))
 
@@ -110,7 +110,7 @@ class ChainRun:
 
     @property
     def impacts(self) -> int:
-        """Number of contacts so far."""
+        """Number of contacts of all cells so far."""
         return int(self._motion["impacts"])
 
     @property
@@ -144,13 +144,13 @@ class ChainImpacts:
     times_s: Floats
     """Start times of contacts, ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
-    """Cell of each contact, counted from 0 at the base, shape (count,)."""
+    """Number of the cell of each contact, counted from 0 at the base, shape (count,)."""
     per_cell: NDArray[np.int64]
     """Number of contacts in each cell, shape (cells,)."""
 
     @property
     def count(self) -> int:
-        """Number of contacts."""
+        """Number of contacts of all cells in the run."""
         return len(self.times_s)
 
 
@@ -167,7 +167,7 @@ class ChainTrajectory:
     end_time_s: float
     impacts: ChainImpacts
     outcome: Outcome
-    """Outcome; only with REACHED_END the run reached the requested time."""
+    """Outcome of the run; only REACHED_END means that the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -237,7 +237,7 @@ def integrate_chain(
 
 
 def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
-    """Raise ValueError if a run with windows of ``window_s`` [s] would take hours."""
+    """Raise ValueError if a run in time windows of ``window_s`` [s] would take hours of computing."""
     work = duration_s / window_s * chain.size
     if work > MOST_CELL_WINDOWS:
         raise ValueError(
@@ -260,7 +260,7 @@ def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
 
 
 def _of_one(run: Trajectory) -> ChainTrajectory:
-    """Return the trajectory of a specimen as the trajectory of a chain of one cell."""
+    """Convert the trajectory of a single specimen to the trajectory of a chain of one cell."""
     impacts = run.impacts
     return ChainTrajectory(
         time_s=run.time_s,

@@ -24,9 +24,9 @@ from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impact
 from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
-"""Small distance between the two motions, over the size of the first motion."""
+"""Distance to which the two motions are repeatedly reset, over the size of the first motion."""
 SHORTEST_INTERVAL_S = 5e-3
-"""Shortest interval [s]; in it, the distance grows by less than 2 even for an exponent of 100 per second."""
+"""Shortest time between two resets [s]; an exponent of 100 per second grows by less than a factor of 2."""
 FEWEST_INTERVALS = 32
 """Smallest number of intervals from which the error of the mean is estimated."""
 
@@ -43,13 +43,13 @@ class ChainExponent:
     blocks: BlockedMean | None
     """Mean growth rate and its error from blocks of intervals [1/s]; None if the run did not finish."""
     interval_s: float
-    """Length of an interval, in whole drive periods [s]."""
+    """Length of an interval between two resets, a whole number of drive periods [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval after settling, shape (n,) [1/s]."""
+    """Growth rate of the distance in each interval after settling, shape (n,) [1/s]."""
     impacts: int
     """Number of impacts of all cells in the intervals after settling."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
+    """x, y, z, vx, vy, vz of every cell at the end of the run, shape (cells, 6) [m, m/s]."""
     outcome: Outcome
 
 

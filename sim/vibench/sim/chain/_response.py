@@ -41,11 +41,11 @@ class ChainResponse:
     shape (cells, 4).
     """
     impacts: NDArray[np.int64]
-    """Number of contacts that began in the window, for every cell, shape (cells,)."""
+    """Number of contacts that began in the evaluated window, for every cell, shape (cells,)."""
     impacts_before: NDArray[np.int64]
-    """Number of contacts that began before the window, for every cell, shape (cells,)."""
+    """Number of contacts that began before the evaluated window, for every cell, shape (cells,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end; initial state for a continued run, shape (cells, 6)."""
+    """x, y, z, vx, vy, vz of every cell at the end of the run, from which a run can continue, (cells, 6)."""
     outcome: Outcome
 
     @property
@@ -129,7 +129,7 @@ def chain_response(
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     """Return the response of a specimen as the response of a chain of one cell.
 
-    The line of z follows from the equation of motion of m0 times exp(-i omega t), integrated by parts.
+    The spectral line of z follows from the equation of motion of m0 times exp(-i omega t), by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
@@ -221,7 +221,7 @@ class MeanEnergies(NamedTuple):
 
     mean_j: Floats
     standard_error_j: Floats
-    """Standard error of the mean, from uncorrelated blocks."""
+    """Standard error of the mean energy of every cell, from uncorrelated blocks [J]."""
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:
@@ -233,7 +233,7 @@ def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> M
 
 
 def _in_stops(cell: Specimen, p: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the potential energy of the contact force of a cell at p, shape of ``p`` [J]."""
+    """Return the energy stored in a cell's contact at the relative displacement p, shape of ``p`` [J]."""
     match cell.contact:
         case PowerLaw(reference=reference, terms=terms):
             part = p / reference

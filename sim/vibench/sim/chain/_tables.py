@@ -27,14 +27,14 @@ WHOLE_COLLISIONS = 1e-7
 MARKOV_TERMS = 11
 """Number of Taylor coefficients of the chain's response to a unit impulse in one cell."""
 REACH = MARKOV_TERMS
-"""Number of cells on each side of the impulse that this truncated response reaches."""
+"""Number of cells on each side of a unit impulse that the truncated Taylor response reaches."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
 """Largest allowed effect of a contact force on the velocity of another cell in the same window, over the
 tolerance; smaller effects are neglected."""
 MOST_HALVINGS = 20
 KEPT = 2
-"""Number of window lengths tried before the shortest length."""
+"""Number of window lengths that are tried before the shortest one."""
 
 
 class ChainTables(NamedTuple):
@@ -45,15 +45,15 @@ class ChainTables(NamedTuple):
     kind_of: Vector
     """Index of the kind of each cell, shape (cells,)."""
     fastest: float
-    """Largest rate of chain and drive [1/s]."""
+    """Largest rate of change of any mode of the chain and of the drive [1/s]."""
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Cells this many places apart, or closer, may not both be in contact in the window, shape (windows,)."""
+    """Distance in cells up to which two cells may not both be in contact, by window, shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
-    """Return the tables for a chain, a drive and an accuracy."""
+    """Return the engine's tables for a chain, a drive and an accuracy level."""
     links = [(cell.stiffnesses[0], cell.dampings[0]) for cell in chain.cells]
     cells = list(zip(chain.cells, [*links[1:], (0.0, 0.0)], strict=True))
     places = {each: place for place, each in enumerate(dict.fromkeys(cells))}
@@ -125,7 +125,7 @@ def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
 
 
 def _stretches(motion: Table) -> tuple[Table, Table, Table]:
-    """Return the elongations of the three links of every cell."""
+    """Return the elongations of the three springs of every cell, from the displacements."""
     x, y, z = motion
     return np.diff(x, axis=0, prepend=0.0), y - z, z - x
 
@@ -149,7 +149,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Return a bound on the part of a cell's velocity that returns from its neighbours in a window."""
+    """Return a bound on the velocity that a cell's own motion causes back via its neighbours in a window."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]
@@ -190,9 +190,9 @@ def _clash(answers: Vector, allowed: float) -> int:
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""Number of polynomial terms; eight Chebyshev points fit a sine over `WINDOW_TURN` radians to 1e-14."""
+"""Number of polynomial terms in a piece of the drive; eight fit a sine over `WINDOW_TURN` rad to 1e-14."""
 ALMOST = 1e-9
-"""Tolerance for rounding, over the length of a piece."""
+"""Tolerance for rounding errors of time, over the length of a piece of the drive."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16
@@ -216,7 +216,7 @@ class Pieces(NamedTuple):
 def pieces_between(
     tables: ChainTables, first: Specimen, drive: BaseDrive, start_s: float, end_s: float
 ) -> Iterator[tuple[Pieces, float]]:
-    """Yield the pieces of the drive in batches, with the end time of each batch [s]."""
+    """Yield the polynomial pieces of the drive in batches, with the end time of each batch [s]."""
     interval, count = _grid(tables, drive)
     begin = min(int(start_s / interval * (1.0 + ALMOST)), count - 1)
     while True:

@@ -17,15 +17,15 @@ from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
-"""Approximate length of a window [s], and smallest number of windows."""
+"""Approximate length of a response window [s], and smallest number of windows."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Fewest pairs of windows for an error estimate, and Student's t of a 95 % interval for that number."""
+"""Fewest pairs of windows for an error estimate, and Student's t (95 %) for this number."""
 TOLERANCE_PART = 0.1
 """Largest part of the requested error that may come from the integration."""
 TRIED_S, TRIED_PART = 1e-4, 0.1
 """Simulated time of the first speed trial [s], and largest part of the time limit spent on trials."""
 LONGEST_S = 60.0
-"""Default limit of the computing time [s]."""
+"""Default limit of the computing time of a chain [s]."""
 
 
 class TargetedResponse(NamedTuple):
@@ -35,7 +35,7 @@ class TargetedResponse(NamedTuple):
     errors: Floats
     """Relative errors (95 %) of the transmissibility of every cell, shape (cells,)."""
     followed_s: float
-    """Simulated time of all windows [s]."""
+    """Total simulated time of all response windows [s]."""
 
 
 def chain_response_to(
@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Continue by ``periods``; return whether that succeeded and time is left to repeat it."""
+        """Continue the run by ``periods``; return whether this succeeded and time is left to do it again."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
@@ -96,7 +96,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Raise ValueError if one drive period takes longer than the limit, judged by trials of rising length."""
+    """Raise ValueError if computing one drive period exceeds the time limit, from trials of rising length."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # first call, which prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:

@@ -44,29 +44,29 @@ from .shapes import (
 # duration and the moments of the force about the middle. They are fitted to collisions solved exactly.
 
 MIDDLE = 1.47
-"""Time from the start to the middle of a collision, in u."""
+"""Time from the start to the middle of a collision, in units of u."""
 DERIVATIVES = 5
-"""Number of variables for the acceleration: its value and its first four derivatives."""
+"""Number of fit variables for m1's acceleration: its value and its first four time derivatives."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Range of approach speeds covered by the fit, over the gap times the fastest modal rate."""
+"""Lowest and highest approach speed of the collision fit, over gap times fastest modal rate."""
 HARDEST_PRESS = 0.24
-"""Largest magnitude of the acceleration due to other springs covered by the fit, over speed / u."""
+"""Largest acceleration due to other springs that the collision fit covers, over approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest first derivative over speed / u^2; largest ratio of successive derivatives (paper's specimen)."""
+"""Largest rate of the acceleration by other springs over speed / u^2; ratio of later derivatives."""
 PAPER_TURN = 0.053
-"""Fastest modal rate times u [rad], for the paper's specimen in the middle of the range of speeds."""
+"""Fastest modal rate times u [rad], for the paper's specimen at a medium approach speed."""
 SLOWEST_TURN = 0.15
-"""Largest fastest modal rate times u [rad] for which a fit is made; a collision lasts about three u."""
+"""Largest product of fastest modal rate and u [rad] for a fit; a collision lasts about three u."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
 NEWTON_STEPS = 8
 FIT_ERROR = 2e-7
-"""Largest allowed error of the speed after a collision, over the speed before it."""
+"""Largest allowed error of the separation speed of a fitted collision, over the approach speed."""
 GUESS_POINTS = 64
 
 
@@ -84,7 +84,7 @@ def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
 
 @lru_cache(maxsize=8)
 def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return a fit to random collisions within the ranges of the variables, or None as `collision_fit`."""
+    """Return a fit to random collisions within the variables' ranges, or None as `collision_fit` does."""
     middle, half = _box(specimen)
     if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
         return None
@@ -139,7 +139,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect of each repeated time integral of the force on p, over that of the second one."""
+    """Return the effect on p of each repeated time integral of the force, over the second's effect."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -147,7 +147,7 @@ def _coupling(specimen: Specimen) -> Vector:
 
 
 def _free(accelerations: Table) -> Table:
-    """Return the depth without contact force in powers of the time from the middle, shape (n, 7)."""
+    """Return the coefficients of the indentation without contact force in powers of time, shape (n, 7)."""
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
@@ -203,7 +203,7 @@ FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
 """Families of processors with wide registers and fused multiply-add."""
 MODES = 3
 MOST_DAMPED = 0.05
-"""Largest damping ratio of a mode; a larger one would need more terms of the series."""
+"""Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
 LEAST_PART = 1e-9
 """Smallest contribution of a mode to p, over the largest; a batch derives all modes from p."""
 
@@ -220,12 +220,12 @@ class BatchedMotion:
 
 @cache
 def batches_pay() -> bool:
-    """Return whether batches are faster than single runs on this processor."""
+    """Return whether SIMD batches are faster than single runs on this processor."""
     return native_engine().family in FUSING_FAMILIES
 
 
 def is_batchable(specimen: Specimen, tolerance: float) -> bool:
-    """Return whether batches support a specimen and a tolerance."""
+    """Return whether SIMD batches support a specimen and an integration tolerance."""
     return (
         tolerance >= LEAST_TOLERANCE
         and _turns_in_p(specimen)

@@ -17,7 +17,7 @@ from numpy.typing import DTypeLike, NDArray
 from .processor import usable_families
 
 Structure = NDArray[np.void]
-"""One structure, shape (), or an array of structures."""
+"""Array of numpy structures; one structure has the shape ()."""
 StructureType = np.dtype[np.void]
 _STRUCTURE = re.compile(r"(\w+) \{ (.*) \}")
 _NAME = re.compile(r"(\*?)\s*(\w+)((?:\[\d+\])*)")
@@ -70,7 +70,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Build script; exists in a checkout, but not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-"""File ending of libraries for this operating system; a checkout may contain libraries for others."""
+"""File ending of this operating system's libraries; a checkout may contain those of other systems."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
@@ -80,7 +80,7 @@ FUNCTIONS = (
 )
 """Functions of the library that have a single structure as argument."""
 Tables = NDArray[np.float64]
-"""Tables of a scene that the engine prepares, in the memory layout of the engine."""
+"""Tables of a scene, prepared by the engine in its own memory layout."""
 _Pointer = ctypes.c_void_p
 
 
@@ -201,7 +201,7 @@ class Engine:
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
-        """Decide whether ``state`` starts in contact and store it; return 0, or -1 if it is refused."""
+        """Decide whether m1 is in contact in ``state``, and store this there; return 0, or -1 if refused."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(

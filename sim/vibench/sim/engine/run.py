@@ -27,11 +27,11 @@ MOST_STEPS = 2_000_000_000
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
 SPARE_IMPACTS = 100
-"""Impacts allowed in addition to those of the mean rate, so that short runs may have some."""
+"""Impacts allowed in addition to the allowed mean rate, so that short runs may have some."""
 DIRECTIONS = 6
 """Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9
-"""Relative distance beyond a rigid stop up to which a start counts as lying on the stop (rounding)."""
+"""Relative distance beyond a rigid stop at which an initial state still counts as touching the stop."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -47,13 +47,13 @@ KNOWN_TO = 1e-6
 
 
 class Watch(IntEnum):
-    """Quantities that a run observes."""
+    """Quantities of the motion that a run observes."""
 
     NOTHING = 0
     PEAKS = 1
-    """Largest abs(x) and abs(p)."""
+    """Largest absolute displacements abs(x) and abs(p)."""
     PEAKS_AND_LINES = 2
-    """Also the components of x and p at the drive frequency."""
+    """Largest abs(x) and abs(p), and the components of x and p at the drive frequency."""
 
 
 class RunRecord:
@@ -100,7 +100,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces those that rounding put after the end."""
+        """Return all samples, shape (samples, 6); ``last`` replaces samples after the end due to rounding."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -111,22 +111,22 @@ class RunRecord:
 
     @property
     def peak_x_m(self) -> float:
-        """Largest observed abs(x) [m]."""
+        """Largest observed absolute displacement of m0, abs(x) [m]."""
         return float(self.structure["peak_x"])
 
     @property
     def peak_p_m(self) -> float:
-        """Largest observed abs(p) [m]."""
+        """Largest observed absolute displacement of m1 against m2, abs(p) [m]."""
         return float(self.structure["peak_p"])
 
     @property
     def area_x(self) -> complex:
-        """Integral of x exp(-i (omega t + phase)) over the time in which lines were observed [m s]."""
+        """Integral of x exp(-i (omega t + phase)) over the time of observing spectral lines [m s]."""
         return complex(self.structure["line_x"])
 
     @property
     def area_p(self) -> complex:
-        """Integral of p exp(-i (omega t + phase)) over the time in which lines were observed [m s]."""
+        """Integral of p exp(-i (omega t + phase)) over the time of observing spectral lines [m s]."""
         return complex(self.structure["line_p"])
 
 
@@ -231,7 +231,7 @@ class NativeRun(_Run):
         return self._tables.ctypes.data, self._state.ctypes.data
 
     def pass_over(self, length_s: float) -> None:
-        """Add to the time a period after which the motion repeats [s]; the state does not change."""
+        """Skip a period after which the motion repeats [s]: increase the time and keep the state."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
@@ -248,10 +248,10 @@ class NativeRun(_Run):
 
 
 class GrowthReadings:
-    """Growth of tangent vectors in equal intervals, orthonormalised in a metric."""
+    """Growth of tangent vectors in equal time intervals; the vectors are kept orthonormal in a metric."""
 
     def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
-        """Allocate memory for ``room`` intervals of ``interval_s``, each divided into equal ``parts``."""
+        """Allocate memory for ``room`` intervals of ``interval_s`` [s], each divided into equal ``parts``."""
         self._growth = np.zeros((room, changes))
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
@@ -283,7 +283,7 @@ class GrowthReadings:
 
 
 def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
-    """Raise ValueError for a start beyond a rigid stop."""
+    """Raise ValueError for an initial state in which m1 is beyond a rigid stop."""
     if not isinstance(specimen.contact, RigidStops):
         return
     lower, upper = specimen.gaps_m

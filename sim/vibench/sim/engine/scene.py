@@ -66,7 +66,7 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
 
 
 def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
-    """Fill the power law of a `Scene` or a `CubicScene`."""
+    """Fill the power-law part of the engine's `Scene` or `CubicScene`."""
     _fill_power(scene["power"], law)
     scene["power_shapes"] = power_structure(engine).ctypes.data
 
@@ -133,7 +133,7 @@ def _collision_structure(engine: Engine) -> Structure:
 
 
 def fill_specimen(target: Structure, specimen: Specimen) -> None:
-    """Fill a `Specimen` of native/structures.hpp."""
+    """Fill the engine's `Specimen` (native/structures.hpp) from a specimen."""
     for name, values in (("m", specimen.masses), ("k", specimen.stiffnesses), ("c", specimen.dampings)):
         for index, value in enumerate(values):
             target[f"{name}{index}"] = value
@@ -171,7 +171,7 @@ def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m:
 
 
 def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
-    """Fill the motion while m1 sticks to a rigid stop, whose force on m1 can only be compressive."""
+    """Fill the modal data of the motion while m1 sticks to a rigid stop; the stop can only push m1."""
     bound = bound_motion(specimen, omega, amplitude_m)
     _fill_motion(target["motion"], bound.modes, bound.steady)
     m1, m2 = specimen.masses[1:]
@@ -182,7 +182,7 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the motion while m1 is in a linear stop: a spring beside k1 with another equilibrium."""
+    """Fill the modal data of the motion in a linear stop: a spring parallel to k1, equilibrium shifted."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]

@@ -17,7 +17,7 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Number of Gauss points in phi: error 1e-8 of the duration, and rounding error of the speed."""
+"""Number of Gauss points in phi; the duration has an error of 1e-8, the speed only a rounding error."""
 TERMS = 8
 """Number of terms of the series for forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
@@ -36,7 +36,7 @@ SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
 """Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to that of the
 polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from LASTS_BY on
-are derivatives of the duration, in the order of the derivatives of the depths."""
+are derivatives of the duration, in the order of those of the depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions tabulated over the press, and their scalars; each starts the solution of the next."""
+    """Return collisions tabulated over the press, and their scalars; each is the next one's initial guess."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
@@ -158,11 +158,11 @@ GAUSS_POINTS = 8
 ORDER = 32
 """Number of terms of the series; in the longest step, the next term is 1e-20 of the largest."""
 POWER_QUADRATURE = 24
-"""Number of quadrature points, which integrate all terms of the series exactly."""
+"""Number of quadrature points with which all terms of the series are integrated exactly."""
 COURSE_DEGREE = 5
-"""Degree of the polynomial that predicts F in a step; it is fitted to F in the preceding step."""
+"""Degree of the polynomial that predicts the force F in a step, fitted to F in the preceding step."""
 END_WEIGHT = 3.0
-"""Weight of F at the end of the preceding step in that fit."""
+"""Weight of the force F at the end of the preceding step, in the fit that predicts F."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
 """Gauss points c_i on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
@@ -200,11 +200,11 @@ def _power_shares() -> Table:
 
 POWER_SHARES: Table = _power_shares()
 INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
-"""Times at which a step is observed: its start, its Gauss points and its end."""
+"""Times within a step at which the motion is observed: its start, its Gauss points and its end."""
 
 
 def _between(places: Vector) -> Table:
-    """Return the differences between all pairs of points, with 1 on the diagonal."""
+    """Return the differences between all pairs of points as a matrix, with 1 on the diagonal."""
     return np.asarray(places[:, None] - places + np.eye(len(places)))
 
 
@@ -212,4 +212,4 @@ POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
 INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
 """Barycentric weights (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
 INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
-"""Derivative of each Lagrange polynomial at its own time, shape of ``INSTANTS``."""
+"""Derivative of each Lagrange polynomial at its own node, shape of ``INSTANTS``."""
