@@ -38,7 +38,7 @@ from .tangent_run import (
 )
 
 FEWEST_INTERVALS = 32
-"""Smallest number of intervals from which the error of the mean is estimated."""
+"""Smallest number of intervals from which the error of the mean growth rate is estimated."""
 
 
 class ExponentVerdict(StrEnum):
@@ -63,7 +63,7 @@ class ChaoticTransient:
     """Chaos that ended before the final motion of a run."""
 
     exponent_per_s: float
-    """Largest exponent during the transient [1/s]."""
+    """Largest Lyapunov exponent during the transient [1/s]."""
     standard_error_per_s: float
     until_s: float
     impacts: int
@@ -74,9 +74,9 @@ class Precision:
     """Required precision of an exponent; the less strict of the two limits applies."""
 
     absolute_per_s: float
-    """Largest allowed standard error [1/s]."""
+    """Largest allowed standard error of the exponent [1/s]."""
     relative: float = 0.0
-    """Largest allowed standard error, over the exponent."""
+    """Largest allowed standard error of the exponent, over the exponent."""
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
@@ -93,23 +93,23 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class LyapunovEstimate:
-    """Largest exponent of the final motion of a run; NaN if the run did not reach its end."""
+    """Largest Lyapunov exponent of a run's final motion; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error [1/s]; for multipliers half the difference of two cycles, for modes zero."""
+    """Standard error of the exponent [1/s]; half the difference of two cycles, or zero for modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
     """Final motion of the run."""
     since_s: float
-    """Time from which growth is averaged, or at which the final motion begins [s]."""
+    """Time from which on growth is averaged, or at which the final motion begins [s]."""
     blocks: BlockedMean | None
-    """Mean and error from blocks of intervals [1/s]; None unless the source is the average."""
+    """Mean growth rate and error from blocks of intervals [1/s]; None unless the source is the average."""
     interval_s: float
-    """Length of an interval [s]."""
+    """Length of the interval in which each growth rate is measured [s]."""
     local_time_s: Floats
     """End times of the intervals, shape (n,) [s]."""
     local_exponents_per_s: Floats
@@ -120,7 +120,7 @@ class LyapunovEstimate:
     impact_rate_hz: float
     """Mean impact rate in the final motion [1/s]."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end, shape (6,)."""
+    """x, y, z, vx, vy, vz at the end of the run, shape (6,) [m, m/s]."""
     end_time_s: float
     outcome: Outcome
 
@@ -204,13 +204,13 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
 
 @dataclass(frozen=True)
 class _Exponent:
-    """Exponent and its error [1/s], with the method."""
+    """Lyapunov exponent and its error [1/s], with the method that determined them."""
 
     mean: float
     error: float
     source: Source
     since: int
-    """Index of the first interval of the average."""
+    """Index of the first interval that the average includes."""
     blocks: BlockedMean | None = None
 
 
@@ -218,7 +218,7 @@ _LOST = _Exponent(math.nan, math.nan, Source.AVERAGE, 0)
 
 
 def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settling, skipped: int) -> _Exponent:
-    """Return the exponent from modes, multipliers or an average, depending on the final motion."""
+    """Return the exponent from modes, Floquet multipliers or mean growth, depending on the final motion."""
     match end.motion:
         case FinalMotion.QUIET:
             slowest = float(np.max(modal_form(specimen).rates.real))
@@ -235,7 +235,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return the largest exponent of a periodic motion: mean of two cycles, half their difference [1/s]."""
+    """Return the largest exponent of a periodic motion [1/s]: mean and half difference of two cycles."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []
@@ -274,7 +274,7 @@ def _estimate(
 
 
 def verdict_of(mean: float, error: float) -> ExponentVerdict:
-    """Return the verdict for an exponent and its standard error [1/s]."""
+    """Return the verdict on the sign of an exponent, given its standard error [1/s]."""
     if not (math.isfinite(mean) and math.isfinite(error)):
         return ExponentVerdict.UNKNOWN
     if abs(mean) <= SURE * error:
@@ -289,7 +289,7 @@ def _verdict(taken: _Exponent) -> ExponentVerdict:
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
-    """Return the chaos before the final motion; None if there was none."""
+    """Return the transient chaos before the final motion; None if there was none."""
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None

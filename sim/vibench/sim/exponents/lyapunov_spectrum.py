@@ -36,14 +36,14 @@ from .tangent_run import (
 
 @dataclass(frozen=True, eq=False)
 class LyapunovSpectrum:
-    """Exponents of the final motion of a run; NaN if the run did not reach its end."""
+    """Lyapunov exponents of a run's final motion; NaN if the run did not reach its end."""
 
     drive: Harmonic
     accuracy: Accuracy
     exponents_per_s: Floats
-    """Exponents in descending order, shape (6,); -inf for directions that vanish when m1 sticks to a stop."""
+    """Exponents, largest first, shape (6,) [1/s]; -inf for directions lost while m1 sticks to a stop."""
     standard_errors_per_s: Floats
-    """Standard errors, shape (6,) [1/s]; zero if the exponents are those of the modes."""
+    """Standard errors of the exponents, shape (6,) [1/s]; zero if the exponents are modal decay rates."""
     blocks: NDArray[np.int64]
     """Number of independent blocks from which each standard error is estimated, shape (6,)."""
     verdict: ExponentVerdict
@@ -147,7 +147,7 @@ UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
 class _Taken(NamedTuple):
-    """Exponents of a run; the default values describe a run that did not reach its end."""
+    """Lyapunov exponents of a run; the default values describe a run that did not reach its end."""
 
     exponents: Floats = UNKNOWN
     errors: Floats = UNKNOWN
@@ -188,7 +188,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
 
 
 def _mean(rates: Floats) -> BlockedMean:
-    """Return the mean of local exponents with its error; -inf for a direction that vanished in contact."""
+    """Return the mean of local exponents with its standard error; -inf for a direction lost in contact."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
     return block_mean(rates)

@@ -34,7 +34,7 @@ from ..specimen.stops import require_positive
 # test of the correlation of blocks at this and all longer lengths (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""Fewest uncorrelated blocks; with fewer, the standard error itself is uncertain by more than 20 per cent."""
+"""Fewest uncorrelated blocks; with fewer, a standard error is itself uncertain by more than 20 per cent."""
 CONFIDENCE = 0.99
 """Confidence level of the test for correlation between blocks."""
 
@@ -89,7 +89,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
 
 
 def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return, for each block length, variance, covariance of neighbours and number of blocks (2 or more)."""
+    """Return variance, covariance of neighbours and number of blocks (2 or more), for each block length."""
     variances, correlations, counts = [], [], []
     while len(centred) > 1:
         variances.append(float(np.mean(centred**2)))
@@ -102,17 +102,17 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the limits of the correlation test at each block length, with all longer lengths."""
+    """Return the limits of the correlation test at each block length, tested with all longer lengths."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Longest time between orthogonalisations: radians of the fastest mode, and its decay times. After this time
-the tangent vectors are still independent to several digits."""
+"""Longest time between orthogonalisations: in radians of the fastest mode, and in its decay times. After this
+time the tangent vectors are still independent to several digits."""
 CHECKS = 32
-"""Largest number of tests per run whether it may end early."""
+"""Largest number of tests, per run, of whether the run may end early."""
 ALMOST = 1e-9
 """Relative tolerance within which a duration is a whole number of intervals."""
 Enough = Callable[[Floats], bool]
@@ -127,10 +127,10 @@ class Interval:
 
     length_s: float
     periods: int
-    """Number of drive periods in the interval; 0 if it is not a whole number."""
+    """Number of drive periods in the interval; 0 if the interval is not a whole number of periods."""
 
     def count_in(self, duration_s: float) -> int:
-        """Return the number of intervals in a duration."""
+        """Return the number of whole intervals in a duration [s]."""
         return math.floor(duration_s / self.length_s * (1.0 + ALMOST))
 
 
@@ -160,15 +160,15 @@ class TangentRun:
     """x, y, z, vx, vy, vz at the end of each interval, shape (n, 6)."""
     impact_times_s: Floats
     is_quiet: bool
-    """Whether a bound proves that no impact will follow."""
+    """Whether a bound on p proves that no impact will follow after the run."""
     final_state: Floats
-    """State at ``end_time_s``, shape (6,)."""
+    """State (x, y, z, vx, vy, vz) at ``end_time_s``, shape (6,)."""
     end_time_s: float
     outcome: Outcome
 
     @property
     def rates(self) -> Floats:
-        """Local exponents, shape (n, m) [1/s]."""
+        """Growth rate of each tangent vector in each interval (local exponents), shape (n, m) [1/s]."""
         return self.growth / self.interval.length_s
 
 
@@ -237,18 +237,18 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change per cycle below which a motion repeats, and above which it does not repeat yet."""
+"""Relative change of the state per cycle: below the first value a motion repeats, above the second not."""
 LONGEST_CYCLE = 16
-"""Longest cycle that is detected, in intervals."""
+"""Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0
-"""Distance of a mean from zero, in standard errors, above which its sign is significant."""
+"""Distance of a mean growth rate from zero, in standard errors, above which its sign is significant."""
 CHANGED = 5.0
-"""Smallest significant difference of the means before and after a change, in standard errors. It is larger
+"""Smallest significant difference of mean growth before and after a change, in standard errors. It is larger
 than SURE, because the time of the change is chosen to make the difference largest."""
 FEWEST_INTERVALS = 32
 """Fewest intervals before and after a change of the exponent's sign."""
 ALIGNING = 8
-"""Number of first intervals, in which a tangent vector still turns to the direction of fastest growth."""
+"""Number of intervals in which an initial tangent vector turns to the direction of fastest growth."""
 
 
 class FinalMotion(StrEnum):
@@ -266,7 +266,7 @@ class Settling:
 
     motion: FinalMotion
     since: int
-    """Number of intervals before the final motion."""
+    """Number of intervals before the final motion begins."""
     cycle: int = 0
     """Number of intervals in a cycle of a periodic motion."""
 
@@ -291,7 +291,7 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Return the first interval after which mean growth is not significantly positive; None if no change."""
+    """Return the interval after which mean growth is not significantly positive; None if there is none."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None

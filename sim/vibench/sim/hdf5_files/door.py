@@ -10,14 +10,14 @@ from pathlib import Path
 import h5py
 
 MOST_OBJECTS = 20_000
-"""Most links to groups and datasets in a file; a recording has about forty."""
+"""Most allowed links to groups and datasets in a file; a recording has about forty."""
 MOST_ATTRIBUTES = 1_000
-"""Most attributes of an object; a channel of a recording has about twenty-five."""
+"""Most allowed attributes of an HDF5 object; a channel of a recording has about twenty-five."""
 DEEPEST = 32
-"""Deepest nesting of groups."""
+"""Deepest allowed nesting of groups in a file."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
-"""Largest chunk; chunks of recordings have 200 kB."""
+"""Largest allowed chunk of a dataset [bytes]; chunks of recordings have 200 kB."""
 LARGEST_RATIO = 1100
 """Largest ratio of declared to stored bytes; Deflate compresses by at most 1030 (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
@@ -33,7 +33,7 @@ OWN_FILTERS = frozenset(
         h5py.h5z.FILTER_LZF,
     }
 )
-"""Allowed filters. Other filters are plug-in libraries, which HDF5 would load and execute."""
+"""Allowed HDF5 filters for data; any other filter is a plug-in library that HDF5 would execute."""
 
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
 """Errors that h5py raises for unreadable headers or number types."""

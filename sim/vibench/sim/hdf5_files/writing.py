@@ -2,7 +2,7 @@
 
 HDF5 2.0 crashes if a write fails while a file is being closed, and h5py only prints errors that occur while
 an object is being closed. Therefore HDF5 writes to a file object that accepts every write and stores the
-first error, which is raised after HDF5 has closed the file. A Ctrl-C during a write is delayed likewise.
+first error. The error is raised after HDF5 has closed the file; a Ctrl-C during a write waits as well.
 """
 
 import signal
@@ -54,7 +54,7 @@ def open_hdf5_to_write(
 
 @contextmanager
 def _interrupts(disk: _Disk) -> Iterator[None]:
-    """Delay a KeyboardInterrupt that occurs inside this module until the file is closed."""
+    """Delay a Ctrl-C (KeyboardInterrupt) that arrives inside this module until the file is closed."""
     is_reached = threading.current_thread() is threading.main_thread()
     found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
     handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}

@@ -21,12 +21,12 @@ from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
 
 BLOCKS = 4
-"""Number of parts along each axis of the map, for the jackknife estimate of the exponent's error."""
+"""Number of parts into which each axis is divided for the jackknife error of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain initial states at a distance for which this distance is used."""
+"""Fewest uncertain initial states with which a distance is used in the fit."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of uncertain initial states for which a distance is used; above it, chance prevails."""
+"""Largest share of uncertain initial states with which a distance is used in the fit."""
 SPREAD = 4.0
 """Smallest ratio of the largest to the smallest used distance; a narrower range gives no reliable slope."""
 
@@ -44,9 +44,9 @@ class UncertaintyExponent:
     """Lower end of the 95 % confidence interval for the boundary as resolved by the grid."""
     high: float
     steps: tuple[int, ...]
-    """Distances used for the fit, in steps of the grid."""
+    """Distances between initial states that the fit uses, in grid steps."""
     shares: tuple[float, ...]
-    """Share of uncertain initial states at each distance."""
+    """Share of uncertain initial states at each distance of the fit."""
 
 
 def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | None:
@@ -82,7 +82,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
 
 
 def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
-    """Return whether a step of this length along an axis leads to another motion, without edge cells."""
+    """Return whether a step of this length along an axis leads to another motion, for all inner cells."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step
     ]
@@ -110,7 +110,7 @@ class KickStability:
     motion: int
     """Index of the motion in `MapResults.motion_numbers`."""
     size: float
-    """Standard deviation of the kicks: of displacements over the gap, of velocities over gap * 2 pi f."""
+    """Standard deviation of the kicks: displacements over the gap, velocities over gap * 2 pi f."""
     returned: Share
     """Share of kicks after which the motion returns, within the drive periods of the map."""
 

@@ -29,9 +29,9 @@ from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
-"""Relative difference between neighbouring responses above which points between them are computed."""
+"""Relative difference of two neighbouring responses above which the points between them are computed."""
 BASIN_JUMP = 2e-3
-"""`JUMP` if only the initial state varies; the same motion then differs only by remaining transients."""
+"""Replaces `JUMP` if only the initial state varies; one motion then differs only by its transients."""
 NOTHING = -1
 BUNDLE_S = 0.3
 """Computing time of the scenes that a worker receives at once [s]; long enough to fill SIMD batches."""
@@ -76,7 +76,7 @@ class MapPoints(Points):
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute next, from all starts; all points if the map is not adaptive."""
+        """Return the points to compute next, for all initial states; all points of a non-adaptive map."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
@@ -138,7 +138,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for each cell, shape (rows, columns), equal in cells that reach the same motions.
+    """Return a number per cell, shape (rows, columns); cells that reach the same motions have equal numbers.
 
     ``label`` has the shape (rows, initial states, columns). The motion from the first must be the same too.
     """
@@ -160,19 +160,19 @@ def cells_shape(grid: Grid) -> tuple[int, int]:
 
 
 def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
-    """Return the numbers of all points (one per initial state) in some cells of a map."""
+    """Return the point numbers of the given cells of a map; a cell has one point per initial state."""
     _, starts, columns = grid.shape
     row, column = np.divmod(cells, columns)
     return np.asarray(((row[:, None] * starts + np.arange(starts)) * columns + column[:, None]).reshape(-1))
 
 
 POINT_S = 2e-4
-"""Time that the main process needs for each point [s]: build its scene and store its result."""
+"""Time that the main process needs per point to build the scene and store the result [s]."""
 
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Estimated computing time of a map; for an adaptive map, bounds: first lattice only, and all points."""
+    """Estimated computing time of a map; two bounds for an adaptive map: first lattice, and all points."""
 
     points: int
     coarse_points: int
@@ -192,17 +192,17 @@ class MapEstimate:
 
     @property
     def all_s(self) -> float:
-        """Elapsed time for all points [s]."""
+        """Estimated elapsed time for computing all points [s]."""
         return self._elapsed_s(self.points, self.work_s)
 
     @property
     def most_s(self) -> float:
-        """Elapsed time for all points if no motion repeats [s]."""
+        """Estimated elapsed time for computing all points if no motion repeats [s]."""
         return self._elapsed_s(self.points, self.longest_work_s)
 
     @property
     def first_s(self) -> float:
-        """Elapsed time for the first lattice [s]."""
+        """Estimated elapsed time for computing the first lattice [s]."""
         return self._elapsed_s(self.coarse_points, self.coarse_work_s)
 
     @property
@@ -216,7 +216,7 @@ class MapEstimate:
 
     @property
     def sentence(self) -> str:
-        """Estimate as text."""
+        """Estimated computing time of the map as text."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture. Estimated "
             f"work: {self.work_s:.2g} s on one core, from {self.known_from}. With "
@@ -227,7 +227,7 @@ class MapEstimate:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Return a dict of plain values for JSON."""
+        """Return the estimate as a dict of plain values for JSON."""
         return {
             **asdict(self),
             "all_s": self.all_s,

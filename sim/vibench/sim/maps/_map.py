@@ -52,7 +52,7 @@ KEPT = (
 )
 """Columns of a study that are also columns of a map."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
-"""Columns in addition to these, in a map with a target."""
+"""Additional columns of a map with a requested error or computing time."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
 SECTION_STATES = 64
@@ -61,7 +61,7 @@ SECTION_COLUMNS = tuple(
     Column(f"section_{name}", "<f8", "m", f"{what} once a drive period", (), SECTION_STATES, "drive_period")
     for name, what in (("x", "displacement of m0"), ("p", "displacement of m1 against m2"))
 )
-"""Columns for these states, in a map along one quantity."""
+"""Columns of the states once per drive period, which only a map along one quantity stores."""
 _OF_STUDIES = {column.name: column for column in COLUMNS}
 _MAP_COLUMNS = (
     *(_OF_STUDIES[name] for name in KEPT[:-1]),
@@ -76,7 +76,7 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Factor in the labels kind * LONGER + period; larger than the longest detected period."""
+"""Factor in the motion labels kind * LONGER + period; it exceeds the longest detected period."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
@@ -111,7 +111,7 @@ def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None
 
 
 def section_cells(found: ScenePrediction) -> dict[str, Cell]:
-    """Return the states to store: one period of a motion that repeats, otherwise `SECTION_STATES`."""
+    """Return the section points to store: one period of a repeating motion, else `SECTION_STATES` points."""
     if found.section is None:
         return {}
     most = min(SECTION_STATES, found.period or SECTION_STATES)
@@ -126,7 +126,7 @@ class Quantity:
     """Parameter of a scene that is fixed or varies in a map."""
 
     field: str
-    """Name of the field of `Map`."""
+    """Name of the field of `Map` for this parameter."""
     axis: str
     """Name of the axis for this parameter in the results."""
     units: str
@@ -156,7 +156,7 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""Largest number of points; file and memory then take 1 GB each."""
+"""Largest number of points of a map; file and memory then take 1 GB each."""
 MOST_STEP = 16
 """Largest default spacing of the first lattice, in grid steps."""
 FEWEST_STEPS = 8
@@ -351,7 +351,7 @@ class Map(GridPlan):
 
     @property
     def is_basin(self) -> bool:
-        """Whether only the start varies."""
+        """Whether only the initial state varies over the map."""
         return all(each in START for each in self.varied)
 
     @property
@@ -361,7 +361,7 @@ class Map(GridPlan):
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether points may be filled in, which requires two varying quantities and no chain."""
+        """Whether points may be interpolated: two varying quantities, and no point continues another."""
         may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
         return may_be and self.first_step > 1
 
@@ -376,7 +376,7 @@ class Map(GridPlan):
 
     @property
     def start_labels(self) -> tuple[str, ...]:
-        """Names of the starts of each point."""
+        """Names of the initial states from which each point is computed."""
         own = tuple(str(each) for each in self.chain) or (
             "given" if any(getattr(self, each.field) for each in START) else "rest",
         )
@@ -384,7 +384,7 @@ class Map(GridPlan):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Dimensions of the results: second varying quantity (if any), starts, first varying quantity."""
+        """Axes of the results: second varying quantity (if any), initial states, first varying quantity."""
         first, *second = (
             StudyAxis(each.axis, self.range_of(each).values, each.units, each.long_name)
             for each in self.varied
@@ -393,12 +393,12 @@ class Map(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Stored columns; errors only with a target, section points only along one quantity."""
+        """Columns that the map stores: errors only with a target, section points only along one quantity."""
         errors = () if self.target is None else tuple(_OF_STUDIES[name] for name in ERRORS)
         return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
 
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
-        """Return the scene at a position of the grid, with the start of the plan or the given start.
+        """Return the scene at a grid position, from the plan's initial state or the given one.
 
         Raises ValueError when a scene with these values is not allowed.
         """
@@ -432,7 +432,7 @@ class Map(GridPlan):
     def _start(
         self, place: tuple[int, ...], numbers: Mapping[str, float], specimen: Specimen, drive: Harmonic
     ) -> Given | Rest:
-        """Return the start of a point that does not continue another point."""
+        """Return the initial state of a point that does not continue another point."""
         if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
             return Given(state_of(random_state(specimen, drive, drawn)), RANDOM)
@@ -462,7 +462,7 @@ def _specimen(
     stiffnesses: tuple[float | None, ...],
     hertz_stiffness: float | None,
 ) -> Specimen:
-    """Return a specimen, which is built only once for all points that share it."""
+    """Return the specimen with these values, built once for all points that share it."""
     changes: dict[str, object] = {}
     if any(each is not None for each in stiffnesses):
         k0, k1, k2 = (

@@ -27,11 +27,11 @@ class Seen:
     is_known: Mask
     """Whether the cell has been computed."""
     codes: Codes
-    """Number that is equal for cells with the same motion or set of motions."""
+    """Number of the cell's motion or set of motions; equal numbers mean the same motions."""
     sizes: Floats
     """Natural logarithm of a response; NaN for motions whose response is not reproducible."""
     jump: float
-    """Difference of ``sizes`` above which two neighbours count as different."""
+    """Difference of ``sizes`` above which two neighbouring cells count as different."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,9 @@ class RefinementPlan:
     fillings: tuple[Filling, ...] = ()
     """Filled-in cells of each level, from coarse to fine."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Filled-in cells that are computed all the same, to check the filling."""
+    """Filled-in cells that are computed as well, to find how often the filling is wrong (audit)."""
     audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    """Computed cell from which each of these cells would have been filled in."""
+    """Computed cell whose motion each audited cell would have received by filling."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
@@ -124,7 +124,7 @@ class _Sketch:
         self.donors[cells] = np.flatnonzero(cells)
 
     def refine(self, fine: int, step: int) -> Mask:
-        """Halve the spacing of the lattice; return the cells that must be computed first, if any."""
+        """Halve the lattice spacing; return the cells to compute before the next halving, if any."""
         cells = np.flatnonzero(lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step))
         corners, weights = _corners(self.codes.shape, cells, step)
         wanted = np.zeros_like(self.is_computed)
@@ -144,7 +144,7 @@ class _Sketch:
     def filling(self, fine: int, step: int) -> Filling:
         """Return the filled-in cells of one lattice level.
 
-        A corner that later turned out to have another motion gets no weight.
+        A corner cell that was later found to have another motion gets no weight.
         """
         is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
         cells = np.flatnonzero(is_new)
@@ -168,7 +168,7 @@ class _Sketch:
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
     def _has_other_neighbour(self, fine: int) -> Mask:
-        """Return whether any of the eight neighbours has another motion, shape (rows, columns)."""
+        """Return whether any of each cell's eight neighbours has another motion, shape (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)
         differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
@@ -224,7 +224,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
 
 
 def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
-    """Return the lattice lines below and above each index, and its position between them (0 to 1)."""
+    """Return the lattice lines below and above each index, and the index's position between them (0 to 1)."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]
     low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])

@@ -47,9 +47,9 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong cells by the motion that was computed; fractional with several initial states."""
+    """Number of wrong audited cells by their computed motion; fractional with several initial states."""
     lost: tuple[float, ...]
-    """Number of wrong cells by the motion that was filled in."""
+    """Number of wrong audited cells by their filled-in motion."""
 
     @property
     def wrong_share(self) -> Share:
@@ -142,7 +142,7 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def motion_counts(self) -> Floats:
-        """Number of different motions reached from the initial states of each cell; NaN if unknown."""
+        """Number of different motions that each cell's initial states reach; NaN if unknown."""
         shape = self.plan.grid.shape
         labels, sizes = self._labels.reshape(shape), self._sizes.reshape(shape)
         order = np.lexsort((sizes, labels), axis=-2)
@@ -226,7 +226,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return group numbers by label and, if given, by size; within a label a jump of size splits."""
+    """Return group numbers of points by label and size; a jump of size starts a new group."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -237,7 +237,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the numbers changed so that 0 is the most common one, 1 the next, and so on."""
+    """Renumber motions by frequency: 0 is the most common one, 1 the next, and so on."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")

@@ -114,7 +114,7 @@ def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
-    """Return the weighted mean over finite corners, shape (n, 4) to (n,); NaN if no corner is finite."""
+    """Return the weighted mean over the finite corner values of each cell, (n, 4) to (n,); NaN if none is."""
     is_known = np.isfinite(values)
     counted = np.where(is_known, weights, 0.0)
     with np.errstate(invalid="ignore"):

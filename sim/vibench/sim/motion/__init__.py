@@ -1,7 +1,7 @@
 """One motion of one specimen: integrated, observed, sampled, or reduced to one state per drive period.
 
 `integrate` returns a `Trajectory`. `steady_response` returns Responses I and II in the window at the end of a
-run. `follow_samples` returns the motion at each sample of a recorded base motion. `poincare` finds the period
-of a motion, and the derivative of the final state by the initial state. If a run cannot continue, its result
-has another `Outcome`; no exception is raised (docs/decisions/0004-contact-integration.md).
+run. `follow_samples` returns the motion at each sample of a recorded base motion. `poincare` finds a motion's
+period, and the derivative of the final state by the initial state. If a run cannot continue, its result has
+another `Outcome`; no exception is raised (docs/decisions/0004-contact-integration.md).
 """

@@ -22,11 +22,11 @@ from ..specimen.stops import chosen
 # amplitude (omega h)^4 / 384 at the highest frequency; the interval h makes it a thousandth of the tolerance.
 
 HERMITE = 384.0
-"""Denominator of the error of cubic Hermite interpolation, h^4 / 384 times the fourth derivative."""
+"""Denominator in the error of cubic Hermite interpolation: h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
 """Part of the tolerance that the interpolation of a sweep may use."""
 SHORTEST_TURN = 0.005
-"""Shortest interval [rad] of the highest frequency; its error, 2e-12 of the amplitude, is small enough."""
+"""Shortest interval [rad at the highest frequency]; its interpolation error is 2e-12 of the amplitude."""
 
 
 class BaseMotion(NamedTuple):
@@ -73,7 +73,7 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 LATEST_START_S = 1e8
 """Latest start time [s], about three years; later ones cannot be resolved to 1e-8 s in double precision."""
 MOST_SAMPLES = 1e9
-"""Largest number of samples, which need 48 GB of memory."""
+"""Largest number of samples of a run; they need 48 GB of memory."""
 ROUNDING = 1e-9
 """Relative tolerance within which a duration contains a whole number of samples or intervals."""
 
@@ -87,7 +87,7 @@ class Impacts:
 
     @property
     def count(self) -> int:
-        """Number of contacts that began."""
+        """Number of contacts that began during the run."""
         return len(self.times_s)
 
 
@@ -100,11 +100,11 @@ class Trajectory:
     states: Floats
     """x, y, z, vx, vy, vz in the inertial frame, shape (n, 6) [m, m/s]."""
     final_state: Floats
-    """State at ``end_time_s``, shape (6,)."""
+    """x, y, z, vx, vy, vz at ``end_time_s``, shape (6,) [m, m/s]."""
     end_time_s: float
     impacts: Impacts
     outcome: Outcome
-    """Outcome; only with REACHED_END the run reached the requested time."""
+    """Outcome of the run; only REACHED_END means that the run reached the requested time."""
     accuracy: Accuracy
 
 
@@ -173,7 +173,7 @@ def integrate(
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:
-    """Raise ValueError for a negative or infinite limit of the impact rate."""
+    """Raise ValueError if the limit of the impact rate is negative or infinite."""
     if not 0.0 <= max_impact_rate_hz < math.inf:
         raise ValueError(
             f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
@@ -200,7 +200,7 @@ def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | 
 
 
 def check_within(available_s: float, end_s: float) -> None:
-    """Raise ValueError for a run that is longer than its drive."""
+    """Raise ValueError if the run lasts longer than its sweep or sampled drive."""
     if end_s > available_s * (1.0 + ROUNDING):
         raise ValueError(
             f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."

@@ -12,7 +12,7 @@ from ..specimen.state import Floats
 
 
 def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, most: int = 32) -> int | None:
-    """Return the number of drive periods after which a motion repeats, the smallest one; None if none.
+    """Return the smallest number of drive periods after which a motion repeats; None if it does not.
 
     Parameters
     ----------

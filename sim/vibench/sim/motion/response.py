@@ -23,7 +23,7 @@ class Response:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Length of the window at the end of the run from which the largest values are taken [s]."""
+    """Length of the window at the end of the run, in which the largest abs(x) and abs(p) are observed [s]."""
     line_periods: int
     """Number of whole drive periods, at the end of the window, from which the phasors are computed."""
     largest_x_m: float
@@ -35,13 +35,13 @@ class Response:
     line_p_m: complex
     """Phasor of p at the drive frequency [m]."""
     impacts: int
-    """Number of contacts that began in the window."""
+    """Number of contacts that began in the evaluated window."""
     impacts_before: int
-    """Number of contacts that began before the window."""
+    """Number of contacts that began before the evaluated window."""
     line_start_state: Floats
-    """x, y, z, vx, vy, vz at the start of the ``line_periods``, shape (6,)."""
+    """x, y, z, vx, vy, vz at the start of the drive periods counted by ``line_periods``, shape (6,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end; initial state for the next point of a sweep, shape (6,)."""
+    """x, y, z, vx, vy, vz at the end of the run, where the next point of a sweep may start, shape (6,)."""
     outcome: Outcome
 
     @property

@@ -96,7 +96,7 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a path for a new file, which replaces ``path`` at the end; after an error the old file stays."""
+    """Yield a path for a new file that finally replaces ``path``; after an error the old file stays."""
     target = path.resolve()  # follow a link, do not replace it
     if target.exists():
         target.open("r+b").close()  # raises OSError if write-protected
@@ -127,7 +127,7 @@ UNKNOWN = ""
 
 
 class Place(Enum):
-    """Place where a process was started; its number identifies a process only if this is `HERE`."""
+    """Place where a process was started; only for `HERE` does its number identify the process."""
 
     HERE = auto()
     CONTAINER = auto()
@@ -145,7 +145,7 @@ def place_of(start: str) -> Place:
 
 
 def is_process(pid: int, start: str) -> bool:
-    """Return whether a process is alive; if one start time is `UNKNOWN`, only the number is compared."""
+    """Return whether a process is alive; if a start time is `UNKNOWN`, compare only the process number."""
     now = process_start(pid)
     return now is not None and (UNKNOWN in (now, start) or now == start)
 

@@ -47,7 +47,7 @@ def sync_data(descriptor: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Do nothing, because Windows flushes folders itself."""
+    """Do nothing, because Windows flushes the file names of a folder itself."""
 
 
 def allocate(descriptor: int, offset: int, size: int) -> None:
