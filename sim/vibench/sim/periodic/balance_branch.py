@@ -32,7 +32,7 @@ from .restoring_force import PowerSpring, RestoringForce
 from .shooting import SAMPLES, PeriodicOrbit
 
 TAIL = 4
-"""Highest harmonic in the error estimate, over the highest harmonic of the solution."""
+"""Ratio of the highest harmonic in the error estimate to the highest harmonic of the solution."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class BalanceOptions:
 
     kept: HarmonicSet = HarmonicSet.ODD
     fewest: int = 15
-    """Highest harmonic of the first attempt."""
+    """Highest harmonic of the first attempt to solve the balance."""
     most: int = 511
-    """Highest harmonic of the last attempt."""
+    """Highest harmonic of the last attempt to solve the balance."""
     tolerance: float = 1e-4
     """Largest allowed change of p due to neglected harmonics, relative to the fundamental of p."""
 
@@ -137,7 +137,7 @@ def balance(
 def balance_of_solution(
     problem: BalanceProblem, unknowns: np.ndarray, frequency_hz: float, amplitude_m: float, tolerance: float
 ) -> Balance:
-    """Return displacements, error estimate and outcome of a solution of the balance equations."""
+    """Return a solution of the balance equations with its displacements, error estimate and outcome."""
     omega = 2.0 * math.pi * frequency_hz
     harmonics, phasors = problem.harmonics, problem.phasors(unknowns)
     seen = condense(problem.structure, omega, harmonics)
@@ -171,20 +171,20 @@ class BalanceFamily:
     problem: BalanceProblem
     path: DrivePath
     scale: float
-    """Parameter change that counts as one unit of length [Hz, or m]."""
+    """Change of the parameter that counts as one unit of arc length [Hz, or m]."""
     options: BalanceOptions
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed truncation error, over the fundamental of p."""
+        """Largest allowed error of p by neglected harmonics, over the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
-        """Return drive frequency [Hz] and amplitude [m] at a point."""
+        """Return drive frequency [Hz] and amplitude [m] at a point of the curve."""
         return self.path.drive(float(point[-1]) * self.scale)
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the residual, and its derivatives by all unknowns and the parameter."""
+        """Return the residual of the balance, and its derivatives by all unknowns and the parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
         residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics, new ones zero; None if the limit is reached."""
+        """Return the family with twice the harmonics, the new ones zero; None if that exceeds the limit."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:

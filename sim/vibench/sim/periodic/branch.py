@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance of a multiplier from the unit circle within which it counts as on it, as without damping."""
+"""Distance from the unit circle within which a Floquet multiplier counts as on it, as without damping."""
 
 
 class Parameter(StrEnum):
@@ -32,15 +32,15 @@ class BifurcationKind(StrEnum):
     """Kind of an event on a branch: a bifurcation, or grazing."""
 
     FOLD = "fold"
-    """The branch turns back; the response jumps here in a sweep. One multiplier is +1."""
+    """The branch turns back, and a sweep jumps to another branch. One Floquet multiplier is +1."""
     SYMMETRY_BREAKING = "symmetry breaking"
-    """Two motions, mirror images of each other, branch off the symmetric motion. One multiplier is +1."""
+    """Two motions, mirror images of each other, leave the symmetric motion. One Floquet multiplier is +1."""
     PERIOD_DOUBLING = "period doubling"
-    """A motion of twice the period branches off. One multiplier is -1."""
+    """A motion of twice the period leaves the branch. One Floquet multiplier is -1."""
     NEIMARK_SACKER = "Neimark-Sacker"
-    """A quasi-periodic motion branches off. A complex pair of multipliers crosses the unit circle."""
+    """A quasi-periodic motion leaves the branch. A complex pair of multipliers crosses the unit circle."""
     GRAZING = "grazing"
-    """A contact appears or disappears, at zero approach speed."""
+    """A contact appears in the motion, or disappears, at zero approach speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +66,14 @@ class Branch:
 
     parameter: Parameter
     frequencies_hz: Floats
-    """Drive frequency, shape (m,)."""
+    """Drive frequency of each point, shape (m,) [Hz]."""
     amplitudes_m: Floats
-    """Drive amplitude, shape (m,)."""
+    """Drive amplitude of each point, shape (m,) [m]."""
     response_i: Floats
     """Largest magnitude, within a period, of every displacement (x, y, z) and of p, over the drive amplitude,
     shape (m, n + 1)."""
     response_ii: Floats
-    """Amplitude of the same at the drive frequency, over the drive amplitude, shape (m, n + 1)."""
+    """Amplitude of every displacement and of p at the drive frequency, over the drive's, shape (m, n + 1)."""
     states: Floats
     """Displacements and velocities at time zero of the drive, shape (m, 2 n)."""
     multipliers: Complex
@@ -87,16 +87,16 @@ class Branch:
     end: ArcEnd
     """Reason why the branch ends at its last point."""
     begin: ArcEnd | None = None
-    """Reason why it ends at its first point; None if following began there."""
+    """Reason why the branch ends at its first point; None if following began there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """Whether no multiplier lies outside the unit circle, shape (m,)."""
+        """Whether each motion is stable: no Floquet multiplier lies outside the unit circle, shape (m,)."""
         return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0 + NEUTRAL)
 
     @property
     def parameters(self) -> Floats:
-        """Values of the parameter, shape (m,)."""
+        """Values of the parameter at the points, shape (m,) [Hz, or m]."""
         return self.frequencies_hz if self.parameter is Parameter.FREQUENCY else self.amplitudes_m
 
 
@@ -123,14 +123,14 @@ POINTWISE = (
 # half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
 
 COMPLEX_PART = 1e-6
-"""Smallest imaginary part of a pair at a Neimark-Sacker point; excludes real pairs of product one."""
+"""Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs of product one."""
 
 
 class OrbitShape(StrEnum):
     """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """The mirrored motion is the same motion half an odd number of drive periods later; needs equal gaps."""
+    """Half its (odd) number of drive periods later, the motion is its own mirror image; needs equal gaps."""
     REPEATED = "repeated"
     """The motion repeats after a whole number of drive periods."""
 
@@ -143,16 +143,16 @@ class OrbitSigns:
     """Data for the detection of bifurcations at one point of a branch."""
 
     multipliers: Complex
-    """Multipliers over half the period if mirrored, otherwise over the period; shape (2 n,)."""
+    """Floquet multipliers over half the period if mirrored, otherwise over the period; shape (2 n,)."""
     contacts: int
-    """Number of contacts in a period."""
+    """Number of contacts that begin in a period of the motion."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Difference from the motion with half the period or mirrored, shape (6,); empty if not defined."""
+    """Difference of the state after half a period or mirrored, shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
     """Bifurcation by which this branch leaves the branch of motions with half the period or mirrored."""
     grazing_distance: float = math.inf
-    """Distance from grazing: of p over the gap or, at a contact, of dp/dt over the gap times 2 pi f."""
+    """Distance from grazing: p to the stop over the gap or, at a contact, dp/dt over the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -174,14 +174,14 @@ class OrbitSigns:
 
     @property
     def has_pair_on_circle(self) -> bool:
-        """Whether the pair of multipliers whose product is closest to one is complex."""
+        """Whether the pair of Floquet multipliers whose product is closest to one is complex."""
         pairs = list(itertools.combinations(self.multipliers, 2))
         first, _ = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
         return bool(abs(first.imag) > COMPLEX_PART)
 
 
 def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[BifurcationKind]:
-    """Return the bifurcations between two neighbouring points, except folds."""
+    """Return the bifurcations between two neighbouring points of a branch, except folds."""
     found = []
     if before.contacts != after.contacts:
         found.append(BifurcationKind.GRAZING)
@@ -194,13 +194,13 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Distance from a simpler motion, over the gap, below which the branch may have reached it in one step."""
+"""Distance from a simpler motion, over the gap, which a branch may cover in one step."""
 IS_SIMPLER = 1e-7
-"""Distance from a simpler motion, over the gap, that is only rounding: the motion is the simpler one."""
+"""Distance from a simpler motion, over the gap, below which both are the same motion but for rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch passed a motion of half the period or mirrored, where it ends."""
+    """Return whether a branch has passed a motion of half the period or mirrored, at which it ends."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -53,7 +53,7 @@ class FrequencyPath:
         return value, float(self._curve(self._inside(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """Return the derivatives by frequency: 1 for frequency, and that of the amplitude [m/Hz]."""
+        """Return the derivatives of frequency (1) and amplitude [m/Hz] by the frequency."""
         if len(self.amplitudes_m) == 1 or self._inside(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
@@ -81,7 +81,7 @@ class AmplitudePath:
         return self.frequency_hz, value
 
     def slopes(self, value: float) -> tuple[float, float]:  # noqa: ARG002 - the same everywhere
-        """Return the derivatives by amplitude: 0 for frequency, 1 for amplitude."""
+        """Return the derivatives of frequency (0) and amplitude (1) by the amplitude."""
         return 0.0, 1.0
 
 
@@ -111,7 +111,7 @@ class OrbitReport:
 
 
 class Family(Curve, Protocol):
-    """A curve whose points are periodic motions."""
+    """Equations of a curve whose points are periodic motions."""
 
     @property
     def path(self) -> DrivePath:
@@ -120,23 +120,23 @@ class Family(Curve, Protocol):
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed error estimate of a point."""
+        """Largest allowed error estimate of a point; above it, the resolution is increased."""
         ...
 
     def report(self, point: Vector) -> OrbitReport:
-        """Return the results for the motion at a point."""
+        """Return the results (responses, stability) of the motion at a point of the curve."""
         ...
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
         """Return the family at a higher resolution, with a point and a tangent converted to it.
 
-        None if this is the highest resolution.
+        None if the family already has the highest resolution.
         """
         ...
 
 
 RANGE_LENGTH = 10.0
-"""Length of the parameter range in scaled units; the gap, or the spring's length scale, has length 1."""
+"""Length of the parameter range in scaled units, in which the gap or the spring's length scale is 1."""
 
 
 def parameter_value(path: DrivePath, drive: Harmonic) -> float:
@@ -145,7 +145,7 @@ def parameter_value(path: DrivePath, drive: Harmonic) -> float:
 
 
 def range_scale(low: float, high: float, value: float) -> float:
-    """Return the parameter change that counts as one unit of length [Hz, or m]."""
+    """Return the change of the parameter that counts as one unit of arc length [Hz, or m]."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         raise ValueError(
             f"A branch from {low} to {high} through {value} is not allowed: give 0 < low <= value <= high."
@@ -185,7 +185,7 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""Distance from grazing, over the gap, within which a branch that cannot be continued ends by grazing."""
+"""Distance from grazing, over the gap, within which a failed continuation counts as an end by grazing."""
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
@@ -202,7 +202,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
 
 
 def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Join two branches that start at the same point; points of the first are reversed."""
+    """Join two branches that start at the same point, after reversing the order of the first one's points."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
@@ -289,7 +289,7 @@ class _Followed:
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
-        """End a branch at a motion of half the period or mirrored, beyond which it would repeat itself."""
+        """End a branch at a motion of half the period or mirrored, beyond which the branch repeats itself."""
 
         def measure(point: ArcPoint) -> float:
             return float(self.family.report(point.point).signs.apart @ signs.apart)

@@ -44,7 +44,7 @@ class ArcSteps:
     """Largest residual of a point on the curve."""
     most_points: int = 2000
     until_s: float = math.inf
-    """Time limit as a value of `time.monotonic` [s]."""
+    """Time limit for following the curve, as a value of `time.monotonic` [s]."""
 
 
 class ArcEnd(StrEnum):
@@ -71,16 +71,16 @@ class ArcPoint:
     arc: float = 0.0
     """Arc length from the start of the curve."""
     is_fold: bool = False
-    """Whether the parameter reverses here; such a point is inserted between two steps."""
+    """Whether the parameter reverses at this point (a fold); such a point is inserted between two steps."""
     end: ArcEnd | None = None
     """Reason why the curve ends at this point; None for all points before the last."""
 
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
-"""Number of Newton iterations at which the step length is kept; with fewer, the next step is longer."""
+"""Number of Newton iterations at which the step length is unchanged; fewer make the next step longer."""
 FARTHEST_ASIDE = 0.5
-"""Largest correction, over the step length; a larger one would lead to another branch."""
+"""Largest allowed Newton correction, over the step length; a larger one could reach another branch."""
 LEAP_GROWTH = 10.0
 """Ratio of successive step lengths that are tried across a kink."""
 LONGEST_LEAP = 5.0
@@ -91,9 +91,9 @@ LOCATED = 1e-9
 CRAWLING, MOST_CRAWLED = 10.0, 50
 """More than MOST_CRAWLED successive steps, all below CRAWLING times the shortest step, indicate a kink."""
 NEAR_START = 0.2
-"""Distance from the start, over the step length, below which the curve may have closed."""
+"""Distance from the curve's first point, over the step length, below which the curve may have closed."""
 SAME_POINT = 1e-6
-"""Distance below which two points are the same point of the curve."""
+"""Distance below which two points count as the same point of the curve."""
 SHORTEST_BRACKET = 1e-12
 """Length of the bracketing interval at which the search for a zero ends."""
 
@@ -212,7 +212,7 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
 
 
 def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
-    """Return whether a step passed through the start of the curve."""
+    """Return whether a step has passed the first point of the curve, which is then closed."""
     step = ahead.point - here.point
     length = float(np.linalg.norm(step))
     part = float((start.point - here.point) @ step) / length**2
@@ -257,7 +257,7 @@ def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
 
 
 def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Return the fold between two points; None if there is none or it cannot be located."""
+    """Return the fold between two points; None if there is no fold, or it cannot be located."""
     if before.tangent[-1] * after.tangent[-1] >= 0.0:
         return None
     found = locate(curve, before, after, lambda point: float(point.tangent[-1]), steps.tolerance)
@@ -299,7 +299,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Return a point of the curve between two others, if possible at a fraction of the chord."""
+    """Return a point of the curve between two of its points, if possible at a given fraction of the chord."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:
@@ -316,7 +316,7 @@ def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance
 def _at_bound(
     curve: Curve, before: ArcPoint, after: ArcPoint, bounds: tuple[float, float], steps: ArcSteps
 ) -> ArcPoint:
-    """Return the point of the curve at the bound that the step has passed."""
+    """Return the point of the curve at the parameter bound that the step has passed."""
     bound = bounds[0] if after.point[-1] <= bounds[0] else bounds[1]
     span = after.point[-1] - before.point[-1]
     part = (bound - before.point[-1]) / span if span != 0.0 else 1.0

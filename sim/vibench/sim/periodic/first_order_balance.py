@@ -22,7 +22,7 @@ from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""Value of the sum, over its largest term, below which an extremum counts as a double zero."""
+"""Value of a sum of powers, over its largest term, below which an extremum counts as a double zero."""
 ROOT_TOLERANCE = 1e-15
 """Absolute tolerance of ln u; the method `brentq` adds a relative tolerance of rounding size."""
 
@@ -52,7 +52,7 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return the sum over its largest term, which has the sign of the sum."""
+    """Return a sum of powers over the magnitude of its largest term; the sign is that of the sum."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
@@ -92,7 +92,7 @@ FUNDAMENTAL = np.array([1])
 
 
 def fundamental_share(exponent: int) -> float:
-    """Return the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1), 3/4 for n = 3, 5/8 for n = 5.
+    """Return the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1), such as 3/4 for n = 3.
 
     The quotient of two exact integers is correctly rounded for every n.
     """
@@ -112,7 +112,7 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """Whether amplitude perturbations decay; False on the middle one of three branches.
+    """Whether perturbations of the amplitude decay; False on the middle one of three branches.
 
         Floquet multipliers also show all other instabilities (`vibench.sim.periodic.floquet`).
     """

@@ -27,9 +27,9 @@ STEPS_PER_TURN = 8.0
 STEPS_PER_HARMONIC = 16
 """Number of Magnus steps per period of the highest harmonic, for a force that is smooth at every p."""
 SMOOTH_STEPS = 128
-"""Smallest number of Magnus steps per period, for such a force."""
+"""Smallest number of Magnus steps per period, for a force that is smooth at every p."""
 GAUSS = math.sqrt(3.0) / 6.0
-"""Distance of the two Gauss points from the middle of a step, over the step length."""
+"""Distance of each of the two Gauss points from the middle of a step, over the step length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def transition(
 
 
 class _Departures:
-    """Transition matrices of small perturbations between phases without a contact change in between."""
+    """Transition matrices of small perturbations between drive phases in which no contact begins or ends."""
 
     def __init__(self, structure: LinearStructure, spring: RestoringForce, motion: Motion) -> None:
         self._structure, self._spring, self._motion = structure, spring, motion
@@ -93,7 +93,7 @@ class _Departures:
         self._fastest = own + math.sqrt(stiffest * float(-structure.direction @ push))
 
     def over(self, start: float, stop: float) -> Floats:
-        """Return the transition matrix between two phases [rad]."""
+        """Return the transition matrix of small perturbations between two drive phases [rad]."""
         length = (stop - start) / (2.0 * math.pi * self._motion.frequency_hz)
         stiffness, _ = self._slopes(np.array([0.5 * (start + stop)]))
         if self._spring.kinks and stiffness[0] == 0.0:
@@ -125,13 +125,13 @@ class _Departures:
         return np.asarray(steps[0])
 
     def _rates(self, turn: Floats) -> Floats:
-        """Return the state matrices with spring at phases ``turn``, shape (k, 2 n, 2 n)."""
+        """Return the state matrices with the spring at drive phases ``turn`` [rad], shape (k, 2 n, 2 n)."""
         direction = self._structure.direction
         rows = np.concatenate([np.multiply.outer(slope, direction) for slope in self._slopes(turn)], axis=1)
         return np.asarray(self._system + self._spring_in[None, :, None] * rows[:, None, :])
 
     def _slopes(self, turn: Floats) -> tuple[Floats, Floats]:
-        """Return dF/dp and dF/d(dp/dt) at phases ``turn``, shape (k,) each."""
+        """Return the spring's dF/dp and dF/d(dp/dt) at drive phases ``turn`` [rad], shape (k,) each."""
         p, rate = self._motion.p(turn), self._motion.rate(turn)
         return self._spring.stiffness(p, rate), self._spring.damping(p, rate)
 

@@ -57,7 +57,7 @@ class LinearStructure:
 
     @property
     def size(self) -> int:
-        """Number of degrees of freedom."""
+        """Number of degrees of freedom of the structure."""
         return len(self.direction)
 
 
@@ -74,13 +74,13 @@ def structure_of(specimen: Specimen) -> LinearStructure:
 
 
 class Condensed(NamedTuple):
-    """Condensed structure at m harmonics of one frequency; slopes are derivatives by omega."""
+    """Structure condensed to p at m harmonics of one frequency; "slope" fields are derivatives by omega."""
 
     compliance: Complex
-    """b.Z_k^-1 b, shape (m,) [m/N]."""
+    """Compliance at the spring, b.Z_k^-1 b, for each harmonic, shape (m,) [m/N]."""
     compliance_slope: Complex
     linear: complex
-    """P_1 / U without the spring."""
+    """Ratio P_1 / U of relative motion to base motion without the spring."""
     linear_slope: complex
     reach: Complex
     """Displacements per unit force of the spring, Z_k^-1 b, shape (m, n) [m/N]."""
@@ -135,7 +135,7 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Grid points per period of the highest harmonic; only components above 15 times it cause aliasing."""
+"""Samples per period of the highest harmonic; only components above 15 times its frequency alias."""
 FEWEST_SAMPLES = 1024
 
 
@@ -147,7 +147,7 @@ class ForceHarmonics(NamedTuple):
     holomorphic: Complex
     """Derivative dF_k / dP_l, shape (m, m) [N/m]."""
     conjugate: Complex
-    """Derivative by the complex conjugate, dF_k / dP_l*, shape (m, m) [N/m]."""
+    """Derivative by the complex conjugate of P_l, dF_k / dP_l*, shape (m, m) [N/m]."""
     frequency_slope: Complex
     """Derivative dF_k / domega at constant P, due to rate-dependent forces, shape (m,) [N s]."""
 
@@ -158,7 +158,7 @@ def grid_size(highest: int) -> int:
 
 
 def waveform(phasors: Complex, harmonics: Harmonics, samples: int) -> Floats:
-    """Return one period of Re sum P_k exp(i k theta) on an even grid, shape (samples,)."""
+    """Return one period of the signal Re sum P_k exp(i k theta) on an even grid, shape (samples,)."""
     spectrum = np.zeros(samples // 2 + 1, dtype=np.complex128)
     spectrum[harmonics] = 0.5 * samples * phasors
     if harmonics[0] == 0:
@@ -231,7 +231,7 @@ class HarmonicSet(StrEnum):
     """Which harmonics a solution contains."""
 
     ODD = "odd"
-    """Odd harmonics: for motions that are their own mirror image half a period later (equal gaps)."""
+    """Odd harmonics only: for motions that equal their mirror image half a period later (equal gaps)."""
     ALL = "all"
     """All harmonics and the mean: any motion with the drive's period."""
 
@@ -261,7 +261,7 @@ class BalanceProblem:
 
     @property
     def size(self) -> int:
-        """Number of real unknowns."""
+        """Number of real unknowns of the balance equations."""
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
     def packed(self, phasors: Complex) -> Vector:
@@ -364,7 +364,7 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
 
 
 def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
-    """Solve by Newton's iteration with step halving; return the unknowns and whether it converged."""
+    """Solve the balance by Newton's iteration with step halving; return the unknowns, and if it converged."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearised(unknowns, omega, amplitude_m)
     error = size_of(residual)
@@ -389,7 +389,7 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
 
 
 def size_of(values: Vector) -> float:
-    """Return the largest magnitude; infinite if any value is not finite."""
+    """Return the largest magnitude of an array; infinite if any value is not finite."""
     size = float(np.max(np.abs(values)))
     return size if math.isfinite(size) else math.inf
 

@@ -36,13 +36,13 @@ class ExactFamily:
 
     mapping: PeriodMap
     reference: Harmonic
-    """Drive whose frequency scales the velocities."""
+    """Reference drive, whose frequency scales the velocities."""
     tolerance: ClassVar = math.inf
-    """No limit on the error estimate: shooting has no resolution that could be increased."""
+    """Error limit for refining: none, because shooting has no resolution that could be increased."""
 
     @property
     def scales(self) -> Vector:
-        """Scales of a state, shape (6,)."""
+        """Scales of the six state variables, shape (6,) [m, m/s]."""
         return state_scales(self.mapping.specimen, self.reference)
 
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
@@ -61,18 +61,18 @@ class ExactFamily:
 
 @dataclass(frozen=True, eq=False)
 class OrbitFamily(ExactFamily):
-    """Fixed points of the period map along a drive path; a point ends with parameter / scale."""
+    """Fixed points of the period map along a drive path; a point of the curve ends with parameter / scale."""
 
     path: DrivePath
     scale: float
-    """Parameter change that counts as one unit of length [Hz, or m]."""
+    """Change of the parameter that counts as one unit of arc length [Hz, or m]."""
 
     def drive_at(self, point: Vector) -> Harmonic:
-        """Return the drive at a point."""
+        """Return the drive at a point of the curve."""
         return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
 
     def state_at(self, point: Vector) -> Vector:
-        """Return the state at time zero of the drive."""
+        """Return the state at time zero of the drive, for a point of the curve."""
         return point[:-1] * self.scales
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
@@ -139,8 +139,8 @@ def periodic_branch_within(
     """Follow a periodic motion in both directions along a drive path, from ``low`` to ``high``.
 
     Return the whole branch, with its folds; without folds its parameter ascends. `Branch.begin` and
-    `Branch.end` say why it ends. A closed branch is followed once around. Raises ValueError when the
-    orbit did not converge, or is outside the range.
+    `Branch.end` state the reasons for both ends of the branch. A closed branch is followed once around.
+    Raises ValueError when the orbit did not converge, or is outside the range.
 
     Parameters
     ----------

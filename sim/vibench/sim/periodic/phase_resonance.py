@@ -30,14 +30,14 @@ STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_po
 """Step lengths along the branch, in units in which a decade of level is `LENGTH_PER_DECADE` long."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
-"""Relative change of the frequency that is one unit of length."""
+"""Relative change of the frequency that counts as one unit of arc length."""
 FARTHEST = 20.0
-"""Largest change of frequency or level that an iteration may try, in units of length."""
+"""Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state that an iteration may try, over the gap; larger ones would take minutes on a hard spring."""
+"""Largest state that Newton's iteration may try, over the gap; larger ones take minutes on a hard spring."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
-"""Step of the finite differences that give derivatives of the phase, over the scale of each unknown."""
+"""Step of the finite differences for derivatives of the phase, over the scale of each unknown."""
 SCAN_POINTS = 400
 
 
@@ -53,20 +53,20 @@ class PhaseResonanceFamily(ExactFamily):
 
     @property
     def path(self) -> DrivePath:
-        """Path along amplitude; its frequency has no effect, because the phase determines the frequency."""
+        """Path along drive amplitude; its frequency is unused, because the phase determines the frequency."""
         return AmplitudePath(self.reference.frequency_hz)
 
     def amplitude_m(self, point: Vector) -> float:
-        """Return the drive amplitude at a point [m]."""
+        """Return the drive amplitude at a point of the branch [m]."""
         return self.reference.amplitude_m * float(10.0 ** (point[7] / LENGTH_PER_DECADE))
 
     def drive_at(self, point: Vector) -> Harmonic:
-        """Return the drive at a point."""
+        """Return the drive at a point of the branch."""
         frequency_hz = self.reference.frequency_hz * math.exp(FREQUENCY_SHARE * float(point[6]))
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Return closure error and phase error, shape (7,), and their derivatives by the point, (7, 8)."""
+        """Return closure error and phase error, shape (7,), and their derivatives by all unknowns, (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state = self.drive_at(point), point[:6] * self.scales

@@ -19,7 +19,7 @@ class PowerSpring:
     length: float
     """Reference displacement at which term i equals F_i [m]."""
     terms: tuple[tuple[int, float], ...]
-    """Exponents and forces (n_i, F_i [N]) with n_i odd; empty for no force."""
+    """Pairs of exponent n_i (odd) and force F_i [N]; empty for no force."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.length < math.inf:
@@ -65,7 +65,7 @@ class GapSpring:
     stiffness_coefficient: float
     """Contact stiffness k [N/m^exponent]."""
     exponent: float
-    """Exponent: 1 for a linear stop, 3/2 for a Hertz contact."""
+    """Exponent of the penetration: 1 for a linear stop, 3/2 for a Hertz contact."""
     upper: float
     """Gap at positive p [m]; infinite for no stop."""
     lower: float
@@ -128,7 +128,7 @@ class GapSpring:
 RestoringForce = PowerSpring | GapSpring
 """Nonlinear force F(p, dp/dt) between m1 and m2, parallel to the spring k1."""
 LINEAR = PowerSpring(1.0, ())
-"""Spring without force; its length scale is arbitrary."""
+"""Spring that exerts no force; its length scale is arbitrary."""
 
 
 def spring_of(specimen: Specimen) -> RestoringForce:

@@ -39,9 +39,9 @@ from .harmonic_balance import phasors_of, size_of
 # digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Step of the finite differences, over the parameter's value."""
+"""Step of the finite differences for derivatives by the drive parameter, over the parameter's value."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
-"""Offsets (in steps) and weights of the fourth-order central difference."""
+"""Offsets (in steps) and weights of the fourth-order central difference quotient."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,12 +63,12 @@ class PeriodMap:
 
     @property
     def turns(self) -> float:
-        """Time that the map covers, in drive periods."""
+        """Time that the period map covers, in drive periods."""
         return 0.5 * self.periods if self.shape is OrbitShape.MIRRORED else float(self.periods)
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Map for motions with half the period or mirrored; None if there can be none."""
+        """Period map for motions with half the period or mirrored; None if such motions are impossible."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -112,7 +112,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
     def _may_start(self, state: Vector) -> bool:
-        """Return whether a run can start here; Newton's iteration may try states beyond a rigid stop."""
+        """Return whether a run can start from a state; Newton's iteration may try one beyond a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -136,14 +136,14 @@ class PeriodMap:
 NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8
 RETURNED = 1e-9
-"""Largest closure error (final minus initial state, over its scale) of a periodic motion."""
+"""Largest allowed closure error of a periodic motion: final minus initial state, over its scale."""
 FLOW_ERROR = 1e-10
 """Assumed integration error in a period at reference accuracy, over the state's scale; ten times the measured
 error (docs/accuracy.md)."""
 SAMPLES = 4096
 """Samples per drive period from which responses are computed."""
 SETTLING_PERIODS = 400
-"""Length in drive periods of the run from rest that gives the default initial guess."""
+"""Length, in drive periods, of the run from rest whose end is the default initial guess."""
 
 
 class ShootingEnd(StrEnum):
@@ -169,7 +169,7 @@ class PeriodicOrbit:
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
-    """Amplitude at the drive frequency over the drive amplitude, shape (4,)."""
+    """Amplitude of x, y, z and p at the drive frequency over the drive amplitude, shape (4,)."""
     outcome: ShootingEnd
 
     @property
@@ -234,7 +234,7 @@ def periodic_orbit(
 def _damped_step(
     mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
 ) -> tuple[Vector, Vector, bool]:
-    """Halve a step until the closure error falls; return state, closure error, and whether it fell."""
+    """Halve a Newton step until the closure error falls; return state, closure error, and whether it fell."""
     scales = state_scales(mapping.specimen, drive)
     for halving in range(MOST_HALVINGS):
         trial = state - 0.5**halving * step
@@ -245,7 +245,7 @@ def _damped_step(
 
 
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
-    """Return the motion from ``state`` with its responses; ``gone`` is its scaled closure error."""
+    """Return the periodic motion from ``state`` with its responses; ``gone`` is the scaled closure error."""
     run = mapping.orbit(state, drive, SAMPLES)
     moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN after the end of a run that failed
     moved[: len(run.states)] = run.states[: len(moved)]
@@ -268,7 +268,7 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 
 
 def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
-    """Return the largest magnitudes, shape (n,), of periodic waves, shape (m, n), between samples too.
+    """Return the largest magnitudes, shape (n,), of sampled periodic waves, (m, n), also between samples.
 
     Two samples of a wave and of its rate define a Hermite cubic; its slope is zero at the extremes.
     """
@@ -318,7 +318,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the distance from grazing: of p over the gap, or of dp/dt over the gap times 2 pi f."""
+    """Return the distance from grazing: p to the stop over the gap, or dp/dt over the gap times 2 pi f."""
     match specimen.contact:
         case NoContact() | PowerLaw():
             return math.inf
@@ -338,7 +338,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
 
 
 class PhaseReference(StrEnum):
-    """Which motion of m0 defines the phase at a phase resonance."""
+    """Motion of m0 (relative or absolute) whose phase against the base defines a phase resonance."""
 
     RELATIVE = "relative"
     """Motion relative to the base: for the lowest mode, or if contacts limit the relative motion."""
@@ -346,7 +346,7 @@ class PhaseReference(StrEnum):
     """Absolute motion: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Return this motion of m0 over the base motion, from the transmissibility of m0."""
+        """Return this motion of m0 over the base motion; transmissibility - 1 for the relative motion."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 
