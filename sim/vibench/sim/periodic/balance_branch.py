@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Solutions with a fixed number of harmonics along a drive path; a point ends with parameter / scale."""
+    """Balances with a fixed number of harmonics along a drive path; a point ends with parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath

@@ -77,7 +77,7 @@ class PeriodMap:
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the final state for an initial state at drive phase zero, (6,); NaN if the run failed."""
+        """Return the map's final state for a state at drive phase zero, shape (6,); NaN if the run fails."""
         if not self._may_start(state):
             return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)

@@ -28,13 +28,13 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Memory of the moving average, in runs; after that many later runs, a run has a third of its weight."""
+"""Memory of the moving average, in runs; after so many further runs, a run keeps a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Largest logarithmic deviation that one run may contribute, as its final motion may be an unusual one."""
+"""Limit on one run's logarithmic deviation from its kind's mean, as its final motion may be unusual."""
 FEWEST = 3
-"""Fewest runs of a kind for an estimate of its scatter."""
+"""Fewest runs of a kind from which the scatter of their computing times is estimated."""
 UNKNOWN_FACTOR = 10.0
-"""Uncertainty factor of an expected time without known runs of its kind."""
+"""Uncertainty factor of an expected computing time if no run of that kind is known."""
 LEAST_FACTOR = 1.5
 SURE, FEW = 2.0, 1.6
 """Coefficients of an approximation to Student's t for 95 % of runs: t = SURE (1 + FEW / (runs - 1))."""
@@ -63,7 +63,7 @@ class _Kind:
 
 
 MOST_FACTOR = 10.0
-"""Uncertainty factor above which only a range of times is stated."""
+"""Uncertainty factor above which only a range of computing times is stated."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,10 @@ class Expected:
     factor: float
     """Uncertainty factor: 95 % of such runs take from ``time_s / factor`` to ``time_s * factor``."""
     runs: int
-    """Number of known runs on which this is based."""
+    """Number of known runs on which the expected time is based."""
 
     def __str__(self) -> str:
-        """Return the estimate as text."""
+        """Return the expected computing time as text."""
         time_s, factor = self.time_s, self.factor
         learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
         text = f"{time_s:.1g} s within a factor of {factor:.2g}"
@@ -125,13 +125,13 @@ class CostLedger:
             self.save()
 
     def _known(self, kind: str) -> _Kind:
-        """Return the statistics of a kind or, with too few runs, of the next more general kind."""
+        """Return the statistics of a kind of run or, with too few runs, of the next more general kind."""
         enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
         return next((each for each in enough if each.runs >= FEWEST), _Kind())
 
     @property
     def _drift(self) -> float:
-        """Return the mean deviation of the latest runs of any kind; 0 unless it is significant."""
+        """Return the mean logarithmic deviation of the latest runs; 0 unless it is significant."""
         if len(self._lately) < MEMORY:
             return 0.0
         mean = math.fsum(self._lately) / MEMORY
@@ -139,7 +139,7 @@ class CostLedger:
         return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
 
     def save(self) -> None:
-        """Write new statistics to the file, if possible."""
+        """Write new computing time statistics to the ledger's file, if possible."""
         with self._lock:
             self._saved_s = time.monotonic()
             if not self._is_new:
@@ -159,7 +159,7 @@ def _names(kind: str) -> list[str]:
 
 
 def _read(path: Path) -> dict[str, _Kind]:
-    """Return the statistics by kind in a file; empty if there is no valid file."""
+    """Return the computing time statistics in a file, by kind of run; empty if there is no valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         known = {

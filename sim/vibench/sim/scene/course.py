@@ -46,15 +46,15 @@ class SceneRun:
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
-    """Time at which the motion was found to be settled [s]; None if not checked or not settled."""
+    """Time at which the motion was found to have settled [s]; None if this was not checked or not found."""
     ended: str
     """Reason for the end of the run."""
     path: tuple[Stretch, ...]
-    """Stretches from the start until the motion settled or was proved chaotic."""
+    """Stretches of the run, from its start until the motion settled or was proved chaotic."""
     grew: bool
     """Whether a small perturbation grew enough to prove chaos."""
     wandered_until_s: float
-    """Last time at which the motion still changed from one of its periods to the next [s]."""
+    """Last time at which successive periods of the motion still differed [s]."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
     """Relative change of the responses by leakage if spectral lines are computed over the whole window, shape
     (4,). Zero unless the motion was found to repeat only within the window."""
@@ -81,7 +81,7 @@ class FixedCourse:
         """Return None: with a fixed duration the motion is not integrated further."""
 
     def seen(self) -> SceneRun:
-        """Observe the end of the motion and classify it."""
+        """Observe the motion in the window at its end and classify it."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
         last = follow_with_section(run, duration.duration_s - duration.window_s)
@@ -113,7 +113,7 @@ def classify(
     ended: str,
     repeats: Repetition | None = None,
 ) -> SceneRun:
-    """Return the kind of a motion from its window and the stretches before it.
+    """Classify a motion from its response window and the stretches of the run before the window.
 
     The stretches before the window have the length of its blocks. A motion that repeats counts as periodic
     only if Newton's iteration finds a stable periodic motion nearby, because chaos also comes close to
@@ -152,7 +152,7 @@ MOST_LOOKS = 4096
 LOOKS = 16
 """Fewest checks for repetition before the window."""
 LONGEST_SLICE = 1 << 16
-"""Most drive periods between two checks, limited by the memory for their states."""
+"""Most drive periods between two checks for repetition; limits the memory for stored states."""
 
 
 class Lead:
@@ -167,7 +167,7 @@ class Lead:
         periods = whole_periods(self._until_s, pace.frequency_hz)
         self._every = every = max(1, math.ceil(periods / MOST_LOOKS))
         self.states: StatesAlone | None = None
-        """Motion to integrate with checks; None if it is integrated without."""
+        """Motion to integrate with checks for repetition; None if it is integrated without checks."""
         if pace.sharpness.noise < EXACTLY:
             exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
             slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
@@ -176,7 +176,7 @@ class Lead:
             self.states = states.aim(self._until_s)
 
     def end(self) -> tuple[Stretch, ...]:
-        """Integrate to the end of this part and return its stretches."""
+        """Integrate to the end of the part before the window, and return its stretches."""
         run, states = self._run, self.states
         if states is None:
             rate_hz = self._frequency_hz / self._every
@@ -189,11 +189,11 @@ class Lead:
 
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Shortest interval between two checks [s] and [drive periods]; at most one window."""
+"""Shortest interval between two checks for repetition, in s and in drive periods; at most one window."""
 WINDOWS = 2
-"""Number of windows over which a non-repeating motion is watched; the last one gives the responses."""
+"""Number of windows in which a non-repeating motion is observed; the last one gives the responses."""
 DRIFT_SHARE = 0.25
-"""Share of the budget for integrating a slow drift further; the error estimate takes three times as long."""
+"""Share of the budget that a slow drift may use; its error estimate takes three times as long."""
 
 
 class SettlingCourse:
@@ -242,7 +242,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Integrate until the motion repeats or never will; return it if it must be integrated further."""
+        """Integrate until it is clear whether the motion repeats; return the motion if it must go on."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -278,7 +278,7 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Return the motion to integrate further; the last ``watched`` stretches have a tangent vector."""
+        """Return the motion to integrate further; its last ``watched`` stretches have a tangent vector."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
@@ -286,7 +286,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Return window and kind; observe a new window if the motion was integrated further."""
+        """Return window and kind of the motion; if it was integrated further, observe a new window."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None
@@ -320,7 +320,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the drive periods between two checks (a slice), and the number of slices in a window."""
+    """Return the number of drive periods between two checks (a slice), and of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))
@@ -355,7 +355,7 @@ def _observe_last(
     pace: Pace,
     ended: str,
 ) -> SceneRun:
-    """Classify a run whose window consists of its last ``in_window`` stretches."""
+    """Classify the motion of a run whose window consists of its last ``in_window`` stretches."""
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
     window = window_of(begins, last)

@@ -10,7 +10,7 @@ from .followed_run import FollowedRun
 TOLERANCE = 1e-10
 """Integration tolerance of the period map, far below the distance at which a motion counts as settled."""
 RETURNED = 1e-10
-"""Largest change over one period, relative to the size of the motion, for a periodic motion."""
+"""Largest change of state over one period, relative to the motion's size, of a periodic motion."""
 ITERATIONS = 8
 
 
@@ -19,11 +19,11 @@ class FixedPoint:
     """Stable periodic motion found near a run."""
 
     run: FollowedRun
-    """Run whose state is on this motion."""
+    """Run whose current state is on the periodic motion."""
     away: Floats
     """Inverse of (identity - Jacobian of the period map), scaled, shape (6, 6)."""
     distance: float
-    """Distance of the given run from this motion, over the size of the motion."""
+    """Distance of the given run from the periodic motion, over the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:

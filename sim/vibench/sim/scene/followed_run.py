@@ -33,23 +33,23 @@ from ..specimen.state import Floats
 # this instead of measured time, so that a scene with a budget has the same result on every machine.
 
 FLIGHT, STEPS = 5e-5, 3.5e-4
-"""Cost of one second of motion without contact, and of motion under a force that acts at every p [s]."""
+"""Computing cost of one second of motion: without contact, and with a force that acts at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
-"""Cost of an impact on a Hertz or rigid stop, and on a linear gap [s]."""
+"""Computing cost of an impact: on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Factors on the cost of contacts with a tangent vector, which requires time steps in collisions."""
+"""Factors on the computing cost of contacts with a tangent vector, which needs time steps in collisions."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Tolerance below which contacts cost more, and the factor."""
+"""Tolerance below which contacts take more computing time, and the factor."""
 STEP = 1e-9
-"""Smallest cost of a step without contact [s]; it matters if a mode is far faster than the paper's."""
+"""Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
-"""Number of steps that one step with a tangent vector counts as, where the number of steps is limited."""
+"""Number of steps as which one step with a tangent vector counts in the limit of steps."""
 
 
 def nominal_cost_s(
     contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Return the nominal cost of a stretch [s], from its impacts, tangent vectors and steps."""
+    """Return the nominal computing cost of a stretch [s], from its impacts, tangent vectors and steps."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -64,7 +64,7 @@ def nominal_cost_s(
 
 @dataclass(frozen=True)
 class Samples:
-    """Times at which states are stored: first time, sample rate, and number."""
+    """Times at which states are stored, given by the first time, the sample rate and their number."""
 
     first_s: float
     rate_hz: float
@@ -79,27 +79,27 @@ class Stretch:
     end_s: float
     outcome: Outcome
     impacts: int
-    """Number of contacts that began."""
+    """Number of contacts that began in the stretch."""
     samples: Samples
-    """Times of the stored states."""
+    """Times of the stored states; see ``states``."""
     states: Floats
-    """Stored states, shape (n, 6)."""
+    """Stored states x, y, z, vx, vy, vz of the motion, shape (n, 6)."""
     peak_x_m: float = 0.0
-    """Largest abs(x) [m]; zero if not observed."""
+    """Largest abs(x) in the stretch [m]; zero if not observed."""
     peak_p_m: float = 0.0
     area_x: complex = 0j
-    """Integral of x exp(-i (omega t + phase)) [m s]; zero if not observed."""
+    """Integral of x exp(-i (omega t + phase)) over the stretch [m s]; zero if not observed."""
     area_p: complex = 0j
     growth: float = math.nan
     """Natural logarithm of the growth of the tangent vector; NaN without one."""
 
     @property
     def length_s(self) -> float:
-        """Length from start to end."""
+        """Length of the stretch [s]."""
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Return the stretch with only every n-th stored state."""
+        """Return the stretch with only every ``every``-th stored state."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
@@ -117,12 +117,12 @@ class FollowedRun:
         self.specimen = specimen
         self.drive = drive
         self.outcome = Outcome.REACHED_END
-        """Outcome of the last stretch."""
+        """Outcome of the last integrated stretch."""
         self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
         self.cost_s = 0.0
-        """Nominal cost since the start [s]; see `nominal_cost_s`."""
+        """Nominal computing cost since the start of the run [s]; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
 
     @property
@@ -158,7 +158,7 @@ class FollowedRun:
 
     @property
     def is_in_flight(self) -> bool:
-        """Whether no stop is in contact."""
+        """Whether m1 touches no stop at present."""
         return self._run.is_in_flight
 
     def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
@@ -271,7 +271,7 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
 
 
 BLOCKS = 10
-"""Number of blocks of a window, from which the scatter is estimated."""
+"""Number of blocks of a window, from which the scatter of Response I is estimated."""
 FIRST, LAST = 2, 3
 """Number of first and last blocks of a window in which growth is measured, to prove that chaos lasts. They
 cover both halves of the observed time, with or without a stretch before the window."""
@@ -282,10 +282,10 @@ class Block:
     """Peaks and spectral lines of a part of a motion with whole drive periods."""
 
     peak_x_m: float
-    """Largest abs(x)."""
+    """Largest abs(x) in this part of the motion [m]."""
     peak_p_m: float
     line_x_m: complex
-    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase)))."""
+    """Phasor of x at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase))) [m]."""
     line_p_m: complex
 
 
@@ -303,7 +303,7 @@ class ObservedWindow:
     """Number of drive periods at the end of the window over which the lines are taken: as many whole periods
     of the motion as fit."""
     line_x_m: complex
-    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase)))."""
+    """Phasor of x at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase))) [m]."""
     line_p_m: complex
 
     @property
@@ -313,12 +313,12 @@ class ObservedWindow:
 
     @property
     def largest_x_m(self) -> float:
-        """Largest abs(x)."""
+        """Largest abs(x) in the window [m]."""
         return max(stretch.peak_x_m for stretch in self.stretches)
 
     @property
     def largest_p_m(self) -> float:
-        """Largest abs(p)."""
+        """Largest abs(p) in the window [m]."""
         return max(stretch.peak_p_m for stretch in self.stretches)
 
     @property
@@ -381,7 +381,7 @@ def observe_window(
 
 
 def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
-    """Return a window of ``parts`` with whole drive periods; ``head`` before them only adds peaks."""
+    """Return a window of ``parts`` of whole drive periods; ``head``, before them, only adds peak values."""
     frequency = begins.drive.frequency_hz
     periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
@@ -396,7 +396,7 @@ def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stre
 
 
 def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
-    """Return peaks and lines of each observed part; a line is 2 / T times the area of the `Stretch`."""
+    """Return peaks and spectral lines of each part; a line is 2 / T times the integral of the `Stretch`."""
     return tuple(
         Block(
             part.peak_x_m,
@@ -415,9 +415,9 @@ def states_of(stretches: Sequence[Stretch]) -> Floats:
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Lowest sample rate [1/s]; ten times faster than contacts, to which m0 hardly responds."""
+"""Lowest sample rate of a spectrum [1/s]: ten times the rate of contacts, which hardly move m0."""
 HIGHEST = 0.25
-"""Highest frequency of the spectrum over the sample rate; m0 attenuates aliases below it."""
+"""Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases below it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from .shares import student_quantile, wilson_share
 from .stated_error import ROUNDING
 
 ALIKE = 1e-2
-"""Largest relative difference of responses on the same motion, because some runs are still settling."""
+"""Largest relative difference of responses of one motion; runs that are still settling cause it."""
 OTHER_DIFFERS = 1.0
-"""Assumed relative difference of a motion that no start has reached, such as chaos beside rest."""
+"""Assumed relative difference in response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
 MOST_FREEDOM = 200
 """Degrees of freedom above which Student's t hardly changes."""
@@ -32,12 +32,12 @@ class Start:
     repeats: Repetition | None
     """Period of a nearly periodic motion, whose windows are alike; None for other motions."""
     impacts: int
-    """Number of impacts in the first window."""
+    """Number of impacts in the start's first response window."""
     section: Floats
     """States once per drive period in the first window, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
-        """Return the mean responses over the first ``windows`` windows, shape (4,)."""
+        """Return the mean of the four responses over the first ``windows`` windows, shape (4,)."""
         return np.asarray(np.mean(self.windows[:windows], axis=0))
 
 
@@ -74,7 +74,7 @@ def windows_of(starts: Sequence[Start]) -> int:
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return the number of starts that missed the repeating motion of most starts; None without one."""
+    """Return how many starts missed the repeating motion that most starts reached; None without such one."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None
@@ -84,7 +84,7 @@ def others_of(starts: Sequence[Start]) -> int | None:
 
 
 def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
-    """Return the next number of starts and of windows per start; the work at most doubles."""
+    """Return the numbers of starts and of windows per start to use next; the work at most doubles."""
     windows = windows_of(starts)
     if len(starts) < FEWEST_STARTS:
         return FEWEST_STARTS, windows

@@ -50,7 +50,7 @@ class LinearMotion:
 
     @property
     def largest_p_m(self) -> float:
-        """Upper bound on abs(p) at all times [m]."""
+        """Upper bound on abs(p) without contact, at all times [m]."""
         return abs(self.steady_p) + float(np.abs(self.modes[:, Y] - self.modes[:, Z]).sum())
 
     @property
@@ -59,7 +59,7 @@ class LinearMotion:
         return float(self.rates.real.max())
 
     def state(self, time_s: float) -> Floats:
-        """Return x, y, z, vx, vy, vz at a time, shape (6,)."""
+        """Return x, y, z, vx, vy, vz at a time [s], shape (6,) [m, m/s]."""
         # Subtract whole cycles exactly; their rounding error would shift the phase at late times.
         part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
         turn = 2.0 * math.pi * part + self.drive.phase_rad
@@ -124,17 +124,17 @@ DECAYED_SHARE = 1e-9
 """Largest transient, over the steady motion, that the closed form may neglect."""
 
 CLOSED_FORM_S = 5e-4
-"""Planned time for a closed form [s]. Measured run times correct the planned times for each machine
+"""Planned computing time for a closed form [s]. Measured run times correct the planned times for each machine
 (`vibench.sim.scene.cost`)."""
 FLIGHT_S, PERIOD_S, IMPACT_S, PRESSED_S = 5e-5, 1e-7, 1e-6, 1.2e-2
-"""Planned time per second and per drive period of motion without contact, per impact, and per second of
-contact [s]."""
+"""Planned computing time per second and per drive period of motion without contact, per impact, and per
+second of contact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
-"""Planned time [s] per second and per drive period of motion under a force that acts at every p."""
+"""Planned computing time [s] per second and per drive period of motion, for a force at every p."""
 TANGENT = 1.5
 """Additional computing time for a tangent vector, over the time without one."""
 SETTLING_S = 10.0
-"""Planned length of an automatic duration [s]."""
+"""Planned simulated time of a run with an automatic duration [s]."""
 TOUCHING = 0.6
 """Ratio of the steady p without stops to the gap above which most motions depend sensitively on the start:
 84 of 93 random scenes above this ratio, 3 of 49 below it (`benchmarks/planned_costs.py`)."""
@@ -142,9 +142,9 @@ SLOW = 0.9
 """Ratio of drive frequency to lowest natural frequency below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if the linear p equals the gap; grows with the cube root of p over the gap."""
+"""Impacts per drive period if p without stops equals the gap; grows with the cube root of p over gap."""
 HALF_PRESSED = 150.0
-"""Linear p over the gap at which m1 touches a stop for half of the time."""
+"""Ratio of p without stops to the gap at which m1 touches a stop for half of the time."""
 MICROMETRES = 1e6
 
 
@@ -158,7 +158,7 @@ class ScenePlan:
     planned_s: float
     """Estimated computing time on a nominal reference machine [s]."""
     longest_planned_s: float
-    """The same if the motion never repeats and an automatic duration has its full length [s]."""
+    """Estimated computing time if the motion never repeats and an automatic duration has full length [s]."""
     kind: str
     """Kind of run in the cost ledger, ``a/b/c``, from general to special."""
     largest_p_m: float
@@ -171,14 +171,14 @@ class ScenePlan:
 
     @property
     def cost(self) -> "Expected":
-        """Expected time on one core of this machine, from previous runs."""
+        """Expected computing time on one core of this machine, from previous runs."""
         from .cost import cost_ledger  # noqa: PLC0415 - reads a file, and few plans need it
 
         return cost_ledger().expected(self.kind, self.planned_s)
 
     @property
     def cost_s(self) -> float:
-        """Expected time on one core of this machine, without its uncertainty [s]."""
+        """Expected computing time on one core of this machine, without its uncertainty [s]."""
         return self.cost.time_s
 
     def explain(self) -> str:
@@ -358,7 +358,7 @@ def _share(scene: Scene, motion: LinearMotion) -> float:
 
 
 def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
-    """Return the planned computing time for other starts [s]; zero unless they are probably needed."""
+    """Return the planned computing time for runs from other starts [s]; zero if they are hardly needed."""
     is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
     return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
 

@@ -25,9 +25,9 @@ class MotionKind(StrEnum):
     PERIODIC = "periodic"
     """The motion repeats after `ScenePrediction.period` drive periods."""
     QUASI_PERIODIC = "quasi-periodic"
-    """The motion does not repeat, but a small change of the start does not grow."""
+    """The motion does not repeat, but a small change of the initial state does not grow (quasi-periodic)."""
     CHAOTIC = "chaotic"
-    """The motion does not repeat, and a small change of the start grows."""
+    """The motion does not repeat, and a small change of the initial state grows."""
     UNDECIDED = "undecided"
     """The simulated time is too short to classify the motion."""
     CHAOTIC_SO_FAR = "chaotic so far"
@@ -44,7 +44,7 @@ class StartMemory(StrEnum):
     """A small perturbation of the start grew to the size of the motion. A repeated run, on another machine or
     at another accuracy, may therefore reach another motion."""
     UNKNOWN = "unknown"
-    """Not determined, because there was no budget or the run failed."""
+    """Not determined, because no computing time was allowed for it, or the run failed."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Ensemble:
     """Motions reached from several starts that differ by a millionth of the gap."""
 
     starts: int
-    """Number of starts, including the requested one."""
+    """Number of starts (initial states), including the requested one."""
     motions: tuple[FoundMotion, ...]
     """Motions found, the most frequent first."""
     requested_motion: int
@@ -89,7 +89,7 @@ class Ensemble:
     escape: EscapeRate | None
     """Rate at which chaos ends; None without chaos."""
     scatter: float | None
-    """Relative standard deviation of Response I between all starts."""
+    """Relative standard deviation of Response I over all starts."""
     followed_s: float
     """Sum of the simulated times of all starts [s]."""
 
@@ -104,9 +104,9 @@ class TargetReport:
     error: float | None
     """Largest of the stated errors of the four responses; None if unknown."""
     time_s: float
-    """Computing time since the request [s]."""
+    """Computing time used since the request [s]."""
     starts: int
-    """Number of starts averaged; 1 without sensitive dependence on the start."""
+    """Number of starts over which responses are averaged; 1 without sensitive dependence on the start."""
     windows: int
     """Number of consecutive windows per start that are averaged."""
     is_met: bool
@@ -117,7 +117,7 @@ class TargetReport:
 
     @property
     def text(self) -> str:
-        """Return the report as a phrase."""
+        """Return requested and reached error and time as a phrase."""
         if self.error is None:
             return f"no error is known after {_seconds(self.time_s)}"
         reached = _percent(self.error)
@@ -165,13 +165,13 @@ class ScenePrediction:
     frequency_hz: float
     amplitude_m: float
     response_i: float | None
-    """Largest abs(x) over the window."""
+    """Response I: largest abs(x) in the window, over the drive amplitude."""
     response_ii: float | None
-    """Amplitude of x at the drive frequency."""
+    """Response II: amplitude of x at the drive frequency, over the drive amplitude."""
     relative_i: float | None
-    """Largest abs(p) over the window."""
+    """Response I of p: largest abs(p) in the window, over the drive amplitude."""
     relative_ii: float | None
-    """Amplitude of p at the drive frequency."""
+    """Response II of p: amplitude of p at the drive frequency, over the drive amplitude."""
     impacts: int
     """Contacts that began within the window."""
     impact_rate_hz: float
@@ -184,7 +184,7 @@ class ScenePrediction:
     window_s: float
     """Length of the window at the end of the simulated time [s]."""
     settled_s: float | None = None
-    """Time at which the motion was found to be settled [s]; None if it was not, or a duration was given."""
+    """Time at which the motion was found to have settled [s]; None if not found, or a duration was given."""
     ended: str
     """Reason for the end of the run."""
     integration_error: float | None = None
@@ -207,7 +207,7 @@ class ScenePrediction:
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
     error_estimate: float | None = None
-    """Largest of the four errors."""
+    """Largest of the relative errors of the four responses."""
     section: Floats | None = None
     """States once per drive period in the window, shape (n, 6), if a Poincaré section was requested."""
     spectrum_hz: Floats | None = None
@@ -217,9 +217,9 @@ class ScenePrediction:
     memory: StartMemory = StartMemory.UNKNOWN
     """Whether the start determines the final motion."""
     ensemble: Ensemble | None = None
-    """Motions reached from other starts; None if the start determines the motion, or without a budget."""
+    """Motions reached from other starts; None if the start determines the motion, or no time was allowed."""
     target: TargetReport | None = None
-    """Requested and reached error and computing time; None if neither was requested."""
+    """Requested and reached error and computing time; None if neither of them was requested."""
 
     @property
     def is_one_of_several(self) -> bool:

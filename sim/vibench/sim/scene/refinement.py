@@ -50,7 +50,7 @@ from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, wi
 LONGEST_S = 60.0
 """Default limit of the computing time [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""Time after which a first result is due [s]; nominal cost that it may use even after the time limit [s]."""
+"""Time after which a first result is due [s], and nominal cost it may use even after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal cost, and largest processor time, between two checks of the time limit [s]."""
 FIRST_CYCLES = 1e4
@@ -60,7 +60,7 @@ CLOSE = 3e-3
 KNOWN = 0.03
 """Relative distance from a known periodic motion below which the run may be approaching it."""
 MOST_PUSH = 1000.0
-"""Largest length, over the drive amplitude, that replaces the gap as the scale of other starts."""
+"""Largest length, over the drive amplitude, that replaces the gap as the size of changes of the start."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
@@ -76,7 +76,7 @@ remaining time that it may use."""
 
 
 class _Clock:
-    """Clock that holds the time limit and reports how far the target is met."""
+    """Clock with the computing time limit; reports how far the requested error and time are reached."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -98,7 +98,7 @@ class _Clock:
         needed: tuple[float, float, float] | None = None,
         windows: int = 1,
     ) -> ScenePrediction:
-        """Return the prediction with the report on its target."""
+        """Return the prediction, with its requested and reached error and time."""
         error, target = found.error_estimate, self._target
         is_met = error is not None and (target.error is None or error <= target.error)
         taken_s = self.taken_s
@@ -112,11 +112,11 @@ class _Orbit:
 
     period: int
     run: FollowedRun
-    """Run whose state is on this motion."""
+    """Run whose current state is on the periodic motion."""
     section: Floats
     """States once per drive period, shape (period, 6)."""
     responses_m: Floats
-    """Responses [m], shape (4,)."""
+    """Responses I and II of x, then of p, shape (4,) [m]."""
     errors: Floats
     """Relative errors of the responses, shape (4,)."""
     impacts: int
@@ -131,9 +131,9 @@ class _Path:
     """Recent states once per drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
     distance: float = math.inf
-    """Relative distance from this periodic motion at the last check."""
+    """Relative distance of the run from the periodic motion it may approach, at the last check."""
     closest: float = CLOSE
-    """Relative change per period below which Newton's iteration is tried next."""
+    """Relative change of the state per period below which Newton's iteration is tried next."""
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
@@ -182,7 +182,7 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.apart(), self._twin.apart()
-        """Copies of the motion and of the second, stricter run, made at the last check of both."""
+        """Copies of the run and of the stricter run beside it, made at the last check of both."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
         """All periodic motions found so far."""
@@ -236,7 +236,7 @@ class _Refinement:
         return (made + math.ceil(look)) / self._frequency_hz
 
     def _drawn(self, count: int) -> Floats:
-        """Return random changes of the start, shape (count, 6), which are far smaller than the motion."""
+        """Return random changes of the initial state, shape (count, 6), far smaller than the motion."""
         drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
         gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
         return np.asarray(drawn * (most_m / gap_m if most_m < gap_m < math.inf else 1.0))
@@ -257,7 +257,7 @@ class _Refinement:
     def _followed(
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
-        """Integrate a motion in short parts; return these, or None after the time limit or a failure."""
+        """Integrate a motion in short parts; return the parts, or None after the time limit or a failure."""
         parts: list[Stretch] = []
         while run.time_s < until_s:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
@@ -288,7 +288,7 @@ class _Refinement:
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
     def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
-        """Add new states to a path; return whether it approaches a stable periodic motion, now known."""
+        """Add new states to a run's path; return whether it now approaches a known stable periodic motion."""
         path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False
@@ -316,13 +316,13 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion over ``size``; inf for no motion."""
+        """Return the distance of a state from a periodic motion over ``size``; inf if the motion is None."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
 
     def _nearest(self, state: Floats, within: float) -> _Orbit | None:
-        """Return the known periodic motion nearest to a state; None if it is farther than ``within``."""
+        """Return the known periodic motion nearest to a state; None if none is closer than ``within``."""
         found = min(self._orbits, key=lambda each: self._away_from(each, state, 1.0), default=None)
         return found if self._away_from(found, state, 1.0) < within else None
 
@@ -390,7 +390,7 @@ class _Refinement:
 
     @property
     def _unsettled(self) -> float:
-        """Estimate the relative distance from the final motion, from the change during one decay time."""
+        """Estimate the relative distance of a run from its final motion, by the change in one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -420,7 +420,7 @@ class _Refinement:
         return self._clock.report(found)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
-        """Yield results for a motion that does not repeat and is not sensitive to its start."""
+        """Yield results for a motion that does not repeat and does not depend sensitively on its start."""
         main, twin, periods = self._main, self._twin, self._window_periods
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:
@@ -445,7 +445,7 @@ class _Refinement:
                 return
 
     def _many_starts(self) -> Iterator[ScenePrediction]:
-        """Yield means over a growing number of nearly equal starts, in stated windows."""
+        """Yield mean responses over a growing number of nearly equal starts, in stated windows."""
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
