@@ -227,7 +227,7 @@ class _Followed:
     def go_on(
         self, start: Vector, toward: float, bounds: tuple[float, float]
     ) -> tuple[ArcEnd | None, ArcPoint]:
-        """Follow at one resolution; return the reason for the end (None: refine), and the last point."""
+        """Follow at one resolution; return the reason for the end (None: refine) and the last point found."""
         family = self.family
         points = trace(family, start, toward, bounds, self.steps)
         before = next(points)

@@ -21,25 +21,25 @@ from .prediction import MotionKind
 MOST_PERIODS = 32
 """Longest period that is detected, in drive periods."""
 FEWEST_BETWEEN = 8
-"""Fewest drive periods between the states that are compared."""
+"""Fewest drive periods between two states that are compared to detect repetition."""
 SLOWEST_RATIO = 0.99
-"""Largest assumed ratio of successive changes, for the slowest settling."""
+"""Largest assumed ratio of successive changes of state, which means the slowest settling."""
 NEARLY = 0.01
-"""Relative change from one period to the next below which a motion counts as settling."""
+"""Relative change of state from one period to the next, below which a motion counts as settling."""
 TINY = 1e-300
-"""Size used for a motion at rest."""
+"""Size of a motion at rest, which avoids division by zero."""
 DISTINCT = 20.0
 """Smallest change, in tolerances, after fewer drive periods than the period. If a change is smaller, the
 motion may still be settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
 """Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
 NEUTRAL = 0.1
-"""Growth per decay time of the slowest mode below which it counts as zero; damping alone gives -1."""
+"""Growth per decay time of the slowest mode that still counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
-"""Number of consecutive parts of a motion whose changes all grow or all shrink in a drift; this happens by
-chance in 2 of 720 cases."""
+"""Number of consecutive parts of a motion; in a drift, the changes of state in all of them grow, or all
+shrink. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time without growth or decay, in decay times, after which a motion counts as quasi-periodic."""
+"""Time without growth or decay of a perturbation, in decay times, of quasi-periodic motion."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Repetition:
 
     period: int
     distance: float
-    """Estimated distance from the periodic motion, over the size of the motion."""
+    """Estimated distance of the run from the periodic motion, over the size of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Growth:
 
     @property
     def total(self) -> float:
-        """Natural logarithm of the growth over all stretches."""
+        """Natural logarithm of the perturbation's growth over all stretches."""
         return float(self.logarithms.sum())
 
     @property
@@ -72,7 +72,7 @@ class Growth:
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Growth over the first and over the second half of the stretches."""
+        """Logarithmic growth over the first and over the second half of the stretches."""
         middle = len(self.logarithms) // 2
         return float(self.logarithms[:middle].sum()), float(self.logarithms[middle:].sum())
 
@@ -84,7 +84,7 @@ class Sharpness:
     tolerance: float
     """Largest distance from the periodic motion for a settled motion."""
     noise: float
-    """Change from one period to the next that the integration steps may cause."""
+    """Change of state from one period to the next that the integration's time steps may cause."""
 
 
 def repetition(
@@ -131,7 +131,7 @@ def _returns_nowhere(points: Floats, tolerance: float) -> bool:
 
 
 def wandered_until(section: Floats, omega: float, period: int) -> int:
-    """Return the index of the first state from which on a motion nearly repeats with this period."""
+    """Return the index of the first state after which a motion nearly repeats with this period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
@@ -198,7 +198,7 @@ def _change(after: Floats, before: Floats) -> float:
 FORGETTING = 8.0
 """Decay times of the slowest mode after which a non-repeating motion counts as being on its attractor."""
 FEWEST_TIMES = 40.0
-"""Longest run over the longest decay time; decay times of slower and undamped modes are limited to this."""
+"""Ratio of the longest run to the longest decay time that is used; longer decay times are cut to it."""
 MOST_STATES = 2_000_000
 """Most drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
@@ -206,7 +206,7 @@ FEWEST_PERIODS = 32
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
 """Relative distance from the periodic motion below which a motion counts as settled."""
 ROUNDING = 1e-10
-"""Relative noise of a motion that is exact, or whose contacts have the same steps in every period."""
+"""Relative noise of a motion that is exact, or whose contacts have equal time steps in every period."""
 EXACTLY = 1e-9
 """Relative distance from the periodic motion below which the rest of a run is skipped; below the error of
 every accuracy level."""
@@ -223,7 +223,7 @@ class Pace:
     forgetting_s: float
     """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """The same decay time without this limit [s]; for undamped modes, the limit."""
+    """Decay time of the slowest mode, not limited by the longest run [s]; for undamped modes, the limit."""
     sharpness: Sharpness
     nearly: Sharpness
     """Tolerances of the least accurate level, for motions that are nearly settled."""
@@ -265,7 +265,7 @@ class Pace:
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Return whether a perturbation grew, in each half of the stretches, enough to prove chaos."""
+        """Return whether a perturbation grew enough to prove chaos, in each half of the stretches."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
@@ -296,7 +296,7 @@ def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
 
 
 def growth_of(stretches: Sequence[Stretch]) -> Growth:
-    """Return the growth of the tangent vector over those stretches that have one."""
+    """Return the growth of the tangent vector over those stretches in which one was propagated."""
     carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
     logarithms = np.array([stretch.growth for stretch in carried])
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))

@@ -19,7 +19,7 @@ from .shares import student_quantile
 COVERED = 0.975
 """Probability below the upper end of a symmetric 95 % interval."""
 FEWEST_BLOCKS = 4
-"""Fewest blocks from which the scatter is estimated."""
+"""Fewest blocks of a run from which the scatter of Response I is estimated."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class WindowScatter:
     """Scatter of the largest value in a window, from window to window."""
 
     relative: float
-    """Standard deviation over the mean."""
+    """Standard deviation of the largest value in a window, over its mean."""
     blocks: int
-    """Number of blocks from which the scatter is estimated."""
+    """Number of blocks from which the scatter was estimated."""
 
     @property
     def between_runs(self) -> float:
         """Relative difference that two runs do not exceed in 95 % of cases.
 
-        It is sqrt(2) deviations times Student's t. Measured coverage: 85 to 99.7 % of pairs of chaotic runs.
+        The limit is sqrt(2) standard deviations times Student's t, and covers 85 to 99.7 % of chaotic pairs.
         """
         return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 
@@ -43,9 +43,9 @@ class WindowScatter:
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
     """Return the scatter of the largest value in ``blocks_in_window`` blocks; None for too few blocks.
 
-    It is the geometric mean of two standard deviations. The one of block peaks is too large, because peaks of
-    longer windows scatter less (Coles, An Introduction to Statistical Modeling of Extreme Values (2001),
-    section 3.1). That of the bootstrap is too small, because it never exceeds the largest observed peak.
+    The scatter is the geometric mean of two estimates. The scatter of block peaks is too large, because peaks
+    of longer windows scatter less (Coles, Statistical Modeling of Extreme Values (2001), section 3.1).
+    The bootstrap estimate is too small, because it never exceeds the largest observed peak.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:

@@ -30,7 +30,7 @@ class Observable(StrEnum):
     SPECTRUM = "spectrum"
     """Amplitude spectrum of x; requires stored samples."""
     POINCARE = "poincare"
-    """States once per drive period."""
+    """Poincaré section: states once per drive period."""
     SCATTER = "scatter"
     """Scatter of Response I between nearly equal starts; requires several more runs."""
 
@@ -68,7 +68,7 @@ class AutomaticDuration(Strict):
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
-    """Longest simulated time [s]."""
+    """Longest simulated time; a motion that is still unclear then is undecided [s]."""
     kind: Literal["automatic"] = "automatic"
 
     def __post_init__(self) -> None:
@@ -81,9 +81,9 @@ class Target(Strict):
     """Requested error or time, or both."""
 
     error: float | None = None
-    """Largest relative error of each response; None for as small as the time allows."""
+    """Largest relative error of each response; None for the smallest that the time allows."""
     time_s: float | None = None
-    """Limit of the computing time [s]; None for at most one minute."""
+    """Limit of the computing time [s]; None for one minute."""
 
     def __post_init__(self) -> None:
         if self.error is None and self.time_s is None:
@@ -98,7 +98,7 @@ class Target(Strict):
 
 @dataclass(frozen=True)
 class Rest(Strict):
-    """Start from rest."""
+    """Start of a run from rest."""
 
     kind: Literal["rest"] = "rest"
 
@@ -115,7 +115,7 @@ class Rest(Strict):
 
 @dataclass(frozen=True)
 class Given(Strict):
-    """Start from a given state."""
+    """Start of a run from a given initial state."""
 
     state: State
     """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
@@ -144,7 +144,7 @@ class Scene(Strict):
     motions other starts reach; zero for neither. It is a nominal time, on the machine of docs/accuracy.md, so
     that results are the same on every machine."""
     target: Target | None = None
-    """Requested error and time. They replace accuracy, duration and budget, which must then not be given."""
+    """Requested error and computing time; accuracy, duration and budget must then not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:

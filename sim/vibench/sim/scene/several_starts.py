@@ -28,7 +28,7 @@ from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile,
 from .states_alone import Follow, StatesAlone
 
 PUSH = 1e-6
-"""Largest change of the start: of displacements over the gap, of velocities over the gap times 2 pi f."""
+"""Largest change of the initial state: displacements over the gap, velocities over gap times 2 pi f."""
 SEED = 2025
 PARTED = 0.01
 """Relative difference of displacements above which the motions from two starts have separated; it is ten
@@ -38,11 +38,11 @@ TOUCHING = 0.999
 LEAST_SIZE = 1e-3
 """Smallest size of a motion, over the gap, that is used in the test for separation."""
 LEAST_S = 1e-3
-"""Smallest assumed cost of one start [s]."""
+"""Smallest assumed computing cost of a run from one start [s]."""
 TOO_FEW = 4
-"""Fewest starts with which an ensemble is useful."""
+"""Fewest starts for which an ensemble of motions is computed."""
 LASTING_S = 300.0
-"""Mean lifetime above which chaos counts as lasting [s]; ten times the length of the paper's runs."""
+"""Mean lifetime above which chaos counts as lasting [s]; ten times the duration of the paper's runs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class ReachedMotion:
     """Final motion from one start."""
 
     run: FollowedRun
-    """Run at the end of its window."""
+    """Run from this start, at the end of its response window."""
     motion: MotionKind
     period: int | None
     responses_m: Floats
@@ -58,7 +58,7 @@ class ReachedMotion:
     scatter: WindowScatter | None
     """Scatter of the largest abs(x) between windows, if the motion does not repeat."""
     wandered_until_s: float
-    """Last time at which the motion still changed from one of its periods to the next [s]."""
+    """Last time at which successive periods of the motion still differed [s]."""
     growth: Growth
     """Growth of a small perturbation; empty if the motion repeats."""
 
@@ -103,22 +103,22 @@ def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Draw:
-    """Numbers of starts, seed, and limit of the cost."""
+    """Settings of an ensemble: numbers of starts, seed, and limit of the computing cost."""
 
     clear: int = CLEAR
-    """Number of starts, including the requested one, if all reach one motion or chaos lasts."""
+    """Number of starts, including the requested one, if all starts reach one motion or chaos lasts."""
     fewest: int = FEWEST
-    """Number of starts in all cases but these two."""
+    """Number of starts if they neither reach one motion, nor several motions, nor lasting chaos."""
     most: int = MOST
-    """Number of starts if they reach several motions."""
+    """Number of starts if different starts reach different motions."""
     seed: int = SEED
     budget_s: float = math.inf
-    """Limit of the nominal cost of all starts [s]."""
+    """Limit of the nominal computing cost of the runs from all starts [s]."""
 
 
 NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
-"""Margin added to the total time that the starts must still be integrated [s]."""
+"""Margin added to the simulated time that the starts still need to prove lasting chaos [s]."""
 
 
 class SeveralStarts:
@@ -151,7 +151,7 @@ class SeveralStarts:
 
     @property
     def reached(self) -> tuple[ReachedMotion, ...]:
-        """Motions reached, that of the requested start first."""
+        """Motions reached from the starts; that of the requested start comes first."""
         return tuple(self._reached)
 
     @property
@@ -183,7 +183,7 @@ class SeveralStarts:
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
     def follow(self) -> None:
-        """Integrate and observe as many starts as needed, within the budget."""
+        """Integrate and observe runs from as many starts as are needed, within the budget."""
         run, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = run.cost_s * min(1.0, self._first_s / run.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
@@ -205,7 +205,7 @@ class SeveralStarts:
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
-        """Integrate and observe up to ``wanted`` more starts within a budget; return their cost [s]."""
+        """Integrate and observe up to ``wanted`` further starts within a budget; return their cost [s]."""
         count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
@@ -221,13 +221,13 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """Whether chaos lasts: no start has settled, and a long enough lifetime is proved."""
+        """Whether chaos lasts: no run has settled, and a long enough mean lifetime is proved."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
     @property
     def _has_settled(self) -> bool:
-        """Whether any start has reached a repeating motion."""
+        """Whether the run from any start has reached a repeating motion."""
         reached = any(each.period is not None for each in self._reached)
         return reached or any(each.repeats is not None for each in self._under_way)
 
@@ -275,7 +275,7 @@ class SeveralStarts:
 SAME = 1e-3
 """Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Difference of two chaotic motions over the 95 % limit of their scatter, above which they are different."""
+"""Ratio above which two chaotic motions differ: their difference over the 95 % limit of their scatter."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
@@ -337,7 +337,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 
 
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
-"""Kinds of motion that may still change if the run is continued."""
+"""Kinds of motion that may still turn into another motion if the run is continued."""
 FEWEST_DRAWS = 3
 """Fewest starts on a motion from which its scatter between starts is estimated."""
 
@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return the kind of a motion; "chaotic so far" for chaos that ended from a start or may not last."""
+    """Return the kind of a motion; "chaotic so far" if chaos ended in a run from a start or may not last."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
@@ -412,7 +412,7 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    """Return the responses of the first start if the motion repeats, otherwise the mean over starts."""
+    """Return the responses of the first start if the motion repeats, otherwise the mean over the starts."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
@@ -421,7 +421,7 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the 95 % limit of the relative difference between another run and the mean of a group."""
+    """Return the 95 % limit of the relative difference of responses between a run and a group's mean."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
@@ -433,7 +433,7 @@ def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
 
 
 def _deviation(values: Sequence[float]) -> float | None:
-    """Return the standard deviation over the mean; None for a single value."""
+    """Return the standard deviation of values over their mean; None for a single value."""
     return float(np.std(values, ddof=1) / np.mean(values)) if len(values) > 1 else None
 
 

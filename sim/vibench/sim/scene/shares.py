@@ -55,7 +55,7 @@ UNSURE = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """Share of starts, with the limits of its confidence interval."""
+    """Share (of starts, for example) with the limits of its confidence interval."""
 
     share: float
     low: float
@@ -99,7 +99,7 @@ class Count:
     """Number of trials with one outcome."""
 
     trials: float
-    """Number of trials; fractional if dependent trials count less."""
+    """Number of trials; fractional if trials that depend on each other count less."""
     is_final: bool
     """Whether the trials have ended; otherwise they may still have any outcome."""
 

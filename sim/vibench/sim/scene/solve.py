@@ -46,13 +46,13 @@ if TYPE_CHECKING:
     from ..exponents.lyapunov import LyapunovEstimate
 
 EXPONENT_S = 25.0
-"""Longest averaging time of an exponent [s]."""
+"""Longest averaging time of a Lyapunov exponent [s]."""
 EXPONENT_PRECISION = 0.2, 0.01
-"""Required standard error of an exponent: absolute [1/s], and relative."""
+"""Required standard error of a Lyapunov exponent: absolute [1/s], and relative."""
 
 
 class Question(StrEnum):
-    """Extent of the solution of a scene."""
+    """Extent of the results requested for a scene."""
 
     ANSWER = "answer"
     """Responses with errors and, with sensitive dependence on the start, motions from other starts."""
@@ -343,7 +343,7 @@ class _Begun:
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Return the motions from other starts, as many as budget or ``draw`` allow; None if too few."""
+        """Return the motions from as many other starts as budget or ``draw`` allow; None if too few."""
         scene, pace = self._scene, self._pace
         requested = ReachedMotion(
             self.run,
@@ -431,7 +431,7 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind of the motion; with an automatic duration only lasting chaos is "chaotic"."""
+    """Return the kind of the motion; with an automatic duration, only proved lasting chaos is "chaotic"."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:

@@ -31,20 +31,20 @@ collisions in closed form are more accurate than that."""
 FORGETTING = 4.0
 """Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Length of a window over that of the shorter windows to which it is compared; also the ratio of leakage."""
+"""Ratio of a window's length to that of the shorter windows with which it is compared; also of leakage."""
 LOOKS = 8
-"""Number of periods that are compared: of the motion, or of the drive if the motion does not repeat."""
+"""Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
-"""Stated error over measured error."""
+"""Safety factor: stated error over measured error."""
 ROUNDING = 1e-11
 """Relative rounding error of an exact result."""
 ROUNDED = 1e-13
 """Offset of the start of the stricter run, over the drive amplitude. It is several times the accumulated
 rounding error of a run, because one offset shows only one sample of the effect of rounding."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""Signs of this offset for each coordinate. Those of y and z are equal, so that p does not change."""
+"""Signs of the offset of each coordinate; those of y and z are equal, so that p does not change."""
 SLOWEST_RATIO = 0.9
-"""Largest assumed ratio of successive changes, for the slowest settling."""
+"""Largest assumed ratio of successive changes of state, which means the slowest settling."""
 FIRST_LOOK = 16
 """Number of drive periods before two runs are first compared; later, whenever the time has doubled."""
 PARTED = 0.05
@@ -52,7 +52,7 @@ PARTED = 0.05
 MEMORIES = 8.0
 """Decay times of the slowest mode after which a chaotic motion counts as stationary."""
 MEMBERS = 5
-"""Number of additional starts if the difference between samples cannot be estimated from the window."""
+"""Number of additional starts if the window cannot show how much two random samples differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return the relative rounding errors of responses; those of lines also count relative to the peaks."""
+    """Return the relative rounding errors of responses; a line has the absolute error of its peak."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
@@ -142,7 +142,7 @@ class _StrictRun:
     """Motion integrated from its start with a smaller tolerance."""
 
     run: FollowedRun
-    """Run at the time at which it separated from the original run, else at the end of the window."""
+    """Stricter run, at the time at which it separated from the original run, else at the window's end."""
     responses_m: Floats | None
     """Responses in the window [m], shape (4,); None if the runs separated before."""
     is_together: bool
@@ -154,7 +154,7 @@ def _more_starts(
 ) -> list[Floats]:
     """Return the responses of a few more starts in the same window, shape (4,) each; NaN if a run fails.
 
-    The stricter run is one of them, because all others share the step errors until they separate.
+    The stricter run is one of these, because all other runs share the step errors until they separate.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.pushed(push) for push in pushed[1:]]
@@ -270,5 +270,5 @@ def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
 
 
 def finite_or_none(value: float) -> float | None:
-    """Return a finite number, otherwise None."""
+    """Return the number if it is finite, otherwise None."""
     return value if math.isfinite(value) else None

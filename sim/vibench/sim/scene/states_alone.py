@@ -29,9 +29,9 @@ from .scene import AutomaticDuration, FixedDuration
 SLICE_S = 0.5
 """Shortest time between two checks for repetition [s]."""
 PARTS = 4
-"""Number of parts of a stretch in which growth is measured, to see whether a perturbation keeps growing."""
+"""Number of parts of a stretch in which growth is measured, to see if a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Decay times of the slowest mode for which states are stored; settling takes ten at *standard*."""
+"""Time for which states are stored, in decay times of the slowest mode; settling takes ten at *standard*."""
 
 
 class StatesAlone:
@@ -68,7 +68,7 @@ class StatesAlone:
         self.path: list[Stretch] = []
         """Stretches integrated so far, with every n-th state."""
         self.repeats: Repetition | None = None
-        """Repetition of the motion; once it is found, the run ends."""
+        """Repetition of the motion; the run ends once a repetition is found."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """Latest states, once per drive period, shape (n, 6)."""
         self._settled_s: float | None = None
@@ -86,7 +86,7 @@ class StatesAlone:
 
     @property
     def wandered_until_s(self) -> float:
-        """Last time at which two periods differed [s]; the current time if the motion does not repeat."""
+        """Last time at which two successive periods differed [s]; the current time without repetition."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
@@ -156,7 +156,7 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
 WORTH_A_FIT_S = 3000.0
 """Total simulated time of one specimen for which batches save more than their collision fit costs [s]."""
 AUTOMATIC_S = 10.0
-"""Assumed length, in this comparison, of a run with an automatic duration [s]."""
+"""Assumed length of a run with an automatic duration, to compare batches with single runs [s]."""
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
@@ -171,9 +171,9 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
 """Longest time [s] and most drive periods between two checks of a batch; limited by the stored states."""
 HELD_STATES, FULL = 1 << 20, 16
-"""Most stored states of all motions in a batch; number of motions that fill the SIMD registers."""
+"""Most stored states of all motions in a batch, and number of motions that fill the SIMD registers."""
 TRIES = 8
-"""Most drive periods to wait for one that ends without contact; only then a batch can begin."""
+"""Most drive periods to wait for a period that ends without contact, at which a batch can begin."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:

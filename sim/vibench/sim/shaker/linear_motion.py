@@ -22,7 +22,7 @@ _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """Response to voltage and to stop force at n frequencies; columns as in `SINE_COLUMNS`."""
+    """Responses to a voltage and to a stop force at n frequencies, with the columns of `SINE_COLUMNS`."""
 
     per_volt: ComplexArray
     """Motion without contact, per volt at the amplifier's input, shape (n, 5)."""
@@ -31,7 +31,7 @@ class LinearMotion:
 
     @property
     def lever(self) -> ComplexArray:
-        """Motion per metre of p, with p imposed by the stops, shape (n, 5)."""
+        """Motion per metre of p, if the stops impose p, shape (n, 5)."""
         return self.per_newton / self.per_newton[:, [_P]]
 
     @property
@@ -113,7 +113,7 @@ def linear_motion(
 
 
 def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray) -> ComplexArray:
-    """Return the dynamic stiffness of table, m0, m1 and m2, shape (n, 4, 4) [N/m]."""
+    """Return the dynamic stiffness matrix of table, m0, m1 and m2, shape (n, 4, 4) [N/m]."""
     s_of = s[:, None, None]
     stiffness = np.zeros((s.size, 4, 4), dtype=np.complex128)
     stiffness[:, 1:, 1:] = (

@@ -34,15 +34,15 @@ class Amplifier:
     """
 
     gain: float = 1.0
-    """Output voltage over input voltage, not zero; negative for an inverting amplifier."""
+    """Gain: output over input voltage, not zero; negative for an inverting amplifier."""
     low_cut_hz: float = 0.0
-    """Lower -3 dB frequency [Hz]; 0 for DC coupling."""
+    """Lower -3 dB frequency of the amplifier [Hz]; 0 for DC coupling."""
     high_cut_hz: float = math.inf
-    """Upper -3 dB frequency [Hz]."""
+    """Upper -3 dB frequency of the amplifier [Hz]."""
     clip_v: float = math.inf
     """Largest output voltage, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; the amplifier reduces its voltage to keep it."""
+    """Largest current, peak [A]; the amplifier reduces its voltage so as not to exceed it."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -187,7 +187,7 @@ class LoadedShaker:
         self.structure = engine.new("LoadedShaker", step=step_s, tolerance=_CONTACT_TOLERANCE)
         """The `LoadedShaker` of native/structures.hpp that the engine advances."""
         self.step_s = step_s
-        """Length of a step [s]."""
+        """Length of a time step [s]."""
         self._place(specimen, start)
         x, _, _, vx, _, _ = self.structure["specimen"]["motion"]
         self.structure["reactions_before"] = specimen.stiffnesses[0] * x + specimen.dampings[0] * vx
@@ -213,7 +213,7 @@ class LoadedShaker:
 
     @property
     def impacts(self) -> int:
-        """Number of contacts since the beginning."""
+        """Number of contacts since the first time step."""
         return int(self.structure["impacts"])
 
     @property
@@ -282,7 +282,7 @@ class LoadedShaker:
         )
 
     def account(self, good: int, count: int) -> None:
-        """Raise MotionFailed if only the first ``good`` of ``count`` steps were completed."""
+        """Raise MotionFailed if only the first ``good`` of ``count`` time steps were completed."""
         if good < count:
             raise MotionFailed(
                 f"The specimen's motion was lost after {good} of {count} steps: it is not finite, or a "
@@ -291,5 +291,5 @@ class LoadedShaker:
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:
-    """Return the mean of exp(-t) for t from zero to the argument; 1 if the argument is zero."""
+    """Return the mean of exp(-t) for t between zero and the argument; 1 if the argument is zero."""
     return -math.expm1(-steps_per_time_constant) / steps_per_time_constant if steps_per_time_constant else 1.0

@@ -24,11 +24,11 @@ Gain = Callable[[FloatArray], ComplexArray]
 FINEST_STEP_HZ = 5e4
 """Lowest step rate [Hz]; the specimen's force on the table then has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""End of the pass band over the sample rate. A cosine edge to half the rate follows, as in a converter."""
+"""Upper end of the pass band over the sample rate; a cosine edge to half the sample rate follows."""
 _MARGIN = 2048
-"""Samples on each side of a piece that are filtered too; farther impulse responses are below 1e-8."""
+"""Samples on each side of a piece that are filtered with it; impulse responses beyond are below 1e-8."""
 _PIECE = 1 << 15
-"""Number of samples in a piece, which is filtered at once."""
+"""Number of samples in a piece of the recording; a piece is filtered at once."""
 _BLOCK_S = 0.02
 """Length of the blocks after which impacts are counted [s]."""
 

@@ -11,11 +11,11 @@ class Accuracy(StrEnum):
     """
 
     QUICK = "quick"
-    """Error 1e-5. Enough for chaotic motion, whose results a stricter level does not improve."""
+    """Error 1e-5: enough for chaotic motion, whose results a stricter level does not improve."""
     STANDARD = "standard"
     """Error 1e-6."""
     REFERENCE = "reference"
-    """Error 1e-9. The other two levels are checked against it."""
+    """Error 1e-9: reference with which the two other levels are checked."""
 
     @property
     def tolerance(self) -> float:

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from .stops import Strict, require_positive
 
 FEWEST_SAMPLES = 4
-"""Fewest samples: a not-a-knot cubic spline needs four points."""
+"""Fewest samples of a sampled drive: a not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
-"""Allowed amplitudes. Squares of smaller ones underflow; larger ones are typing errors and compute slowly."""
+"""Allowed base amplitudes [m]. Squares of smaller ones underflow; larger ones are typing errors."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Allowed frequencies. At higher ones, powers of the frequency and numbers of periods would overflow."""
+"""Allowed frequencies [Hz]. At higher ones, powers of the frequency and numbers of periods overflow."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class _Sweep(Strict):
 
     @property
     def highest_hz(self) -> float:
-        """Highest frequency of the sweep."""
+        """Highest frequency of the sweep [Hz]."""
         return max(self.start_hz, self.stop_hz)
 
 

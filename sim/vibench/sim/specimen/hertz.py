@@ -36,7 +36,7 @@ HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz"
 
 @dataclass(frozen=True)
 class Elasticity:
-    """Elastic constants of one of two bodies in contact."""
+    """Elastic constants of one of the two bodies in contact."""
 
     youngs_modulus: float
     """Young's modulus E [Pa]."""

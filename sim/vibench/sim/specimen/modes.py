@@ -82,7 +82,7 @@ class ModalForm(NamedTuple):
 
 
 COINCIDENT = 1e7
-"""Condition number of the eigenvectors above which two modes count as equal (critical damping)."""
+"""Condition number of the eigenvectors above which two modes count as coincident (critical damping)."""
 PROPORTIONAL = 1e-12
 """Largest ratio of off-diagonal to diagonal modal damping for which the modes count as uncoupled."""
 CRITICAL = 1e-12
@@ -139,7 +139,7 @@ def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table)
 
 
 def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
-    """Return the terms (rate, shape, row) of one mode: one term if it oscillates, two if it is overdamped."""
+    """Return the terms (rate, shape, row) of one mode: one term if the mode oscillates, two if overdamped."""
     turn = (omega - decay) * (omega + decay)
     if abs(turn) <= CRITICAL * omega**2:
         raise ValueError(REFUSAL)
@@ -219,7 +219,7 @@ class BaseResponse:
     stuck_x: Complex
     """Ratio x / U while m1 sticks to m2."""
     lever: Complex
-    """Ratio x / p, with p imposed by the stops and the base at rest."""
+    """Ratio x / p if the stops impose p and the base is at rest."""
 
 
 def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:

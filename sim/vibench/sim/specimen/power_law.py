@@ -19,7 +19,7 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Largest exponent. With it, a 0.1 % change of p changes the force by a factor of e, as a wall would."""
+"""Largest exponent; a 0.1 % change of p then changes the force by a factor of e, like a rigid wall."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from .stops import Strict
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
-"""Clearances of the stops at negative and at positive p [m]; one may be infinite."""
+"""Clearances of the stops at negative and at positive p = y - z [m]; one may be infinite."""
 Matrix = NDArray[np.float64]
 
 

@@ -25,11 +25,11 @@ class Stops(NamedTuple):
     """Parameters of F = (linear d + contact d^(3/2)) (1 + loss dd/dt) for m1 at indentation d in a stop."""
 
     linear_stiffness: float = 0.0
-    """Coefficient of d [N/m]."""
+    """Stiffness: coefficient of the indentation d [N/m]."""
     contact_stiffness: float = 0.0
-    """Coefficient of d^(3/2) [N/m^1.5]."""
+    """Hertz stiffness: coefficient of d^(3/2), with the indentation d [N/m^1.5]."""
     loss: float = 0.0
-    """Coefficient of dd/dt [s/m]."""
+    """Loss factor: coefficient of the indentation rate dd/dt [s/m]."""
     restitution: float | None = None
     """Coefficient of restitution of rigid stops; None for elastic stops or no stops."""
 
@@ -63,11 +63,11 @@ class LawWord(Generic[Law_co]):
     """Entry of `CONTACT_LAWS`: form of a law's name, and the function that parses it."""
 
     form: str
-    """Allowed forms of the name, for messages."""
+    """Allowed forms of the law's name, as messages show them."""
     about: str
-    """Short description of the law, for lists."""
+    """Short description of the law, as lists show it."""
     example: str
-    """Example of the name, for figures."""
+    """Example of the law's name, as figures show it."""
     made: Callable[[str, Reference], Law_co]
     """Function that returns the law for the text after the colon; raises `UnreadableLawError`."""
 
@@ -85,13 +85,13 @@ def number_in(detail: str) -> float:
 
 
 def require_nothing(detail: str) -> None:
-    """Raise `UnreadableLawError` for text after the name of a law without parameters."""
+    """Raise `UnreadableLawError` if text follows the name of a law that has no parameters."""
     if detail:
         raise UnreadableLawError(detail)
 
 
 def require_positive(name: str, value: float, unit: str) -> None:
-    """Raise ValueError for a number that is not positive and finite."""
+    """Raise ValueError if a number is not positive and finite."""
     if not 0.0 < value < math.inf:
         raise ValueError(f"{name} {value} {unit} is not allowed: it must be positive and finite.")
 

@@ -27,11 +27,11 @@ RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 
 Answer = tuple[str, tuple[Solved, ...]]
-"""Software of the worker, and its results."""
+"""Results of a worker, with the versions of its software."""
 
 
 def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
-    """Solve scenes on a worker; return its software and the results."""
+    """Solve scenes on a worker; return the results and the versions of the worker's software."""
     return software(), tuple(solve_timed(scenes, solver))
 
 
@@ -105,11 +105,11 @@ class ClusterExecutor:
         self._client.close()
 
     def _note(self, bundle: Bundle, future: Future) -> None:
-        """Put a finished bundle into the queue; the client calls this in one of its threads."""
+        """Put a finished bundle into the queue; the Dask client calls this function in one of its threads."""
         self._arrived.put((bundle, future))
 
     def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
-        """Return the results of all finished futures, fetched at once; none if they were lost."""
+        """Return the results of all finished futures, fetched together; nothing for lost results."""
         if not futures:
             return {}
         try:

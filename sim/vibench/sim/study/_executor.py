@@ -26,7 +26,7 @@ class Bundle:
     """Scenes that are sent to a worker together, because sending short scenes one by one is slow."""
 
     numbers: tuple[int, ...]
-    """Number of the point in the study, for each scene."""
+    """Number of the study's point to which each scene belongs."""
     scenes: tuple[Scene, ...]
 
 
@@ -36,9 +36,9 @@ class Reply:
 
     bundle: Bundle
     solved: tuple[Solved, ...]
-    """Results in the order of the scenes; fewer after a cancellation or an error."""
+    """Results in the order of the scenes; fewer than scenes after a cancellation or an error."""
     error: BaseException | None = None
-    """Error that prevented the results that are absent."""
+    """Error that prevented the missing results; None if there was no error."""
 
 
 class Executor(Protocol):
@@ -62,7 +62,7 @@ class Executor(Protocol):
         """
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no more scenes, and return the replies still due. May be called at any time."""
+        """Start no more scenes, and return the replies for running scenes. May be called at any time."""
 
     def close(self) -> None:
         """Release all workers. May be called at any time."""

@@ -27,7 +27,7 @@ from ._software import software
 from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
-"""Longest wait for a reader to close the file, and time between attempts to lock it [s]."""
+"""Longest wait for a reader to close the file, and time between attempts to lock the file [s]."""
 
 
 def sole_writer(path: Path) -> OpenFile:
@@ -69,7 +69,7 @@ _COMPONENTS = {
         ),
     )
 }
-"""Additional axes of columns with several components, by name."""
+"""Coordinates of the additional axes of columns with several components, by name of the axis."""
 HEAD_BYTES = 2_000_000
 """Upper bound on the size of everything in the file except the columns [bytes]."""
 
@@ -232,7 +232,7 @@ class FileStore:
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Write the results of points: first their numbers, then their states.
+        """Write the results of points: first their numbers, then the point states.
 
         Raises StudyError after a write error; results written before are safe.
         """
@@ -248,7 +248,7 @@ class FileStore:
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Write filled-in points, as whole columns: first numbers, then states."""
+        """Write the filled-in points of a map as whole columns: first numbers, then point states."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
             self._write(self._places.columns[name], self.arrays[name].tobytes())

@@ -38,7 +38,7 @@ class PointState(IntEnum):
     MISSING = 0
     """The point has not been computed."""
     DONE = 1
-    """The run reached its end."""
+    """The run of the point reached its end."""
     STOPPED = 2
     """The run did not reach its end; ``outcome`` contains the reason. Numbers may be NaN."""
     FAILED = 3
@@ -50,7 +50,7 @@ class PointState(IntEnum):
 SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
 """Columns of the table of sessions, with sizes [bytes]. A session is a run or a resumption of the study."""
 MOST_SESSIONS = 1024
-"""Number of rows of this table; all further sessions use the last row."""
+"""Number of rows of the table of sessions; all further sessions use the last row."""
 
 
 Cell = float | int | bytes | tuple[float, ...]
@@ -80,18 +80,18 @@ class Column:
     name: str
     dtype: str
     units: str
-    """Unit as UDUNITS text; 1 for ratios and counts."""
+    """Unit of the column as UDUNITS text; 1 for ratios and counts."""
     long_name: str
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """Number of components; if there are several, the array has an additional last axis."""
+    """Number of components per point; if there are several, the array has an additional last axis."""
     along: str = COORDINATE
-    """Name of the additional axis."""
+    """Name of the additional axis for the components."""
 
     @property
     def missing(self) -> float | int | bytes:
-        """Value that marks a missing result."""
+        """Value that marks a missing result in this column."""
         match self.dtype[:2]:
             case "<f":
                 return math.nan
@@ -248,7 +248,7 @@ class StudyAxis:
     values: tuple[float | str, ...]
     """Ascending numbers, or labels."""
     units: str
-    """Unit as UDUNITS text; empty for labels."""
+    """Unit of the axis as UDUNITS text; empty for labels."""
     long_name: str
 
     @property
@@ -287,7 +287,7 @@ class GridPlan(FrozenModel, ABC):
         """Return the drive frequency at a position of the grid [Hz]."""
 
     def phase_after(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> float:
-        """Return the drive phase [rad] at the end of a point, from which another point continues."""
+        """Return the drive phase [rad] at the end of a point's run, where the next point's run begins."""
         frequency_hz = self.frequency_at(self.grid.place(number))
         turns = math.fmod(frequency_hz * float(arrays[DURATION][number]), 1.0)
         return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][number]), 2.0 * math.pi)

@@ -26,7 +26,7 @@ from ._study import Start
 # The time of a point is estimated from its plan, and from its neighbours once these are done.
 
 SHORTEST_S = 1e-6
-"""Shortest assumed time of a point [s]; avoids division by zero."""
+"""Shortest assumed computing time of a point [s]; avoids division by zero."""
 
 
 class Costs:
@@ -96,7 +96,7 @@ class PointScheduler:
         self._queue: list[tuple[float, int]] = []
 
     def release(self, numbers: NDArray[np.int64]) -> None:
-        """Allow these points to be started, except those that have a result."""
+        """Release these points, so that those without a result can be started."""
         new = numbers[~self._is_released[numbers]]
         self._is_released[new] = True
         self.left += int(np.count_nonzero(~self._is_done[new]))
@@ -148,12 +148,12 @@ class PointScheduler:
             self._push(follower)
 
     def put_back(self, number: int) -> None:
-        """Put a point that was taken back into the queue."""
+        """Return a point that was taken from the queue to the queue."""
         self._is_out[number] = False
         self._push(number)
 
     def put_back_alone(self, number: int) -> None:
-        """Put a point back whose bundle failed, to be run in a bundle of its own."""
+        """Return a point of a failed bundle to the queue, to be computed in a separate bundle."""
         self._is_alone[number] = True
         self.put_back(number)
 
@@ -194,7 +194,7 @@ class PointScheduler:
 MOST_IN_BUNDLE = 64
 """Largest number of points in a bundle; limits the results that are lost with a worker."""
 SHARE = 8
-"""Remaining work per worker over the largest bundle; so all workers end at about the same time."""
+"""Ratio of the remaining work per worker to the largest bundle; makes all workers end together."""
 QUEUED_PER_SLOT = 2
 """Number of bundles per worker: one runs and one waits, so that no worker is idle."""
 LOOK_S = 0.2
@@ -209,8 +209,8 @@ class StudyEnd(StrEnum):
 
 
 PLANNED = 2000
-"""Largest number of points whose time is planned one by one; in a larger grid, one point stands for several
-neighbours."""
+"""Largest number of points whose computing time is planned one by one; in a larger grid, one point stands for
+several neighbours."""
 
 
 class Points(ABC):
@@ -243,7 +243,7 @@ class Points(ABC):
         return self.times_s()
 
     def times_s(self, *, may_repeat: bool = True) -> Floats:
-        """Return the expected computing time of each point, (points,) [s]; 0 for a forbidden scene."""
+        """Return the expected computing time of each point, shape (points,) [s]; 0 for a forbidden scene."""
 
         def time_s(number: int) -> float:
             try:
@@ -272,13 +272,13 @@ class Points(ABC):
         return self.unchained(number) if before == NOBODY else self.continued(number, before, arrays)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Return what is stored for a scene that raised an error."""
+        """Return the result to store for a scene that raised an error."""
         message = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
 
     @abstractmethod
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute next, given the results so far; called whenever all are done."""
+        """Return the points to compute next, given the results so far; called when all others are done."""
 
     @abstractmethod
     def unchained(self, number: int) -> Scene:
@@ -290,7 +290,7 @@ class Points(ABC):
 
     @abstractmethod
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return what is stored for the solution of a point."""
+        """Return the result to store for the solution of a point."""
 
 
 def run_points(
@@ -381,7 +381,7 @@ class _Session:
         return Progress(released - self._scheduler.left, released, self._left_s(), note)
 
     def _left_s(self) -> float | None:
-        """Return the remaining time [s], from the speed of the workers so far; None if unknown."""
+        """Return the remaining time of the session [s], from the workers' speed so far; None if unknown."""
         if not self.is_unfinished:
             return 0.0
         if self._taken_s == 0.0:

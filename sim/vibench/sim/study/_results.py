@@ -26,13 +26,13 @@ Plan = TypeVar("Plan", bound=GridPlan)
 
 @dataclass(frozen=True)
 class Places:
-    """Byte offsets, in the file, of the datasets that are written during a run."""
+    """Positions in the file [bytes] of the datasets that are written during a run."""
 
     columns: Mapping[str, int]
     session_columns: Mapping[str, int]
     n_sessions: int
     sessions: int
-    """Number of sessions that are already recorded."""
+    """Number of sessions that the file already records."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
 
 
 def places_of(path: Path, plan: GridPlan) -> Places:
-    """Return the byte offsets, in the file, of the datasets that are written during a run."""
+    """Return the positions in the file [bytes] of the datasets that are written during a run."""
     with _open_store(path, type(plan)) as file:
         group = file[layout.SESSIONS]
         return Places(

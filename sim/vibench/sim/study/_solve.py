@@ -103,7 +103,7 @@ class Expansion(Points):
         return self._study.scene(self.grid.place(number), start, self._study.phase_after(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Return what is stored for a solved point, with the start and the identity of its scene."""
+        """Return the result to store for a solved point, with the start and the digest of its scene."""
         before = self.predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
         cells: dict[str, Cell] = {

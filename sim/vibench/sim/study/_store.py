@@ -78,10 +78,10 @@ class Store(Protocol):
         """Record that a session begins, and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results; return when they are safe."""
+        """Store results; return when they are safely stored."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store interpolated points, given by column, with the state FILLED."""
+        """Store the interpolated points of a map, given by column, with the point state FILLED."""
 
 
 class MemoryStore:
@@ -101,7 +101,7 @@ class MemoryStore:
             self.arrays[layout.STATE][answer.number] = answer.state
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store interpolated points, given by column, with the state FILLED."""
+        """Store the interpolated points of a map, given by column, with the point state FILLED."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
@@ -215,7 +215,7 @@ def cut_text(text: str) -> bytes:
 def _numbers_at(
     arrays: Arrays, columns: Mapping[str, layout.Column], at: int | tuple[int, int]
 ) -> dict[str, Any]:
-    """Return the numbers of a point, or of one of its motions, by field name; None if missing."""
+    """Return the values of a point, or of one of its motions, by field name; None for missing values."""
     return {field: _number(arrays[column.name][at]) for field, column in columns.items()}
 
 

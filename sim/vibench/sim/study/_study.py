@@ -84,7 +84,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 MOST_POINTS = 10_000_000
 """Largest number of points of a study; the file then has 2 GB."""
 AS_DESCRIBED = "as described"
-"""Label of an axis on which no values were given, so that the specimen's value is used."""
+"""Label of an axis without given values, for which the specimen's value is used."""
 
 
 class Start(StrEnum):
@@ -277,7 +277,7 @@ class Study(GridPlan):
 
     @property
     def duration(self) -> FixedDuration | AutomaticDuration:
-        """Duration of the run of every point."""
+        """Duration setting of every point's run: fixed, or until the motion settles."""
         match "auto" if self.target is not None else self.duration_s:
             case "auto":
                 return AutomaticDuration(window_s=self.window_s)
