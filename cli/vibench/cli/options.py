@@ -45,6 +45,8 @@ _ALLOWED = {
     "finite_number": "it must be a finite number",
 }
 """Description of the allowed values, by pydantic's type of error."""
+_EXAMPLES = {"error": "; for 1 % give 1%"}
+"""Example of an allowed value, by field."""
 
 
 @dataclass(frozen=True)
