@@ -17,10 +17,10 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
 @pytest.mark.parametrize(
     ("state_errors", "said", "without"),
     [
-        ((7.8e-7, 5.7e-8, 5.8e-12), "Each level reduces the error", []),
-        ((1.3e-8, 1.8e-8, 2.4e-13), "Only `reference` reduces the error", ["standard"]),
-        ((1.3e-8, 1.3e-8, 2.4e-13), "Only `reference` reduces the error", ["standard"]),
-        ((1.3e-6, 1.3e-11, 1.2e-11), "`standard` reduces the error, `reference` does not", ["reference"]),
+        ((7.8e-7, 5.7e-8, 5.8e-12), "Each level reduces the state error", []),
+        ((1.3e-8, 1.8e-8, 2.4e-13), "Only `reference` reduces the state error", ["standard"]),
+        ((1.3e-8, 1.3e-8, 2.4e-13), "Only `reference` reduces the state error", ["standard"]),
+        ((1.3e-6, 1.3e-11, 1.2e-11), "`standard` reduces the state error, `reference`", ["reference"]),
         ((1.3e-8, 1.0e-8, 0.9e-8), "All levels are about equally accurate", ["standard", "reference"]),
     ],
 )
@@ -34,4 +34,4 @@ def test_an_accuracy_level_without_improvement_is_reported_as_such(state_errors,
 def test_accuracy_levels_that_cannot_differ_are_not_reported_as_lacking_gain():
     assert benchmark(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
     assert benchmark(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
-    assert "starts (3.2% at `quick`)" in benchmark(None, None, None, regime=Regime.CHAOTIC).advice
+    assert "conditions (3.2% at `quick`)" in benchmark(None, None, None, regime=Regime.CHAOTIC).advice
