@@ -10,13 +10,13 @@ from ..tables import Labelled
 
 LONGEST_PERIOD = 32
 _TABLE = 2
-"""Number of dimensions of an array of points: periods by coordinates."""
+"""Number of dimensions of an array of Poincaré points: drive periods by coordinates."""
 STEADY = 2e-3
-"""Scatter allowed for a steady motion, relative to the orbit; real drives fluctuate by as much."""
+"""Allowed scatter of a steady motion's points, relative to the orbit; real drives fluctuate by as much."""
 _NOISE_MARGIN = 1.5
-"""Largest ratio of measured to expected scatter that is attributed to noise."""
+"""Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25
-"""For periods above one: largest variance of points of equal phase, relative to that of all points."""
+"""For periods above one: largest variance of points of equal phase over the variance of all points."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""
@@ -27,15 +27,15 @@ _STEADY_SCATTER = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Points(Labelled):
-    """One point per drive period, with its noise; coordinates are normalised."""
+    """Poincaré points of a motion, one per drive period, with their noise, relative to the orbit's size."""
 
     value: Reals
-    """Displacement and velocity over the size of the orbit, shape (periods, 2)."""
+    """Displacement and velocity, each divided by the size of the orbit, shape (periods, 2)."""
     noise: Reals
-    """Standard deviation of the noise on each coordinate, normalised likewise, shape (2,)."""
+    """Standard deviation of the noise of displacement and velocity, divided likewise, shape (2,)."""
 
     def __post_init__(self) -> None:
-        """Raise InvalidRequest for other shapes or invalid noise, UnusableData for lost points."""
+        """Raise InvalidRequest for other shapes or invalid noise, UnusableData for NaN points."""
         points, noise = np.shape(self.value), np.shape(self.noise)
         if len(points) != _TABLE or noise != points[1:]:
             raise InvalidRequest(
@@ -53,12 +53,12 @@ class Points(Labelled):
 
     @property
     def spread(self) -> float:
-        """RMS distance from the mean point; 1 is the size of the orbit."""
+        """RMS distance of the points from their mean; 1 is the size of the orbit."""
         return float(np.sqrt(np.mean(np.var(self.value, axis=0))))
 
     @property
     def noise_level(self) -> float:
-        """RMS of the noise."""
+        """RMS noise of the points, relative to the size of the orbit."""
         return float(np.sqrt(np.mean(self.noise**2)))
 
 
@@ -83,9 +83,9 @@ def shortest_period(points: Points) -> int | None:
 
 
 def drift(points: Points) -> float:
-    """Return the largest trend of the mean or the scatter over a record, in standard errors.
+    """Return the largest trend of the points' mean or scatter over a record, in standard errors.
 
-    The slope through tenths of the record is divided by its standard error; a scatter of 0.2 % of the orbit
+    The slope through tenths of the record is divided by its standard error. A scatter of 0.2 % of the orbit
     is tolerated as unsteadiness of the drive.
     """
     blocks = np.array_split(points.value, _BLOCKS)
@@ -110,12 +110,12 @@ def slow_share(points: Points) -> float:
 
 
 def is_settled(points: Points) -> bool:
-    """Return whether mean and scatter are constant over the record."""
+    """Return whether mean and scatter of the points are constant over the record."""
     return drift(points) <= _DRIFT
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the scatter about the mean point changes by a tenth or more, even if it is small."""
+    """Return whether the points' scatter about their mean changes by a tenth or more, even if it is small."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

@@ -34,7 +34,7 @@ _EXPLAINED = 0.02
 """Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Upper limit of this relative distance, even if the noise would explain a larger one."""
+"""Largest RMS distance of points from a closed curve, over their spread, even if noise explains more."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -43,12 +43,12 @@ _MAINS_WITHIN = 1e-3
 
 @dataclass(frozen=True)
 class Rotation:
-    """Closed curve that fits the points of a section best."""
+    """Closed curve that fits the points of a Poincaré section best."""
 
     turns_per_period: float
     """Rotation number: turns per drive period, 0 to 0.5."""
     left_over: float
-    """RMS distance of the points from the curve, relative to their spread."""
+    """RMS distance of the section's points from the curve, relative to the spread of these points."""
 
 
 def rotation(points: Reals) -> Rotation:
@@ -75,7 +75,7 @@ def rotation(points: Reals) -> Rotation:
 
 
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
-    """Return the mains frequency or harmonic that explains this rotation; otherwise None."""
+    """Return the mains frequency or the harmonic that explains a rotation number; None if there is none."""
     for mains in _MAINS_HZ:
         for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
             turns = hum_hz / drive_hz
@@ -94,7 +94,7 @@ def _residual(centred: Reals, turns: float) -> float:
 
 _BLOCKS = 10
 _SHORTEST_BLOCK = 50
-"""Drive periods per block, enough to see whether a motion repeats."""
+"""Number of drive periods per block, enough to see whether a motion repeats."""
 
 
 def begin_of_last_motion(points: Points) -> int:
@@ -115,19 +115,19 @@ def begin_of_last_motion(points: Points) -> int:
     changes = np.flatnonzero(repeats[1:] != repeats[:-1])
     if changes.size != 1:
         return 0
-    # The change lies somewhere inside the block that does not repeat.
+    # The motion changes somewhere inside the block that does not repeat.
     last = int(changes[0]) + 1
     return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
 
 
 MOST_POINTS = 3000
-"""Maximum number of points, from the end of a record, in tests of the shape; more would only take time."""
+"""Maximum number of points, from the end of a record, for tests of their shape; more only take time."""
 ABOVE_NOISE = 5.0
-"""Minimum ratio of scatter to noise for tests of the shape."""
+"""Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
-"""Largest ratio of noise to orbit; more noise could hide another motion."""
+"""Largest ratio of noise to the size of the orbit; more noise could hide another motion."""
 SMALL = 0.05
-"""Largest scatter of a periodic motion with linear noise, relative to the orbit."""
+"""Largest scatter of a periodic motion with linear noise, relative to the size of the orbit."""
 SLOW = 0.5
 """Largest `slow_share` of the variance; if it is larger, the motion changes slowly."""
 _FEWEST_TURNS = 3.0
@@ -135,12 +135,12 @@ _FEWEST_TURNS = 3.0
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
 _LOW_PERIOD = 4
-"""Longest period that counts as low; hum causes such periods if the drive is at twice the mains frequency."""
+"""Longest period that counts as low; mains hum at half the drive frequency causes such periods."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Required margin below the surrogates' mean in standard deviations; rank alone fails once in 40."""
+"""Required distance below the surrogates' mean [standard deviations]; a rank test alone fails once in 40."""
 _ASYMMETRIC = 2.5
-"""Required margin for time symmetry; noise exceeds it in about 4 % of cases (better of two coordinates)."""
+"""Minimum `margin` of the time symmetry; noise exceeds it in 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0
 """Distance of an exponent's lower bound below its estimate, in standard deviations of the estimate."""
 _DELAYS = 3
@@ -154,12 +154,12 @@ class MotionKind(StrEnum):
     QUASI_PERIODIC = "quasi-periodic"
     CHAOTIC = "chaotic"
     UNDECIDED = "undecided"
-    """The data allow no verdict; `MotionVerdict.why` states the reason."""
+    """The recording allows no verdict; `MotionVerdict.why` states the reason."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Results of the tests; None if a test was not needed."""
+    """Results of the tests for a verdict; None if a test was not needed."""
 
     drive_hz: float
     periods: int
@@ -167,7 +167,7 @@ class Evidence:
     spread: float
     """Scatter of the points relative to the size of the orbit."""
     noise: float
-    """Noise relative to the size of the orbit."""
+    """Noise of the points relative to the size of the orbit."""
     is_settled: bool
     rotation: Rotation | None = None
     zero_one: ZeroOne | None = None
@@ -177,7 +177,7 @@ class Evidence:
 
 @dataclass(frozen=True, eq=False)
 class MotionVerdict(Labelled):
-    """Kind of a motion, with the reason."""
+    """Kind of a recorded motion, with the reason for this verdict."""
 
     DOCUMENT: ClassVar = (
         "kind why period periods_judged=evidence.periods is_settled=evidence.is_settled "
@@ -190,7 +190,7 @@ class MotionVerdict(Labelled):
     why: str
     evidence: Evidence
     period: int | None = None
-    """Drive periods after which a periodic motion repeats."""
+    """Number of drive periods after which a periodic motion repeats."""
 
     @property
     def least_exponent_per_s(self) -> float | None:
@@ -243,8 +243,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     if count - before < FEWEST:
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
-    # A settled end repeats, however long the transient was. An irregular end or a long period may itself be
-    # a transient: a decay into noise rotates about a point.
+    # A settled motion repeats at the end, however long its transient was. An irregular end or a long period
+    # may itself be a transient: a decay into noise rotates about a point.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")
@@ -392,7 +392,7 @@ def _verdict(
 
 
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
-    """Return the verdict for linear noise: periodic if it is small, otherwise undecided."""
+    """Return the verdict if linear noise explains the points: periodic if it is small, else undecided."""
     if evidence.spread > SMALL:
         return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (

@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""Up to 4 times this number of nearest points are searched for one that is not near in time."""
+"""Up to 4 times this number of nearest points are searched for one that is distant in time."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -39,7 +39,7 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Pairs of a point and its nearest neighbour, for the points that have one."""
+    """Pairs of a point and its nearest neighbour; points without a neighbour are left out."""
 
     point: Integers
     neighbour: Integers
@@ -68,7 +68,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     distance = np.full(last, np.nan)
     tried = 4
     while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
-        # A list of ranks keeps the result two-dimensional.
+        # A list of neighbour ranks keeps the result two-dimensional.
         ranks = list(range(1, min(tried, last) + 1))
         reach, index = (np.asarray(each) for each in tree.query(points[wanted], k=ranks))
         allowed = (np.abs(index - wanted[:, np.newaxis]) >= apart) & (reach > floor)
@@ -96,18 +96,18 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Distance relative to the typical distance, above which the size of the attractor limits growth."""
+"""Distance of neighbours over the typical distance, above which the attractor's size limits its growth."""
 _ABOVE_NOISE = 3.0
-"""Minimum ratio of the distances in the fit to the noise."""
+"""Minimum ratio of the neighbours' distances in the line fit to the noise."""
 _SHORTEST_FIT = 3
-"""Minimum number of steps for a line fit."""
+"""Minimum number of steps for fitting a line to the divergence."""
 _BLOCKS = 10
 FEWEST_PAIRS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Divergence:
-    """Mean logarithm of the distance of initial neighbours, step by step."""
+    """Mean logarithm of the distance of initially neighbouring points after each step."""
 
     logarithm: Reals
     """Mean ln(distance) of all pairs after each step, shape (steps + 1,)."""
@@ -119,7 +119,7 @@ class Divergence:
     exponent: float
     """Slope of the fitted line [1/step]; NaN if no line was fitted."""
     sd_exponent: float
-    """Scatter of the slope over tenths of the record."""
+    """Scatter of the slope between tenths of the record."""
     pairs: int
 
     @property
@@ -179,7 +179,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # Leave out the first steps, in which the difference still rotates into the direction of growth.
+    # Leave out the first steps, while the difference rotates into the direction of growth.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -196,14 +196,13 @@ def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
 
 
 _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
-"""Range of the frequencies c; other frequencies are prone to resonances (Gottwald and Melbourne, section
-3.1)."""
+"""Frequencies c of the 0-1 test; others are prone to resonances (Gottwald and Melbourne, section 3.1)."""
 _FREQUENCIES = 100
 _CUT = 10
 """The mean square displacement is computed for lags up to the series length divided by this number."""
 FEWEST = 200
 OVERSAMPLED = 0.8
-"""Correlation of neighbours above which a series is a flow sampled too finely for this test."""
+"""Correlation of successive values above which a series is sampled too finely for the 0-1 test."""
 
 
 @dataclass(frozen=True)
@@ -213,9 +212,9 @@ class ZeroOne:
     k: float
     """Median of the correlations K_c: near 0 regular, near 1 chaotic *or noisy*."""
     spread: float
-    """Half the interquartile range of the K_c."""
+    """Half the interquartile range of the correlations K_c."""
     neighbour_correlation: float
-    """Correlation of each value with the next."""
+    """Correlation of each value of the series with the next value."""
 
     @property
     def is_oversampled(self) -> bool:
@@ -267,9 +266,9 @@ def _correlation(series: Reals, frequency: float) -> float:
 
 
 SURROGATES = 39
-"""For linear noise, the statistic is the smallest of 40 with probability 1/40 = 0.025."""
+"""Number of surrogates; linear noise has the smallest statistic of 40 with probability 1/40 = 0.025."""
 _DELAYS, _NEIGHBOURS = 4, 10
-"""Number of values in a delay vector, and of similar vectors used to predict the next value."""
+"""Number of values in a delay vector, and number of similar vectors that predict the next value."""
 _ITERATIONS = 200
 _SETTLED = 1e-8
 _LAGS = (1, 2, 3, 4)
@@ -296,7 +295,7 @@ class SurrogateTest:
 
     @property
     def p(self) -> float:
-        """Probability that linear noise has a statistic this small (one-sided rank test)."""
+        """Probability that linear noise has a statistic as small as the series (one-sided rank test)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 
@@ -338,8 +337,8 @@ def prediction_error(series: Reals) -> float:
     """Return the relative error of predicting each value from the successors of similar delay vectors.
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
-    4.2), mean over neighbours: far below 1 for a deterministic series, near 1 otherwise. With one neighbour
-    or fewer delays, more chaotic motions with impacts remained undecided.
+    4.2), mean over neighbours. The error is far below 1 for a deterministic series, near 1 otherwise. With
+    one neighbour or fewer delays, more chaotic motions with impacts remained undecided.
     """
     pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
     # Delay vectors that overlap in time are not neighbours.
