@@ -19,17 +19,17 @@ from ..tables import Labelled
 
 
 class CurveOrigin(StrEnum):
-    """Origin of a curve."""
+    """Origin of a curve, such as measured, simulated or predicted."""
 
     MEASURED = "measured"
     SIMULATED = "simulated"
     """Simulation driven by the recorded voltage or base motion, analysed with the same estimator."""
     PREDICTED = "predicted"
-    """Prediction for the specimen driven by sines."""
+    """Predicted response of the specimen driven by sines."""
     STABLE = "stable branches"
-    """Stable periodic motions; there may be several at one frequency."""
+    """Stable periodic motions on branches; there may be several at one frequency."""
     UNSTABLE = "unstable branches"
-    """Unstable periodic motions; there may be several at one frequency."""
+    """Unstable periodic motions on branches; there may be several at one frequency."""
 
 
 class CurveKind(StrEnum):
@@ -54,9 +54,9 @@ class Curve(Labelled):
     relative_sd: Reals
     """Relative standard deviation of the magnitude; NaN if unknown."""
     note: str = ""
-    """Remarks, such as averages, window and accuracy."""
+    """Remarks on the curve, such as averages, window and accuracy."""
     level_m: float | None = None
-    """Base amplitude of a simulated curve [m]; None if none was requested."""
+    """Base amplitude of a simulated curve [m]; None if no amplitude was requested."""
 
     @property
     def name(self) -> str:
@@ -146,13 +146,13 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
 
 @dataclass(frozen=True)
 class Reading:
-    """Values of one curve at the markers."""
+    """Values of one curve at the markers of frequencies."""
 
     name: str
     magnitudes: tuple[float, ...]
-    """One value for each marker; NaN outside the curve."""
+    """Value of the curve at each marker; NaN outside the frequency range of the curve."""
     decibel: float
-    """Ratio of the last value to the first [dB]; NaN if either is missing."""
+    """Ratio of the value at the last marker to the value at the first [dB]; NaN if either is missing."""
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
@@ -169,9 +169,9 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """Minimum height of a peak above the neighbouring valley [dB]."""
 _LEAST_RISE_SD = 8.0
-"""Minimum height of a peak in standard deviations; a thousand points of noise have a range of 6.5."""
+"""Minimum height of a peak in standard deviations; a thousand points of noise span 6.5 of them."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance in half widths): a mode has at most n peaks, itself included, in this distance."""
+"""Pairs (n, distance in half widths): so near a mode there are at most n peaks, its own included."""
 _CROWD_RISE = 0.3
 """Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01
@@ -182,7 +182,7 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 @dataclass(frozen=True)
 class CurvePeak:
-    """One peak of a curve."""
+    """Resonance peak of a curve."""
 
     frequency_hz: float
     """Vertex of a parabola through the highest point and its neighbours, on logarithmic axes."""
@@ -194,7 +194,7 @@ class CurvePeak:
 
     @property
     def damping_ratio(self) -> float | None:
-        """Half the width over the frequency, which is the damping ratio of a single linear mode."""
+        """Half the width over the peak's frequency, which is the damping ratio of a single linear mode."""
         width_hz = self.half_power_width_hz
         return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
 
@@ -227,7 +227,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
             break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
-        # These numbers include the peak itself.
+        # These numbers of peaks include the peak itself.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
     return tuple(sorted(peaks, key=lambda each: each.frequency_hz))

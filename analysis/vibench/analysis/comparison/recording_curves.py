@@ -61,7 +61,7 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator
 
 
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
-    """Yield separate curves of the steps up and the steps down, because they differ between jumps."""
+    """Yield separate curves of the steps up and the steps down, because both differ between jumps."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
         return  # several levels at one frequency are not a curve over frequency
     directions = np.array(found.direction)
@@ -98,9 +98,9 @@ class Model(StrEnum):
 
     LEFT_OUT = "left out"
     UNDER_VOLTAGE = "under the recorded voltage"
-    """Several runs of rig and specimen; also valid for chaotic motion."""
+    """Several simulated runs of rig and specimen; also valid for chaotic motion."""
     UNDER_BASE = "under the recorded base motion"
-    """One run of the specimen alone; for linear and coherent motion."""
+    """One simulated run of the specimen alone; for linear and coherent motion."""
 
 
 _SIMULATIONS = {
@@ -117,7 +117,7 @@ class AnalysisOptions(FrozenModel):
     """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
     alone driven by the recorded base motion. It takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
-    """Noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
+    """Estimator; noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
     """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
     window: Window = Window.HANN
@@ -127,19 +127,19 @@ class AnalysisOptions(FrozenModel):
     averages: Annotated[float, Field(gt=1.0)] | None = None
     """Number of independent averages of streamed noise; automatic by default."""
     overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
-    """Overlap of neighbouring segments, as a fraction."""
+    """Overlap of neighbouring segments, as a fraction of their length."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
     """Probability that the bounds at a spectral line contain the true value."""
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
-        """Refuse invalid combinations: building the request raises their error."""
+        """Refuse invalid combinations of options: building the request raises the error."""
         self.request  # noqa: B018 - making it is the check
         return self
 
     @property
     def request(self) -> FrequencyResponseRequest:
-        """These options as the request of an analysis."""
+        """Noise analysis requested by these options."""
         return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))
 
     @property

@@ -32,13 +32,13 @@ class LineEvent:
     DOCUMENT: ClassVar = "kind frequency_hz amplitude_m"
 
     kind: str
-    """Kind: fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
+    """Kind of the special point: fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
     frequency_hz: float
     amplitude_m: float
     index: int
-    """Index of the last point of the branch before the event."""
+    """Index of the last point of the branch before the special point."""
     response_ii: float
-    """Response II of m0 at the event, interpolated between the points on either side."""
+    """Response II of m0 at the special point, interpolated between the neighbouring points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class BranchLine(Labelled):
     response_i: Reals
     """Largest |x|, |y|, |z| and |p| over the drive amplitude, shape (n, 4)."""
     response_ii: Reals
-    """Amplitude at the drive frequency over the drive amplitude, shape (n, 4)."""
+    """Amplitude of x, y, z and p at the drive frequency, over the drive amplitude, shape (n, 4)."""
     states: Reals
     """x, y, z, vx, vy, vz at the drive's time zero, shape (n, 6) [m, m/s]."""
     multiplier_real: Reals
@@ -116,7 +116,7 @@ class BranchLine(Labelled):
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
     def pieces(self) -> Iterator[tuple[bool, slice]]:
-        """Yield stable and unstable stretches; neighbouring stretches share a point."""
+        """Yield the stable and unstable stretches of the branch; neighbouring stretches share a point."""
         is_stable = self.is_stable[1:] & self.is_stable[:-1]
         edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
         for first, last in pairwise(edges):
@@ -281,7 +281,7 @@ class BranchDiagram(Labelled):
 
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
-    """Follow the branches one by one and yield each."""
+    """Compute the branches of a request, and yield them one by one."""
     where = request.shaken, request.path, request.start, request.stop
     if request.resonance_band_hz is not None:
         found = _resonance(request, request.resonance_band_hz)

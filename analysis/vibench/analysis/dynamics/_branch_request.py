@@ -35,7 +35,7 @@ class BranchMethod(StrEnum):
     """Method to find and follow motions."""
 
     SHOOTING = "shooting"
-    """Exact motions of any period with every contact, for any contact law."""
+    """Shooting: exact motions of any period with every contact, for any contact law."""
     BALANCE = "balance"
     """Harmonic balance with as many harmonics as needed: motions of the drive's period, no rigid stops."""
     FIRST_ORDER = "first-order"
@@ -54,9 +54,9 @@ class BranchRequest(SpecimenChoice):
     frequency_hz: PositiveFloat = 260.0
     """Frequency of the drive when the amplitude varies."""
     start: PositiveFloat = 50.0
-    """Lower end of the range, in Hz or in m."""
+    """Lower end of the range of frequencies [Hz] or amplitudes [m]."""
     stop: PositiveFloat = 600.0
-    """Upper end of the range, in Hz or in m."""
+    """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     error: TargetError | None = None
     """Error of every motion relative to the fundamental of p, 0.01 or "1 %"; 1e-4 by default. Shooting always
     reaches 1e-8; harmonic balance uses as many harmonics as needed."""
@@ -79,7 +79,7 @@ class BranchRequest(SpecimenChoice):
     loop_time_s: PositiveFloat | None = None
     """Latency of a bench's feedback loop, to report which motions it can hold [s]."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
-    """Pairs of frequency [Hz] and base amplitude [m], instead of one amplitude."""
+    """Pairs of frequency [Hz] and base amplitude [m] of a recorded level, instead of one amplitude."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -111,7 +111,7 @@ class BranchRequest(SpecimenChoice):
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
-        Harmonic(*self.path.drive(self.stop))  # refuses an impossible drive
+        Harmonic(*self.path.drive(self.stop))  # raises for an impossible drive
         return self
 
     def _refuse_other_resonances(self) -> None:
@@ -159,7 +159,7 @@ class BranchRequest(SpecimenChoice):
 
     @property
     def title(self) -> str:
-        """Title for curves and figures."""
+        """Title of the request for curves and figures."""
         where = f"{1e6 * self.amplitude_m:g} µm"
         if self.resonance_band_hz is not None:
             low_hz, high_hz = self.resonance_band_hz

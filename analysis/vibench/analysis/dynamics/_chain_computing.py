@@ -37,7 +37,7 @@ from ..tables import Labelled
 from ._chain_request import ChainDrive, ChainRequest
 
 WAVES = 61
-"""Number of wave numbers from 0 to pi for bands."""
+"""Number of wave numbers from 0 to pi at which bands are computed."""
 LINES = 800
 """Number of frequencies for the transmissibility without contact."""
 MOST_SHOWN = 4
@@ -62,11 +62,11 @@ class ChainRun(Labelled):
     frequency_hz: float
     """Frequency of a steady sine; NaN for other drives."""
     over_hz: Reals
-    """Frequencies of the transmission, shape (m,): one under a steady sine."""
+    """Frequencies of the transmission, shape (m,); a single frequency under a steady sine."""
     transmission: Reals
     """Amplitude of x of m0 over the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
-    """Relative error of the transmission, shape (cells,); NaN without a requested error or time."""
+    """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell while observed, shape (cells,)."""
     impacts: NDArray[np.int64]
@@ -82,8 +82,8 @@ class ChainRun(Labelled):
     time_s: Reals
     """Time axis of `motion_m`, shape (n,)."""
     motion_m: Reals
-    """Displacement x of m0 in every cell, shape (n, cells): over the last periods of a steady sine; under
-    other drives, the RMS over equal stretches of the run."""
+    """Displacement x of m0 in every cell, shape (n, cells), over the last periods of a steady sine. Under
+    other drives, the RMS of x over equal stretches of the run."""
     impact_time_s: Reals
     """Times of the contacts within the range of `time_s`, shape (contacts,)."""
     impact_cell: NDArray[np.int64]
@@ -204,7 +204,7 @@ ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
 time was requested, it is at most this share of the time simulated before."""
 SWEEP_PARTS = 120
-"""Most frequencies of a swept transmission, each averaged over `FEWEST_PERIODS` drive periods or more."""
+"""Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
 """Number of segments averaged for the transmission with a recorded motion."""
@@ -212,7 +212,7 @@ X, VX = 0, 3
 
 
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
-    """Compute the runs one by one and yield each.
+    """Compute the runs of a chain request and yield them one by one.
 
     Raises InvalidRequest when the recording cannot be read, or a run is not possible.
     """
@@ -234,7 +234,7 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
 
 
 def chain_answer(request: ChainRequest) -> ChainAnswer:
-    """Compute all runs of a request."""
+    """Compute all runs of a chain request."""
     began = time.perf_counter()
     runs = tuple(chain_runs(request))
     return ChainAnswer(request, runs, time.perf_counter() - began)

@@ -53,7 +53,7 @@ class ChainRequest(SpecimenChoice):
     duration_s: PositiveFloat = 2.0
     """Observation time under a steady sine, length of a sweep, or maximum length of a recording."""
     settle_s: NonNegativeFloat = 2.0
-    """Settling time from rest under a steady sine."""
+    """Settling time from rest under a steady sine, before the observation."""
     exponent_s: NonNegativeFloat = 0.0
     """Averaging time of the largest Lyapunov exponent under a steady sine; 0 for none."""
     accuracy: Accuracy = Accuracy.STANDARD
@@ -67,7 +67,7 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
-        Harmonic(self.start_hz, self.amplitude_m)  # refuses an impossible drive
+        Harmonic(self.start_hz, self.amplitude_m)  # raises for an impossible drive
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(
@@ -87,7 +87,7 @@ class ChainRequest(SpecimenChoice):
 
     @property
     def has_target(self) -> bool:
-        """Return whether an error or a time was requested."""
+        """Return whether an error or a computing time was requested."""
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
@@ -118,7 +118,7 @@ class ChainRequest(SpecimenChoice):
 
     @property
     def title(self) -> str:
-        """Title for figures."""
+        """Title of the chain request for figures."""
         cells = ", ".join(str(each) for each in self.lengths)
         match self.drive:
             case ChainDrive.NONE:

@@ -34,7 +34,7 @@ _UNITS = {
     "impacts": "1",
     "error_estimate": "1",
 }
-"""Units of the columns of a branch; each column is a dataset."""
+"""Units of the columns of a branch; each column is an HDF5 dataset."""
 _WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
 """Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
@@ -174,7 +174,7 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
 
 
 def _write(group: h5py.Group, source: object, words: Sequence[str], units: Mapping[str, str]) -> None:
-    """Write fields of an object: strings as attributes, arrays as datasets with their units."""
+    """Write fields of an object to HDF5: strings as attributes, arrays as datasets with their units."""
     for name in words:
         group.attrs[name] = getattr(source, name)
     for name, unit in units.items():
@@ -183,7 +183,7 @@ def _write(group: h5py.Group, source: object, words: Sequence[str], units: Mappi
 
 @contextmanager
 def _new_file(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
-    """Create a new file with its kind and request; remove it if writing fails."""
+    """Create a new HDF5 file with the kind and request of its results; remove it if writing fails."""
     with new_file(path) as unfinished, open_hdf5_to_write(unfinished, "x") as file:
         file.attrs["format"] = kind
         file.attrs["format_version"] = FORMAT_VERSION

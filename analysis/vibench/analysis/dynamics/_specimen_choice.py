@@ -81,7 +81,7 @@ class SpecimenChoice(FrozenModel):
 
     @property
     def specimen_text(self) -> str:
-        """The specimen and its changes, for a caption."""
+        """The specimen and its changed values in words, for a caption."""
         parts = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
         if self.gap_m is not None:
             parts.append(f"gap {1e6 * self.gap_m:g} µm")

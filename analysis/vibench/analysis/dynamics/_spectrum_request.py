@@ -34,17 +34,17 @@ class SpectrumRequest(SpecimenChoice):
     frequency_hz: PositiveFloat = 260.0
     """Frequency of the drive when the amplitude varies."""
     start: PositiveFloat = 240.0
-    """Lower end of the range, in Hz or in m."""
+    """Lower end of the range of frequencies [Hz] or amplitudes [m]."""
     stop: PositiveFloat = 280.0
-    """Upper end of the range, in Hz or in m."""
+    """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     step: PositiveFloat = 10.0
-    """Step between points, in Hz or in m."""
+    """Step between points of the range, in Hz or in m."""
     accuracy: Accuracy = Accuracy.REFERENCE
     """Accuracy of contacts and of the sum of the exponents."""
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
     """Averaging time of the exponents."""
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = 5.0
-    """Settling time from rest."""
+    """Settling time from rest, before the averaging of the exponents."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Probability that an interval contains the exponent."""
 
@@ -58,7 +58,7 @@ class SpectrumRequest(SpecimenChoice):
             raise ValueError(
                 f"{self.points} points were requested; at most {MOST_POINTS}: take a larger step"
             )
-        Harmonic(*self.drive(self.stop))  # refuses an impossible drive
+        Harmonic(*self.drive(self.stop))  # raises for an impossible drive
         return self
 
     @property
@@ -85,7 +85,7 @@ class SpectrumRequest(SpecimenChoice):
 
     @property
     def title(self) -> str:
-        """Title for figures."""
+        """Title of the spectrum request for figures."""
         is_level = self.along is Parameter.AMPLITUDE
         fixed = f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
         return f"{self.law}, {fixed}"
@@ -104,7 +104,7 @@ class SpectrumPoint:
     frequency_hz: float
     amplitude_m: float
     exponents_per_s: tuple[float, ...]
-    """Descending order; minus infinity if a stop holds m1 and removes a direction, NaN if the run failed."""
+    """Exponents in descending order; minus infinity if a stop holds m1, NaN if the run failed."""
     low_per_s: tuple[float, ...]
     high_per_s: tuple[float, ...]
     sum_per_s: float
@@ -205,7 +205,7 @@ def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
 
 
 def exponent_spectrum(request: SpectrumRequest) -> ExponentSpectrum:
-    """Compute all exponents of a request."""
+    """Compute all Lyapunov exponents of a request."""
     began = time.perf_counter()
     points = tuple(spectrum_points(request))
     return ExponentSpectrum(request, points, time.perf_counter() - began)
