@@ -61,7 +61,7 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative distance of irregular intervals from multiples of the typical one; their share in coarse times."""
+"""Relative distance of irregular intervals from multiples of the usual one; their share in coarse times."""
 _SINGLE = 0.2
 """Quantile of the intervals that is one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 10
@@ -73,7 +73,7 @@ _COARSE_SPREAD = 1.25
 _RISING = 0.9
 """Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512
-"""Number of times in a group; only the smallest and the largest deviation of each group are kept."""
+"""Number of time stamps in a group; only the smallest and the largest deviation of each group are kept."""
 _LEAST_RISING = 64
 """Minimum number of evenly rising values for a channel not named time to count as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
@@ -180,7 +180,7 @@ def _moment(value: Any) -> float | None:
 
 
 def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
-    """Return the time axis that a channel of times contains, read once in blocks; None for other channels.
+    """Return the time axis of a channel that contains times, read once in blocks; None for other channels.
 
     A channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
     """
@@ -190,7 +190,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
-    # Times that are all equal were rounded too much to be a contradiction.
+    # Equal times were rounded too much to contradict the stated rate.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
@@ -225,7 +225,7 @@ class TimeAxis:
     start: float
     interval: float
     uncertainty: float
-    """Uncertainty of the interval; 0 if exact."""
+    """Uncertainty of the sample interval; 0 if exact."""
     rounding: float
     """Uncertainty of the start time due to rounding."""
     runs: tuple[tuple[int, int], ...]
@@ -264,7 +264,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=rate if rate is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # Times that start at zero count from the stated start.
+            # Times that start at zero count from the stated start of the channel.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,
@@ -406,14 +406,14 @@ class Piece:
     """Stretch of evenly spaced samples in a file."""
 
     first: int
-    """Index of the first sample in the file."""
+    """Index in the file of the first sample of the stretch."""
     place: int
-    """Time of the first sample, in sample intervals since the channel's start."""
+    """Time of the stretch's first sample, in sample intervals since the channel's start."""
     samples: int
 
     @property
     def end(self) -> int:
-        """Time one past the last sample, in sample intervals."""
+        """Time one past the stretch's last sample, in sample intervals since the channel's start."""
         return self.place + self.samples
 
 
@@ -471,7 +471,7 @@ class Alignment:
     places: int
     """Length of the axis in sample intervals: from the earliest sample to the last common one."""
     pieces: tuple[tuple[Piece, ...], ...]
-    """Pieces of each channel."""
+    """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]
     """Delay of each channel that remains after rounding to whole intervals; at most half an interval."""
     remarks: tuple[str, ...]
@@ -623,7 +623,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Return whether channels of these sorted rates stay aligned over this number of samples."""
+    """Return whether channels with these sorted sample rates stay aligned over this number of samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )
@@ -646,7 +646,7 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     """Return the start of each channel relative to the earliest channel, in sample intervals."""
     known = {each.start_s: each for each in channels if each.start_s is not None}
     unknown = [each.name for each in channels if each.start_s is None]
-    # Channels without a stated start begin at zero, if the others begin there too.
+    # Channels without a stated start begin at zero, if the other channels begin there too.
     stated = (*known, 0.0) if unknown else tuple(known)
     if not known or (max(stated) - min(stated)) * rate_hz < _APART / 100:
         return [0.0 for _ in channels]

@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Advance to a date, in the order of day and month nearest to the last; False if it is invalid."""
+        """Advance to the reading of a date (day or month first) nearest to the last one; False if invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -114,7 +114,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 
 LONGEST_HEAD = 200
-"""Maximum number of heading lines."""
+"""Maximum number of heading lines of a text file."""
 DELIMITERS = (";", "\t", "|", ",", None)
 """Separators in order of trial; None means blanks. With any except the comma, commas are decimal marks."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
@@ -154,11 +154,11 @@ class _Layout:
 
     @property
     def width(self) -> int:
-        """Number of cells in a line."""
+        """Number of cells in a line of the text file."""
         return self.columns + self.empty
 
     def cells(self, line: str, clock: ClockTimes | None = None) -> list[str]:
-        """Return the cells of a line, with times in seconds."""
+        """Return the cells of a line of text, with times in seconds."""
         found = _cells(line, self.delimiter, clock or ClockTimes())
         while len(found) > self.columns and len(found) > 1 and not found[-1].strip():
             found.pop()
@@ -294,7 +294,7 @@ def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
 
 
 def _layout(line: str) -> _Layout | None:
-    """Return the format of a line of numbers; None for other lines."""
+    """Return the format of a line of text that contains numbers; None for other lines."""
     for delimiter in DELIMITERS:
         cells = _cells(line, delimiter, ClockTimes())
         filled = len(cells)
@@ -307,7 +307,7 @@ def _layout(line: str) -> _Layout | None:
 
 
 def _cells(line: str, delimiter: str | None, clock: ClockTimes | None = None) -> list[str]:
-    """Return the cells of a line; with a clock, times become seconds."""
+    """Return the cells of a line of text; with a clock, times become seconds."""
     if delimiter is None:
         line = line if clock is None else clock.in_seconds(line)
         return [each.strip('"') for each in line.split()]

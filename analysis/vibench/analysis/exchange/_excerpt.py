@@ -13,7 +13,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
 
 BLOCK_SAMPLES = 51_200
-"""Samples per block, as in one chunk of the file; 0.4 MB per channel."""
+"""Number of samples per block, as in one chunk of the file; 0.4 MB per channel."""
 
 TransferObserver = Callable[[int], None]
 """Callback that receives the number of values written since its last call."""
@@ -25,22 +25,22 @@ def ignore_progress(_values: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
-    """Channels and sample range of a recording; :func:`excerpt` creates it."""
+    """Excerpt: channels and sample range of a recording; :func:`excerpt` creates it."""
 
     recording: Recording
     channels: tuple[ChannelHeader, ...]
     start: int
     stop: int
-    """Index one past the last sample."""
+    """Index one past the last sample of the excerpt."""
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Names of the channels."""
+        """Names of the channels in the excerpt."""
         return tuple(each.role for each in self.channels)
 
     @property
     def samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel in the excerpt."""
         return self.stop - self.start
 
     @property
@@ -54,11 +54,11 @@ class Excerpt:
         return self.recording.path.name.removesuffix(".part").removesuffix(".h5")
 
     def blocks(self) -> Iterator[RecordedBlock]:
-        """Yield blocks of all channels."""
+        """Yield blocks of samples of all channels."""
         return self.recording.blocks(self.roles, BLOCK_SAMPLES, self.start, self.stop)
 
     def channel_blocks(self, role: str) -> Iterator[Reals]:
-        """Yield blocks of one channel, in its physical unit."""
+        """Yield blocks of samples of one channel, in its physical unit."""
         for block in self.recording.blocks((role,), BLOCK_SAMPLES, self.start, self.stop):
             yield block.values[0]
 
@@ -108,7 +108,7 @@ def excerpt(
 
 
 def _sample(place: float) -> int:
-    """Return the nearest sample; -1, outside every recording, for values that are not finite."""
+    """Return the index of the nearest sample; -1, outside every recording, for times that are not finite."""
     return round(place) if isfinite(place) else -1
 
 
@@ -157,6 +157,6 @@ def facts_document(excerpt: Excerpt) -> dict[str, Any]:
 
 
 def write_facts(excerpt: Excerpt, path: Path) -> None:
-    """Write the facts as JSON."""
+    """Write the facts of an excerpt as JSON."""
     text = json.dumps(facts_document(excerpt), indent=2, allow_nan=False, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")

@@ -50,7 +50,7 @@ def new_file(path: Path) -> Iterator[Path]:
         require_unused(each)
     try:
         yield unfinished
-        require_unused(path)  # another program may have created it meanwhile
+        require_unused(path)  # another program may have created this file meanwhile
         rename(unfinished, path)
     except OSError as error:
         mend = "choose another folder" if error.errno in _REFUSED else "free disk space and try again"
@@ -276,16 +276,16 @@ WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
 @dataclass(frozen=True)
 class Exporter:
-    """Exporter of one format, an entry of `EXPORTERS`."""
+    """Functions that export to one format, an entry of `EXPORTERS`."""
 
     write: WriteSamples | None = None
-    """Writes samples; facts and results go to separate files."""
+    """Function that writes the samples; facts and results go to separate files."""
     require: Callable[[Excerpt], None] = _accept
-    """Raises InvalidRequest for an excerpt that the format cannot store."""
+    """Function that raises InvalidRequest for an excerpt that the format cannot store."""
     write_functions: WriteFunctions | None = None
-    """Writes frequency responses and spectra; None if the format cannot store them."""
+    """Function that writes frequency responses and spectra; None if the format cannot store them."""
     write_all: WriteAll | None = None
-    """Writes samples, facts and results into one file."""
+    """Function that writes samples, facts and results into one file."""
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver

@@ -33,7 +33,7 @@ class _Place:
 
     path: str
     row: int | None
-    """Row or column of a two-dimensional dataset; None for a one-dimensional dataset."""
+    """Index of the row or column of a two-dimensional dataset; None for a one-dimensional dataset."""
     has_time_first: bool = True
 
 
@@ -150,7 +150,7 @@ def _origin(file: h5py.File) -> Origin | None:
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return the attributes, texts and single values of a group, with their names."""
+    """Return the attributes, texts and single values of an HDF5 group, with their names."""
     if group.name not in known:
         hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
         items = [(name, group[name]) for name in hard]

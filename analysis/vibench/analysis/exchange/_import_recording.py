@@ -46,7 +46,7 @@ class LaidPart:
     segment: Segment
     start: int
     stop: int
-    """Index one past the last sample."""
+    """Index one past the last sample of the part."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterat
 FARTHEST = 2.0**62
 """Sample number beyond the end of any file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
-"""Range of a channel's largest value, so that squares and steps stay finite."""
+"""Allowed range of a channel's largest value, in which its square and its step stay finite."""
 NEAR_FULL_SCALE = 0.95
 """Share of full scale from which a sample counts as overloaded, as during acquisition."""
 
@@ -150,7 +150,7 @@ def import_recording(
     """Write the recording ``out`` from a file, in blocks; return its path.
 
     Channels are aligned by the times in the file. Missing samples, and values that are not finite, count as
-    lost samples of all channels. The stored "volts" are the numbers in the file: integers of up to 31 bits
+    lost samples of all channels. The stored "volts" are the numbers in the file. Integers of up to 31 bits
     are stored exactly, other numbers to 2^-30 of the power of two above the largest.
 
     Parameters
@@ -191,7 +191,7 @@ def import_recording(
             _write(writer, source, wanted, parts, samples, observer)
             _require_samples(writer, path)
         except BaseException:
-            # An incomplete import is deleted; its source still exists.
+            # An incomplete import is deleted; the imported file still exists.
             writer.finish(RecordingState.FAILED, "the import was not completed")
             out.unlink(missing_ok=True)
             raise
@@ -354,6 +354,6 @@ def _overloads(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator
 
 
 def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Return ranges (start, stop) of set flags."""
+    """Return the ranges (start, stop) of samples whose flag is set."""
     changes = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
     return [(int(start), int(stop)) for start, stop in changes.reshape(-1, 2)]

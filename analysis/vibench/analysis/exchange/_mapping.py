@@ -21,13 +21,13 @@ KNOWN_ROLES = {
     "m0_acceleration": ("acceleration", "m s-2"),
     "m0_displacement": ("displacement", "m"),
 }
-"""Quantity and unit that the analysis requires of these channels."""
+"""Quantity and unit that an analysis requires, keyed by role of the channel."""
 
 
 _NO_UNIT = {"", "-", "1", "none", "None"}
 """Texts that mean "no unit" in a file."""
 _LARGEST_CORRECTION = 0.2
-"""Largest relative difference between a scale and the file's unit; a larger one is a contradiction."""
+"""Largest relative difference between a scale and the file's unit; a larger one contradicts the unit."""
 
 
 def _is_another_quantity(file_unit: str) -> bool:
@@ -71,7 +71,7 @@ class ChannelMapping(FrozenModel):
     in volts: the sensitivity of the sensor, such as ``"100 mV/g"``."""
     offset: float = 0.0
     full_scale: PositiveFloat | None = None
-    """Full scale of the input, as a number in the file; values near it are marked as overloads."""
+    """Full scale of the input, as a number in the file; values near full scale are marked as overloads."""
     coupling: Literal["AC", "DC"] = "DC"
     sensitivity: PositiveFloat | None = None
     sensitivity_unit: str = ""

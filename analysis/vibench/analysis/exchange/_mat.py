@@ -34,7 +34,7 @@ from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_st
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
 PLAIN = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
-"""Type codes of numbers and text."""
+"""Type codes of numbers and text in MATLAB 5 files."""
 SMALL_BYTES = 4
 """Largest element whose data may be stored in its tag [bytes]."""
 DEEPEST = 30
@@ -47,13 +47,13 @@ def require_whole(path: Path) -> None:
     if len(content) < HEAD_BYTES:
         raise ValueError("it ends within its header")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
-    # Version 4 files have no such header; scipy checks their few types itself.
+    # Version 4 files have no header of 128 bytes; scipy checks their few types itself.
     if order is not None:
         _look(content[HEAD_BYTES:], order, 0)
 
 
 def _look(content: memoryview, order: str, depth: int) -> None:
-    """Check consecutive elements and the elements nested in them."""
+    """Check consecutive elements of a MATLAB 5 file, and the elements nested in them."""
     if depth > DEEPEST:
         raise ValueError(f"more than {DEEPEST} nested structs or cells")
     while len(content) >= TAG_BYTES:
@@ -156,7 +156,7 @@ def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
 
 
 def _facts(excerpt: Excerpt) -> dict[str, Any]:
-    """Return the facts: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
+    """Return the facts for MATLAB: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
     facts = facts_document(excerpt)
     del facts["segments"]
     plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
@@ -201,7 +201,7 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         if len(set(names)) < len(names):
             raise ValueError("it has several variables of the same name")
         content = loadmat(path, simplify_cells=True)
-    except (MatReadError, zlib.error) as error:  # neither is a subclass of ValueError
+    except (MatReadError, zlib.error) as error:  # neither error is a ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Files exported by vibench state the sample rate beside the channels.

@@ -35,7 +35,7 @@ class Source(Protocol):
         """All data in the file that can become channels of a recording."""
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return samples, scaled as the file states and NaN if lost, shape (stop - start,)."""
+        """Return samples of a channel, scaled as the file states and NaN if lost, shape (stop - start,)."""
 
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
@@ -69,7 +69,7 @@ DAMAGE = (
 
 
 CHANNELS_SHOWN = 20
-"""Maximum number of channels in a message."""
+"""Maximum number of channels listed in an error message."""
 MOST_CHANNELS = 4096
 """Maximum number of channels; more mean a transposed table or a damaged file."""
 
@@ -148,7 +148,7 @@ class _CheckedSource:
     path: Path
     source: Source
     found: Mapping[SourceChannel, SourceChannel]
-    """Channels of the reader, keyed by the channel with times."""
+    """Channels as the reader lists them, keyed by the same channels with times."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:

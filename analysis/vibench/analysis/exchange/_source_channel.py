@@ -1,4 +1,4 @@
-"""One channel of a foreign file, and a table in memory as a source."""
+"""One channel of a foreign file, and a table in memory as a source of channels."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,7 @@ from ..signals.arrays import Reals
 EXACT_KINDS = {"i": 4, "u": 2}
 """Largest size in bytes of signed and unsigned integers that a recording can store exactly."""
 NAME_SHOWN = 60
-"""Maximum length of a name in a message."""
+"""Maximum length of a name in an error message."""
 LEAST_INTERVAL_S = 1e-100
 """Shortest accepted interval between samples, so that its inverse is finite."""
 SECONDS = {
@@ -145,13 +145,13 @@ class SourceChannel:
 
     @property
     def title(self) -> str:
-        """Name and label in messages."""
+        """Name and label of the channel in messages."""
         label = f" ({shortened(self.label, NAME_SHOWN)})" if self.label else ""
         return repr(shortened(self.name, NAME_SHOWN)) + label
 
     @property
     def are_counts(self) -> bool:
-        """Whether the numbers are counts, or fractions of full scale."""
+        """Whether the channel's numbers are counts, or fractions of full scale."""
         return self.step == 1.0 or self.full_scale is not None
 
     @property

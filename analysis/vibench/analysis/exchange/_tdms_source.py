@@ -18,7 +18,7 @@ from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 LONGEST_NS = 1000 * 86400 * 10**9
-"""Period of time stamps: a thousand days [ns], so that a double resolves them to 15 ns."""
+"""Time stamps are taken modulo a thousand days [ns], which a double resolves to 15 ns."""
 SCALES = {"Linear", "Polynomial", "RTD", "Table", "Thermocouple", "Thermistor", "Strain", "Add", "Subtract"}
 """Types of scales that npTDMS applies, with the parameters in the file."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
@@ -61,7 +61,7 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
         ) from error
     # Open the file here, because npTDMS does not close damaged files.
     with path.open("rb") as raw:
-        if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, without an error
+        if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find no channels and raise no error
             raise UnusableData(f"{path.name} is not a TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
         # Suppress the warnings of npTDMS on standard error; errors are still raised.

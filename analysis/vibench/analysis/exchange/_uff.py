@@ -338,13 +338,13 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
 
 _COMPLEX_DOUBLE = 6
 _COLOUR = 11
-"""Colour of nodes: any of the 16 colours of the definition."""
+"""Colour of nodes: any of the 16 colours of the dataset's definition."""
 _FREQUENCY_AXIS = 18
 _PER_LINE = 4
 _LEAST_STEP = 1e-9
-"""Relative frequency error up to which lines count as evenly spaced."""
+"""Relative frequency error up to which spectral lines count as evenly spaced."""
 _LARGEST_OFFSET = 1e-3
-"""Largest offset of the first line from a multiple of the spacing, relative to the spacing."""
+"""Largest offset of the first spectral line from a multiple of the spacing, relative to the spacing."""
 _SPACINGS_TRIED = 1000
 """Number of candidates tried on each side of the nearest six-digit spacing; about half are suitable."""
 
@@ -380,9 +380,9 @@ class UniversalFunction:
 
     kind: FunctionType
     frequency_hz: Reals
-    """Frequencies of the lines in ascending order, shape (lines,) [Hz]."""
+    """Frequencies of the spectral lines in ascending order, shape (lines,) [Hz]."""
     values: Reals | Complexes
-    """Values at these frequencies, shape (lines,)."""
+    """Values of the function at its frequencies, shape (lines,)."""
     response: FunctionAxis
     reference: FunctionAxis
     note: str
@@ -449,7 +449,7 @@ def _node(axis: FunctionAxis, recording: RecordingDescription) -> int:
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return the function, its first frequency, and its spacing with six digits; zeros if uneven."""
+    """Return a function, its first frequency, and its spacing with six digits; zeros if uneven."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
@@ -467,7 +467,7 @@ def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float
     if np.iscomplexobj(function.values):
         values = CubicSpline(hz, function.values)(even_hz)
     else:
-        values = np.interp(even_hz, hz, function.values)  # a spline of a coherence may exceed 1
+        values = np.interp(even_hz, hz, function.values)  # an interpolated coherence may exceed 1
     return replace(function, frequency_hz=even_hz, values=values), first, step
 
 
@@ -496,7 +496,7 @@ def _last_digit(value: float) -> float:
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
-    """Return the lines of record 12; uneven lines include their frequencies."""
+    """Return the lines of record 12; unevenly spaced ones include their frequencies."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     columns = [[f"{value:20.11E}" for value in part] for part in parts]
     if frequency_hz is not None:
