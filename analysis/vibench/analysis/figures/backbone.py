@@ -38,7 +38,7 @@ _MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 
 def backbone_figure(
     analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None = None
 ) -> style.DrawnFigure:
-    """Draw resonance and amplitude over level, and the backbone; mark levels without a resonance."""
+    """Draw resonance and amplitude over base level, and the backbone; mark levels without a resonance."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, overlay)

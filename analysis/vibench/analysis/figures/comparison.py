@@ -131,7 +131,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
 def comparison_tables(
     name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
-    """Return tables of every curve, of its peaks and of the difference."""
+    """Return tables of every curve, of its peaks, and of the difference of the pair."""
     found = [
         table(
             f"{name}_{number}_{_file_word(curve)}",

@@ -56,7 +56,7 @@ def draw_band(
 
 
 def run_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return sentences on the simulation, and on the position of the measurement among its draws."""
+    """Return sentences on the simulation, and on the position of the measurement among the simulated runs."""
     run = overlay.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
@@ -95,7 +95,7 @@ def sines_table(name: str, sines: ResponsePrediction) -> Table:
 
 
 def band_columns(overlay: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
-    """Return table columns with the median, band, z and rank of a quantity; empty without several draws."""
+    """Return columns with median, band, z and rank of a simulated quantity; empty without several draws."""
     found = overlay.quantity(name)
     if found is None or overlay.run.draws == 1:
         return {}

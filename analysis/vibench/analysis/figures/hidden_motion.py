@@ -142,7 +142,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 
 def _band(depth: Reals, at_1um: FoundParameter, exponent: FoundParameter) -> tuple[Reals, Reals]:
-    """Return the envelope of all force laws whose two parameters are within their bounds."""
+    """Return the envelope of all force laws whose two parameters lie within their bounds."""
     exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
     laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
     return np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))

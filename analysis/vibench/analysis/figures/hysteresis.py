@@ -11,7 +11,7 @@ _HEIGHT_IN = 3.4
 
 
 def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigure:
-    """Draw Response II in both directions, the jumps, and the bands in which the directions differ."""
+    """Draw Response II of both sweeps, the jumps, and the bands in which the sweeps differ."""
     found = hysteresis(up.response, down.response, up.jumps, down.jumps)
     with style.styled():
         figure = style.new_figure(_HEIGHT_IN)
@@ -49,7 +49,7 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
 
 
 def jumps_text(jumps: tuple[Jump, ...]) -> str:
-    """Return jumps with their bounds as text."""
+    """Return jumps of a response, with the bounds of their frequencies, as text."""
     if not jumps:
         return "no jump"
     return " and ".join(

@@ -1,4 +1,4 @@
-"""Figures of noise: distortion at undriven lines, transmission at all levels, and the planned voltage."""
+"""Figures of noise: distortion on undriven spectral lines, transmission at all levels, planned voltage."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ _EVEN, _ODD = style.LINEAR, style.SIMULATED
 
 
 def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> style.DrawnFigure:
-    """Draw the standard deviations due to noise and distortion, and the levels at undriven lines."""
+    """Draw standard deviations due to noise and distortion, and levels at undriven spectral lines."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
     with style.styled():
@@ -135,7 +135,7 @@ _LEVELS_HEIGHT_IN = 4.0
 
 
 def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.DrawnFigure:
-    """Draw the transmissions at several noise levels (at least one), weak to strong."""
+    """Draw the transmissions at one or more noise levels, weak to strong."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     view = rising[0].view
     at = model_resonances(specimen_of(rising[0].facts.bench))
@@ -182,7 +182,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
 
 
 def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
-    """Return the caption with the resonances at each level."""
+    """Return the caption with the resonances at each noise level."""
     levels = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]
@@ -199,7 +199,7 @@ _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
 """Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""The frequency axis contains all lines above this share of the largest line (-14 dB)."""
+"""The frequency axis contains all spectral lines above this share of the largest (-14 dB)."""
 _EXCITATION_COLUMNS = 2000
 
 
@@ -246,7 +246,7 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
 
 
 def _largest_lines(seen: SignalPreview) -> tuple[Reals, Reals]:
-    """Return frequency and amplitude of the largest line in each column, without 0 Hz."""
+    """Return frequency and amplitude of the largest spectral line in each column, without 0 Hz."""
     frequency_hz, size = seen.frequency_hz[1:], seen.spectrum_v[1:]
     width = -(-size.size // _EXCITATION_COLUMNS)
     starts = np.arange(0, size.size, width)

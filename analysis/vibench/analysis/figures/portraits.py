@@ -45,7 +45,7 @@ def portraits_figure(analyses: Sequence[DwellAnalysis]) -> style.DrawnFigure:
 
 
 def verdict_text(verdict: MotionVerdict) -> str:
-    """Return the kind of motion in a few words."""
+    """Return the kind of a dwell's motion in a few words."""
     match verdict:
         case MotionVerdict(kind=MotionKind.PERIODIC, period=period) if period is not None and period > 1:
             return f"periodic, {period} drive periods"

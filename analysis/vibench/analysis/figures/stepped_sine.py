@@ -100,7 +100,7 @@ def _responses(
 def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, overlay: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
-    """Draw the median of the draws at each step in one direction, with the 95 % band as error bars."""
+    """Draw the median of simulated runs at each step in one direction, with the 95 % band as error bars."""
     values, reach = getattr(overlay.response, ATTRIBUTES[what])[chosen], None
     found = overlay.quantity(what)
     if found is not None and overlay.run.draws > 1:
@@ -124,7 +124,7 @@ def _caption(
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
-    """Return the caption with the largest response and its frequency."""
+    """Return the caption of a stepped frequency, with the largest response and its frequency."""
     top = int(np.argmax(found.response_ii))
     return (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
@@ -135,7 +135,7 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
 
 
 def stepped_level_caption(found: SteppedResponse) -> str:
-    """Return the caption with the levels at which the motion jumps, and their hysteresis."""
+    """Return the caption of a stepped level, with the levels of jumps and their hysteresis."""
     text = (
         f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
@@ -153,7 +153,7 @@ def stepped_level_caption(found: SteppedResponse) -> str:
 
 
 def tracked_caption(found: SteppedResponse) -> str:
-    """Return the caption with the number of levels."""
+    """Return the caption of a tracked resonance, with the number of base levels."""
     return f"Resonance tracked, number of base levels: {found.frequency_hz.size}."
 
 

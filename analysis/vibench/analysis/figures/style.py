@@ -53,7 +53,7 @@ WIDTH_IN = 7.2
 """Width of figures that fits A4 text and a column of a report [in]."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Relative margin at both ends of a frequency axis; measured lines are a few ppm off round numbers."""
+"""Relative margin at both ends of a frequency axis; measured frequencies are a few ppm off round numbers."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
 """Ratios of the ends of a frequency axis: below the first, linear; below the second, ticks at 3 and 7."""
@@ -100,7 +100,7 @@ def styled() -> Iterator[None]:
 
 
 def plain_label(name: str) -> str:
-    """Return a name, escaped so that Matplotlib shows it unchanged even with dollar signs."""
+    """Return a text, escaped so that Matplotlib shows it unchanged even with dollar signs."""
     return printable(name).replace("$", r"\$")
 
 

@@ -26,12 +26,12 @@ from .ensemble_band import (
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
-"""Largest ratio of drawn bounds to the curve; wider bounds of uncertain lines would fill the figure."""
+"""Largest ratio of drawn bounds to the curve; wider bounds would fill the figure."""
 _DIFFERENCE_LIMIT_DB = 12.0
 _LINEAR_POINTS = 4000
 _HALF_TURN_DEG = 180.0
 _BELOW = 0.5
-"""Lower end of the magnitude axis relative to the smallest value."""
+"""Lower end of the magnitude axis relative to the smallest drawn magnitude."""
 
 
 def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
