@@ -26,7 +26,7 @@ from .statistical_numbers import statistical_numbers
 CALM, COLLIDING = 1.01, 1.05
 """Ratios of Response I to II (1 for a sine): no collisions below the first, collisions above the second."""
 _LENGTH_S = 3.0
-"""Length of the tracked part of a recording [s], long enough for four restarts."""
+"""Length of the tracked part of a recording [s], long enough for four restarts of the search."""
 _MOST_RECORDINGS = 3
 _JUDGED = (
     Hidden.LOWER_GAP,
@@ -43,7 +43,7 @@ _SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
 
 
 class Way(StrEnum):
-    """Method for parameters from collisions."""
+    """Method by which parameters are found from collisions."""
 
     TRACKED = "tracked"
     STATISTICS = "statistics"
@@ -66,7 +66,7 @@ class CollisionNumbers:
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
-        """Lower and upper gap; empty unless the motion determines both."""
+        """Lower and upper gap; empty unless the motion determines both gaps."""
         found = tuple(each for each in self.determined if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
@@ -188,7 +188,7 @@ class _Colliding:
     path: Path
     label: SegmentLabel
     middle: float
-    """Centre of the part within the longest segment with this label, 0 to 1."""
+    """Relative position, 0 to 1, of the part's centre within the longest segment with this label."""
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:
@@ -210,7 +210,7 @@ class _Colliding:
 
 
 def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
-    """Yield parts with collisions: dwells first because they are stationary, the strongest dwell first."""
+    """Yield parts of recordings with collisions: dwells first (stationary), the strongest dwell first."""
     for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
         if peakedness(dwell.analysis) >= COLLIDING:
             facts, drive = dwell.analysis.facts, dwell.analysis.response.drive

@@ -86,7 +86,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
     """
     reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
     motion, rate = sweep.response, sweep.response.sweep_rate_hz_per_s
-    # Between two regions the masses may still collide, smoothly.
+    # Between two collision regions the masses may still collide, smoothly.
     for edge in (each.start for each in sweep.collisions.regions[:1] if not each.reaches_start):
         last = int(np.argmin(np.abs(motion.time_s - edge.time_s))) - 1
         before = slice(max(0, last - round(_APPROACH_S / motion.interval_s)), max(0, last))
@@ -94,7 +94,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
         if hz.size < _LEAST_INTERVALS or sweep.collisions.is_unexplained[before].any():
             continue
         apart = _apart(motion.response_ii[before], np.abs(swept_response(linear, hz, rate)[:, _M0]))
-        # A line over frequency, because collisions disturb the base motion.
+        # Fit a line over frequency, because collisions disturb the base motion.
         line = np.polynomial.Polynomial.fit(hz, a0_m, 1)
         drive_sd = float(np.median(motion.sd_drive_amplitude_m[before] / a0_m))
         near = np.append(edge.frequency_hz, np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS))
@@ -106,7 +106,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
 
 
 def _apart(measured: Reals | float, linear: Reals) -> float:
-    """Return the largest relative difference of measured and linear motion."""
+    """Return the largest relative difference of measured and linear motion of m0."""
     return float(np.max(np.abs(np.log(measured / linear))))
 
 

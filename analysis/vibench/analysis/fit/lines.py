@@ -17,17 +17,17 @@ from ..signals.window import line_correlation
 from .parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
-"""Smallest relative scatter that is assumed for a line; calibrations and clocks are not more exact."""
+"""Smallest relative scatter assumed for a spectral line; calibrations and clocks are not more exact."""
 _LEAST_CLEAR = 10.0
-"""Smallest ratio of a magnitude to the median scatter of its neighbours, for a normal ln(magnitude).
+"""Smallest ratio of a line's magnitude to the median scatter nearby, for a normal ln(magnitude).
 
 The line's own scatter is estimated from few averages. It would select lines whose scatter is small by chance,
 so that a correct model would be refused.
 """
 _NEIGHBOURS = 31
-"""Number of lines for the median scatter."""
+"""Number of neighbouring spectral lines for the median scatter."""
 _MOST_OFF = np.log(1e4)
-"""Largest logarithmic distance of a parameter from the start of the search."""
+"""Largest |ln| of the ratio of a parameter to its value at the start of the search."""
 LEAST_DAMPING_TIME_S = 1e-8
 """Start value of the damping time for a specimen described without damping [s]."""
 CHANNEL_PHASES = 2
@@ -39,9 +39,9 @@ _STEP = 1e-6
 """Logarithmic step of central differences; far above rounding, far below the width of a resonance."""
 
 _HOPELESS = 5.0
-"""Multiple of the chi square limit above which no weighting can make a fit valid."""
+"""Multiple of the chi square limit above which no weighting of lines can make a fit valid."""
 _MOST_STEPS = 60
-"""Maximum number of evaluations; if the data show no further mode, its fit has no optimum."""
+"""Maximum number of evaluations of a fit; if the data show no further mode, its fit has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""
@@ -75,7 +75,7 @@ class Freedom:
     parameters: tuple[Parameter, ...] = ()
     model: Model = own_response
     starts: tuple[tuple[float, ...], ...] = ((),)
-    """Start values of the model's further parameters."""
+    """Start values of the additional parameters of the model."""
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
 
@@ -88,9 +88,9 @@ class Descended:
     logarithms: Reals
     """Logarithms of the free parameters."""
     covariance: Reals
-    """Covariance of the logarithms, for a correct model."""
+    """Covariance of the parameters' logarithms, for a correct model."""
     freedoms: Reals
-    """Degrees of freedom of the uncertainty of each parameter; few if few lines determine it."""
+    """Degrees of freedom of the uncertainty of each parameter; few if few lines determine this parameter."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -103,11 +103,11 @@ class Lines:
     frequency_hz: Reals
     measured: Complexes
     weights: Reals
-    """Weights of the magnitudes, then of the phases."""
+    """Weights of the magnitudes of all lines, then of their phases."""
     averages: float
-    """Number of independent averages from which the scatter of each line is estimated."""
+    """Number of independent averages from which the scatter of each spectral line is estimated."""
     correlation: tuple[float, float]
-    """Number of lines per independent line, for parameters and for chi square."""
+    """Number of spectral lines per independent line, for parameters and for chi square."""
     nominal: Specimen
     free: tuple[Parameter, ...]
     scale_sd: float
@@ -115,7 +115,7 @@ class Lines:
 
     @property
     def start(self) -> Reals:
-        """Starting point of the search."""
+        """Start values of the search: logarithms of the free parameters, then zeros."""
         named = [max(parameter_value(self.nominal, each), LEAST_DAMPING_TIME_S) for each in self.free]
         return np.concatenate([np.log(named), np.zeros(CHANNEL_PHASES + (self.scale_sd > 0.0))])
 
@@ -130,7 +130,7 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Return the specimen of these parameters, limited to `_MOST_OFF`."""
+        """Return the specimen with these parameters, each limited to `_MOST_OFF`."""
         begun = self.start[: len(self.free)]
         values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
@@ -157,7 +157,7 @@ class Lines:
         )
 
     def squared(self, residuals: Reals) -> Reals:
-        """Return the sum of squares of magnitude and phase for each line."""
+        """Return the sum of squared residuals of magnitude and phase for each line."""
         magnitudes, phases = np.split(residuals[: 2 * self.frequency_hz.size], 2)
         return np.asarray(magnitudes**2 + phases**2)
 
@@ -175,7 +175,7 @@ def lines_of(
     scale_sd: float,
     fitted: Specimen | None = None,
 ) -> Lines:
-    """Select the lines that are well above the scatter; raises NotEnoughData if too few are left.
+    """Select the spectral lines well above their scatter; raises NotEnoughData if too few are left.
 
     The magnitudes of a fitted specimen, if given, replace the measured ones, so that noise has no effect.
     """
@@ -223,7 +223,7 @@ def fit_lines(lines: Lines) -> Descended:
 
 
 def fit_lines_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
-    """Fit with additional parameters, from the previous result and from the description."""
+    """Fit a model with additional parameters, from the previous result and from the description."""
     opened = replace(lines, free=(*lines.free, *allowed.parameters))
     begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
     ways = [(start, further) for start in begun for further in allowed.starts]

@@ -69,7 +69,7 @@ class FittedValue:
     sd: float
     """Standard deviation; NaN if only bounds are known."""
     nominal: float
-    """Value in the bench configuration."""
+    """Value of the parameter in the bench configuration."""
 
     @property
     def unit(self) -> str:

@@ -43,7 +43,7 @@ class SpecimenFit(Labelled):
     lines: int
     """Number of spectral lines that were fitted."""
     reduced_chi_square: float
-    """Reduced chi square, about 1 if the model explains the lines; includes the estimated scatter."""
+    """Reduced chi square, about 1 if the model explains the lines; scatter is estimated."""
     limit: float
     """Reduced chi square that one correct model in a thousand exceeds."""
     suspects: tuple[Suspect, ...]

@@ -28,7 +28,7 @@ from .specimen_fit import SpecimenFit
 # and Shafer 2005). Then the box is narrowed and sampled again (Deistler, Goncalves and Macke 2022).
 
 ROUNDS = (120, 120, 240)
-"""Number of runs in each box, from the widest box to the narrowest."""
+"""Number of simulated runs in each box (range of parameters), from the widest to the narrowest box."""
 _MARGIN = 1.25
 """Ratio of the half width of the next box to the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
@@ -37,7 +37,7 @@ _COMPONENTS = 15
 _FAR = 1.05
 """Largest distance of the observed statistics, relative to the furthest run, at which the model fits.
 
-A correct model exceeds the furthest of n runs at most once in n + 1 times; the margin allows for small
+A correct model exceeds the furthest of n runs at most once in n + 1 times. The margin allows for small
 differences between rig and recording.
 """
 
@@ -165,7 +165,7 @@ def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Re
 _SEGMENT_S = 0.1
 _LOWEST_HZ, _HIGHEST_HZ = 40.0, 12_000.0
 _HIGHEST_PART = 0.4
-"""Highest frequency as a share of the sample rate, within the converter's pass band."""
+"""Highest evaluated frequency as a share of the sample rate, within the converter's pass band."""
 _BANDS = 18
 _ABOVE_NOISE = 4.0
 _COHERENT_HZ = 1_000.0
@@ -178,8 +178,8 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     """Return statistics of a stretch of irregular motion, shape (statistics,).
 
     Statistics are the logarithmic band powers of base acceleration and m0's velocity, and their coherence per
-    band; spread, skewness and tails of m0's velocity and displacement; and for a sine drive the harmonics.
-    Even harmonics distinguish the two stops.
+    band. Others are spread, skewness and tails of m0's velocity and displacement, and for a sine drive the
+    harmonics. Even harmonics distinguish the two stops.
 
     Parameters
     ----------

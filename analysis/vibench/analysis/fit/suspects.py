@@ -54,13 +54,13 @@ class Suspect:
     """The change that explains the misfit, with its size."""
     reduced_chi_square: float
     mends: bool
-    """Whether the model fits without this assumption."""
+    """Whether the model fits when this assumption is dropped."""
     behind: float
     """Twice the log likelihood ratio to the best suspect, plus ln(number of values) per parameter; best 0."""
 
     @property
     def may_be_it(self) -> bool:
-        """Whether the data do not distinguish this suspect from the best one."""
+        """Whether the data do not distinguish this assumption from the best suspect."""
         return self.behind < TOLD_APART
 
 

@@ -31,7 +31,7 @@ from .suspects import Assumption, Suspect
 _SURELY = 3.3
 """Number of standard deviations that one correct description in a thousand exceeds."""
 _LARGEST_SCATTER = 100.0
-"""Largest ratio of variance about a linear response to that in silence; light collisions exceed 1000."""
+"""Largest ratio of variance about a linear response to variance in silence; light collisions exceed 1000."""
 _WEAKER = "so masses may collide or rub; measure weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
 """Relative error of the fitted table mass due to coil, filters and held samples."""
@@ -100,7 +100,7 @@ class UpdatedSpecimen(Labelled):
     collisions: CollisionNumbers | None
     """Parameters from tracked collisions or from statistics; None if neither is possible."""
     linear: SpecimenFit | None
-    """Linear fit of the weakest noise; None without noise."""
+    """Linear fit to the weakest noise recording; None without noise."""
     linear_from: str
     """Name of the recording that gives damping and frequencies; empty if none."""
     table: TableFit | None
@@ -121,7 +121,7 @@ class UpdatedSpecimen(Labelled):
 
     @property
     def reduced_chi_square(self) -> float:
-        """Reduced chi square of the linear fit; NaN if there was none."""
+        """Reduced chi square of the linear fit; NaN without such a fit."""
         return float("nan") if self.linear is None else self.linear.reduced_chi_square
 
     @property
@@ -132,7 +132,7 @@ class UpdatedSpecimen(Labelled):
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def checked(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit, without values if its overlay in ``results`` disagrees with the fitted noise."""
+        """Return the fit; remove its values if its overlay in ``results`` disagrees with the fitted noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]
