@@ -1,4 +1,4 @@
-"""Nonlinear distortion in periodic noise, from the scatter of realisations and the undriven lines."""
+"""Nonlinear distortion in periodic noise, from scatter of realisations and undriven spectral lines."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,7 +13,7 @@ from .periodic import DetectionLines, Drift, PeriodicFrequencyResponse
 
 @dataclass(frozen=True)
 class Distortion(Labelled):
-    """Noise and nonlinear distortion relative to a transmission; medians over the lines."""
+    """Noise and nonlinear distortion relative to a transmission; medians over spectral lines."""
 
     DOCUMENT: ClassVar = (
         "realisations median_not_repeating_over_magnitude=noise_share "
@@ -29,11 +29,11 @@ class Distortion(Labelled):
     distortion_share: float | None
     """Relative scatter of realisations beyond `noise_share`; None for a single realisation."""
     odd_m_per_s: float | None
-    """Rms response on undriven odd lines, without noise; None if there are none."""
+    """Rms response on undriven odd spectral lines, without noise; None if there are no such lines."""
     even_m_per_s: float | None
-    """Rms response on undriven even lines, without noise; None if there are none."""
+    """Rms response on undriven even spectral lines, without noise; None if there are no such lines."""
     detection_noise_m_per_s: float | None
-    """Rms noise on the undriven lines."""
+    """Rms noise on the undriven spectral lines."""
 
 
 def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
@@ -79,7 +79,7 @@ def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
 
 
 def is_even_line(lines: DetectionLines) -> Flags:
-    """Return flags of the even lines, where only even distortion appears."""
+    """Return flags of the even spectral lines, where only even distortion appears."""
     return np.asarray(lines.order % 2 == 0)
 
 

@@ -17,7 +17,7 @@ _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
 """Usual length [s] and minimum number of the pieces of the drive whose energies are compared."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""Hits have at least 0.9 of the drive's energy in the strongest 0.05 of its time; Gaussian noise has 0.06."""
+"""Hits have at least 0.9 of the drive's energy in the strongest 0.05 of the time; Gaussian noise has 0.06."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
@@ -29,7 +29,7 @@ _PARTS = 20
 _NOTHING = 1e-300
 EXPONENTIAL = "exponential"
 _ASSUMED_SD = 0.01
-"""Scatter assumed to weight the lines of a single hit, relative to the line and to the largest line."""
+"""Scatter assumed for weights of a single hit's lines, relative to each line and to the largest line."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Hits:
     """Segments of a record that each begin with a hit."""
 
     starts: tuple[int, ...]
-    """First sample of each segment."""
+    """Index of the first sample of each segment."""
     segment_samples: int
     left_out: int
     """Number of hits whose segment is cut short by the next hit or by the end."""
@@ -122,7 +122,7 @@ class HitSpectra:
         return len(self.spectra)
 
     def response(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
-        """Estimate response over base; the bounds are infinite for a single hit, whose scatter is unknown."""
+        """Estimate response over base; bounds are infinite for a single hit, whose scatter is unknown."""
         products = np.einsum("kif,kjf->ijf", np.conj(self.spectra), self.spectra) / self.count
         averages = SpectralAverages(
             products, self.count, self.left_out, max(self.count, 2.0), self.settings.segment_samples,

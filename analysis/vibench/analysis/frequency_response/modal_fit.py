@@ -1,4 +1,4 @@
-"""Fit of modes to the lines of a transmission by variable projection, with decorrelated errors."""
+"""Fit of modes to a transmission's spectral lines by variable projection, with decorrelated errors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ SMALLEST_RELATIVE_SD = 1e-6
 """Minimum relative standard deviation, so that weights stay finite for noise-free simulations."""
 LARGEST_DAMPING = 0.5
 RESOLVED_LINES = 4.0
-"""Minimum half-power bandwidth of a resolved mode, in noise bandwidths of a line."""
+"""Minimum half-power bandwidth of a resolved mode, in noise bandwidths of a spectral line."""
 WELL_FITTED = 1.2
 """Reduced chi-square below which a higher degree of the background would only add uncertainty."""
 
@@ -41,19 +41,19 @@ class Resonance:
     peak_magnitude: float
     sd_peak_magnitude: float
     reduced_chi_square: float
-    """Reduced chi-square of the lines about the mode; standard deviations are widened if it is above 1."""
+    """Reduced chi-square of the lines about the mode; a value above 1 widens the standard deviations."""
     chi_square_limit: float
     """Reduced chi-square that one correct fit in a thousand exceeds."""
     lines_used: int
     is_resolved: bool
-    """Whether the resolution is fine enough for this bandwidth."""
+    """Whether the spectral resolution is fine enough for the mode's bandwidth."""
     overlap: float
     """Factor by which an overlapping mode increases the uncertainty of damping; 1 without overlap."""
 
     @property
     def is_explained(self) -> bool:
         """Whether the fitted modes describe the lines about this mode, within their scatter."""
-        # NaN for a single hit, whose lines have no known scatter.
+        # Chi-square is NaN for a single hit, whose lines have no known scatter.
         return not self.reduced_chi_square > max(self.chi_square_limit, WELL_FITTED)
 
     @property
@@ -87,11 +87,11 @@ class Resonance:
 # dH/df times x windowed by w' / (2 pi i).
 
 _PROXY_SAMPLES = 1024
-"""Window length for computing correlations; it does not change the result."""
+"""Window length for computing correlations [samples]; the length does not change the result."""
 _FAR_LINES = 12
-"""Distance in lines beyond which errors under cosine windows are uncorrelated."""
+"""Distance in spectral lines beyond which errors under cosine windows are uncorrelated."""
 _NEAR = 0.05
-"""Magnitude of the exponent below which a series is more accurate than the closed form."""
+"""|q| of an integral of exp(q t), below which a series is more accurate than the closed form."""
 _LEAST_NOISE = 0.02
 """Minimum share of sensor noise in a line's variance, since ringing alone may give a singular matrix."""
 
@@ -103,7 +103,7 @@ class Leakage:
     segment_s: float
     window: Window
     noise: Reals
-    """Correlation of the sensor-noise errors of lines k apart, shape (far lines,)."""
+    """Correlation of the sensor-noise errors of spectral lines k apart, shape (far lines,)."""
     ringing: Reals
     """Covariance of the errors of lines k apart due to cut-off ringing, per |dH/df|^2 [Hz^2]."""
 
@@ -226,7 +226,7 @@ _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
 """Maximum number of steps of a fit."""
 _STEADY_AVERAGES = 49.0
-"""Equivalent number of averages of a scatter smoothed over neighbouring lines."""
+"""Equivalent number of averages of a scatter smoothed over neighbouring spectral lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
 """Distance in half-power bandwidths below which the bounds of two modes allow for a third between them."""
@@ -251,7 +251,7 @@ class Lines:
         self.frequency_hz, self.value = band.frequency_hz[usable], band.value[usable]
         self._spread = spread[usable]
         self._leakage = leakage_of(band)
-        # Under an exponential window, lines show the response at a complex frequency.
+        # Under an exponential window, spectral lines show the response at a complex frequency.
         self._off_hz = -0.5j / np.pi * (band.settings.decay_per_s or 0.0)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
@@ -283,7 +283,7 @@ class Lines:
         return np.concatenate([scaled.real, scaled.imag])
 
     def relative_sd(self, frequency_hz: float) -> float:
-        """Return the relative scatter of the line nearest to a frequency."""
+        """Return the relative scatter of the spectral line nearest to a frequency."""
         line = int(np.argmin(np.abs(self.frequency_hz - frequency_hz)))
         return float(self._spread[line] / np.abs(self.value[line]))
 
@@ -329,7 +329,7 @@ class ModalFit:
 
     resonances: tuple[Resonance, ...]
     chi_square: float
-    """Chi square per degree of freedom of all lines."""
+    """Chi square per degree of freedom of all fitted spectral lines."""
     freedom: int
 
     @property

@@ -36,14 +36,14 @@ from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
-"""The transmission, and a slower function that returns all results, such as resonances."""
+"""Two results: the transmission, and a slower function that returns all results, such as resonances."""
 _BLOCK = 1 << 19
-"""Samples per block."""
+"""Number of samples read at once."""
 _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Median difference of two estimators above which it is bias, in standard deviations of the median."""
+"""Median difference of two estimators that counts as bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
 """Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
 
@@ -88,7 +88,7 @@ class NoiseResponse(Labelled):
 
     @property
     def median_coherence(self) -> float:
-        """Median coherence over all lines."""
+        """Median coherence over all spectral lines."""
         return float(np.median(self.frequency_response.coherence))
 
 
@@ -190,7 +190,7 @@ class _Unusable:
     overloaded: int = 0
 
     def valid(self, data: Reals, overloaded: Flags) -> Flags:
-        """Return flags of the usable samples, and count the others."""
+        """Return flags of the usable samples, and count the unusable ones."""
         lost = np.isnan(data).any(axis=0)
         self.lost += int(np.count_nonzero(lost))
         self.overloaded += int(np.count_nonzero(overloaded & ~lost))
@@ -198,14 +198,14 @@ class _Unusable:
 
     @property
     def text(self) -> str:
-        """Return the counts, to append to a sentence; empty if all samples are usable."""
+        """Return the counts as text to append to a sentence; empty if all samples are usable."""
         found = ((self.lost, "lost"), (self.overloaded, "near full scale"))
         text = " and ".join(f"{count} samples {what}" for count, what in found if count)
         return f" ({text})" if text else ""
 
 
 def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
-    """Return the samples of a realisation; None if it has a fault or less than two whole periods."""
+    """Return the samples of a realisation; None if it is faulty or shorter than two periods."""
     shortfall = 1e-3
     periods = int(stretch.samples / period_samples + shortfall)
     if periods < _LEAST_PERIODS:

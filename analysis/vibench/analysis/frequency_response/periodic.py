@@ -1,7 +1,7 @@
 """Transmission from periodic noise: separates noise from nonlinear distortion, without leakage.
 
 The drive is a multisine played for whole periods, in several realisations of its random phases. The scatter
-between periods is noise; additional scatter between realisations is distortion (robust method of Pintelon &
+between periods is noise. Additional scatter between realisations is distortion (robust method of Pintelon &
 Schoukens, System Identification, 2nd ed., section 4.3, with the drive as reference).
 """
 
@@ -24,14 +24,14 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Share of a period that may be missing at the end of a record; the record is continued periodically."""
+"""Share of a period that may be missing at the end of a record; this part is continued periodically."""
 _WEAKEST_LINE = 1e-3
 """Minimum amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
 _CONVERGED = 1e-9
-"""Relative change of the period at which iteration stops; the remaining error is below a tenth of it."""
+"""Relative change of the period at which iteration stops; the error is then below a tenth of this change."""
 _LARGEST_OFFSET = 200e-6
-"""Largest relative clock offset, for two oscillators of 50 to 100 ppm each."""
+"""Largest relative offset between two clocks, for oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
 """A drive repeats if its mean period has at least this share of the mean power of its periods."""
 
@@ -103,7 +103,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
 
 
 def driven_lines(spectra: Complexes) -> Flags:
-    """Return flags of the driven lines, from spectra of shape (periods or realisations, lines)."""
+    """Return flags of the driven spectral lines, from spectra of shape (periods or realisations, lines)."""
     amplitude = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
     amplitude[0] = 0.0
     strongest = float(np.max(amplitude))
@@ -146,21 +146,21 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Limit of this deviation relative to that of the median line; it applies if larger than `_SMALL`."""
+"""Largest deviation of a line for a drift over that of the median line; applies if above `_SMALL`."""
 
 
 class Scatter(StrEnum):
     """Scatter that determines the bounds of a periodic transmission."""
 
     REALISATIONS = "realisations"
-    """The full uncertainty: noise and nonlinear distortion."""
+    """Bounds contain the full uncertainty: noise and nonlinear distortion."""
     PERIODS = "periods"
-    """Noise only, from one realisation; a nonlinear specimen may lie outside the bounds."""
+    """Bounds contain noise only, from one realisation; a nonlinear specimen may lie outside."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Common changes of all lines between realisations, which are not distortion."""
+    """Changes between realisations that all spectral lines share, and that are not distortion."""
 
     OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1", "common_share": "1"}
 
@@ -193,11 +193,11 @@ class BestLinearApproximation:
     relative_sd: Reals
     """Standard deviation of ln(magnitude), and equally of the phase [rad]."""
     steady_relative_sd: Reals
-    """`relative_sd` smoothed over neighbouring lines."""
+    """`relative_sd` smoothed over neighbouring spectral lines."""
     noise_variance: Reals
-    """Complex variance of one realisation due to noise."""
+    """Variance of the complex response of one realisation due to noise."""
     distortion_variance: Reals | None
-    """Complex variance beyond noise and drift; None for a single realisation."""
+    """Variance of the complex response beyond noise and drift; None for a single realisation."""
     drift: "Drift | None"
     scatter: Scatter
     averages: int
@@ -321,9 +321,9 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Minimum share of the scatter that changes common to all lines must explain."""
+"""Minimum share of the scatter that changes common to all spectral lines must explain."""
 _BEYOND_CHANCE = 1.25
-"""Minimum ratio of the explained share to the largest share expected for independent lines."""
+"""Minimum ratio of the explained share to the largest share expected for independent spectral lines."""
 
 
 def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
@@ -356,7 +356,7 @@ def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
 
 
 def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
-    """Return the derivative at each line, from a local quotient of linear functions, which fits one mode."""
+    """Return the frequency derivative at each line, from a local quotient of linear functions (one mode)."""
     if value.size == 1:
         return np.zeros_like(value)
     slope = np.gradient(value, frequency_hz)
@@ -371,7 +371,7 @@ def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
 
 @dataclass(frozen=True)
 class DetectionLines:
-    """Undriven lines inside the driven band, which show distortion."""
+    """Undriven spectral lines inside the driven band, which show distortion."""
 
     OWN_UNITS: ClassVar = {"response_amplitude": "{unit}", "noise_amplitude": "{unit}"}
 
@@ -381,7 +381,7 @@ class DetectionLines:
     response_amplitude: Reals
     """Rms over realisations of the response's amplitude [unit of the response]."""
     noise_amplitude: Reals
-    """Part of the amplitude caused by noise (standard deviation of the mean over periods)."""
+    """Part of the response's amplitude caused by noise (standard deviation of the mean over periods)."""
 
 
 @dataclass(frozen=True)
@@ -397,9 +397,9 @@ class PeriodicFrequencyResponse(Labelled):
 
     frequency_response: FrequencyResponse
     noise_variance: Reals
-    """Complex variance of one realisation due to noise [(unit of the value)^2]."""
+    """Variance of the complex value of one realisation due to noise [(unit of the value)^2]."""
     distortion_variance: Reals | None
-    """Complex variance beyond noise and drift; None for a single realisation."""
+    """Variance of the complex response beyond noise and drift; None for a single realisation."""
     drift: Drift | None
     scatter: Scatter
     realisations: int
@@ -491,7 +491,7 @@ class PeriodicSums:
         )
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Yield the sums without each realisation in turn; yield nothing for a single realisation."""
+        """For each realisation, yield the spectra of all others; nothing for a single realisation."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,
@@ -582,7 +582,7 @@ class PeriodicSums:
 
 
 def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
-    """Return flags of the lines with these orders, as far as the sample rate allows."""
+    """Return flags of the spectral lines with these orders, as far as the sample rate allows."""
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(

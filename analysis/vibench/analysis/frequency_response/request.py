@@ -128,7 +128,7 @@ _SEGMENT_S = 4.0
 _LEAST_SEGMENTS = 8
 """Minimum number of segments by default; a short record gets shorter segments."""
 _PROXY_SAMPLES = 4096
-"""Window length for computing overlap correlations; it does not change the result."""
+"""Window length for computing overlap correlations; the length does not change the result."""
 
 
 @dataclass(frozen=True)
@@ -142,12 +142,12 @@ class FrequencyResponseRequest:
 
     estimator: Estimator = Estimator.DRIVE
     noise_ratio: float | None = None
-    """For hv: noise density of m0's velocity over that of the base's acceleration [s2]."""
+    """For hv: noise density of m0's velocity over the noise density of the base's acceleration [s2]."""
     resolution_hz: float | None = None
-    """Noise bandwidth of a line, which sets the segment length."""
+    """Noise bandwidth of a spectral line, which sets the segment length."""
     segment_s: float | None = None
     averages: float | None = None
-    """Independent averages, which set the segment length."""
+    """Number of independent averages, which sets the segment length."""
     window: Window = Window.HANN
     overlap: float = 0.5
     confidence: float = DEFAULT_CONFIDENCE
@@ -234,6 +234,6 @@ def longest_segment(samples: int, averages: float, window: Window, overlap: floa
 
 
 def _bandwidth_lines(window: Window) -> float:
-    """Return the noise bandwidth of a window in lines: 1.5 for Hann."""
+    """Return the noise bandwidth of a window in spectral lines: 1.5 for Hann."""
     values = taper(window, _PROXY_SAMPLES)
     return float(values.size * (values @ values) / np.sum(values) ** 2)

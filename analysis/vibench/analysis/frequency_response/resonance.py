@@ -1,4 +1,4 @@
-"""Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
+"""Resonances of a transmission: frequency, damping and quality factor, each with its uncertainty."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -22,7 +22,7 @@ from .modal_fit import (
 from .results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
-"""The fit uses lines within this many half-power bandwidths of the peak."""
+"""Distance from the peak, in half-power bandwidths, of the spectral lines used in its fit."""
 _LEAST_LINES = 8
 """Minimum number of lines for a fit: 8 complex values determine 2 pole and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
@@ -35,7 +35,7 @@ _LEAST_GAIN = 25.0
 """Minimum reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
 in a thousand cases."""
 _REACH_DAMPING = 4.0
-"""Largest change of ln(damping ratio) in a fit."""
+"""Largest change of ln(damping ratio) from its start value in a fit."""
 _USUAL_HZ = 300.0
 """Reference frequency that scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
@@ -127,7 +127,7 @@ def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, real
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
-    """Return the line and the half-power half width [lines] of each significant peak."""
+    """Return the line number and the half-power half width [lines] of each significant peak."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
@@ -136,7 +136,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
         width = _half_power_lines(size, int(line))
-        # Peaks as wide as the band would all be fitted to the same lines, so keep only the largest.
+        # Peaks as wide as the band would all be fitted to the same spectral lines, so keep only the largest.
         is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
         if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
             result.append((int(line), width))
@@ -144,7 +144,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
 
 
 def _smooth(size: Reals, spread: Reals) -> Reals:
-    """Average ln(magnitude) over up to 9 lines to reduce scatter to about 2 %; small scatter is kept."""
+    """Average ln(magnitude) over up to 9 lines to reduce its scatter to about 2 %; small scatter is kept."""
     lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
     if lines <= 1:
         return size
@@ -153,14 +153,14 @@ def _smooth(size: Reals, spread: Reals) -> Reals:
 
 
 def _half_power_lines(size: Reals, line: int) -> int:
-    """Return the number of lines from the peak to the nearer -3 dB point."""
+    """Return the number of spectral lines from the peak to the nearer -3 dB point."""
     level = size[line] - 0.5 * np.log(2)
     below = np.flatnonzero(size < level)
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
 
 
 def _fit_peak(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
-    """Fit the lines about a peak with the fewest modes that explain them, at most ``most``."""
+    """Fit the spectral lines about a peak with the fewest modes that explain them, at most ``most``."""
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
     chosen[max(0, line - reach) : line + reach + 1] = True

@@ -13,7 +13,7 @@ from ..signals.quantity import Quantity, derivative_factor
 from ..tables import Labelled
 
 LEAST_COHERENCE = 0.1
-"""Minimum coherence of a significant line."""
+"""Minimum coherence of a significant spectral line."""
 
 
 class Estimator(StrEnum):
@@ -36,7 +36,7 @@ class FrequencyResponseSettings:
     estimator: Estimator
     sample_rate_hz: float
     segment_samples: int
-    """Samples of one segment, or of one period."""
+    """Number of samples of one segment, or of one period."""
     window: str
     overlap: float
     confidence: float
@@ -84,7 +84,7 @@ class FrequencyResponse(Labelled):
     segments_excluded: int
     settings: FrequencyResponseSettings
     steady_relative_sd: Reals | None = None
-    """`relative_sd_magnitude` smoothed over lines, for weights of a fit; None if not needed."""
+    """`relative_sd_magnitude` smoothed over neighbouring lines, for weights of a fit; None if not needed."""
     drive_slope_per_hz: Complexes | None = None
     """Relative slope [1/Hz] of the density that weights the transmission within a line; None if flat."""
     reference_coherence: Reals | None = None
@@ -147,7 +147,7 @@ class FrequencyResponse(Labelled):
         return replace(self, value=self.value / gain)
 
     def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
-        """Return the lines from ``low_hz`` to ``high_hz``, inclusive."""
+        """Return the response at the spectral lines from ``low_hz`` to ``high_hz``, inclusive."""
         kept = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
         if not np.any(kept):
             span = f"{self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"

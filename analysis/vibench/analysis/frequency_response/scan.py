@@ -25,7 +25,7 @@ class ScanShape:
     values: Complexes
     """Transmission in the requested quantities, shape (points,)."""
     half_width: Reals
-    """Relative half width of the bounds, shape (points,)."""
+    """Relative half width of the bounds of the magnitude, shape (points,)."""
 
     @property
     def magnitude_bounds(self) -> tuple[Reals, Reals]:
@@ -45,18 +45,18 @@ class ScanShape:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """The noise measurements of one plan, one for each point, sorted by node number."""
+    """Scan: the noise measurements of one plan, one for each point, sorted by node number."""
 
     analyses: tuple[NoiseAnalysis, ...]
 
     @property
     def name(self) -> str:
-        """Name of the measurement."""
+        """Name of the measurement that contains the scan."""
         return self.analyses[0].facts.measurement.name
 
     @property
     def points(self) -> tuple[ScanPoint, ...]:
-        """Point of each measurement."""
+        """Point of the specimen in each measurement."""
         return tuple(point for each in self.analyses if (point := each.facts.measurement.point) is not None)
 
     @property

@@ -13,11 +13,11 @@ from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 _ENOUGH_FREEDOM = 24.0
-"""Degrees of freedom at which the variance of a line is accurate to a third."""
+"""Degrees of freedom at which the variance of a spectral line is accurate to a third."""
 _FREEDOM = 96.0
 """Degrees of freedom, summed over neighbouring lines, for estimating the noise levels."""
 _FEWEST_FREEDOM = 4.0
-"""Total degrees of freedom of the lines above which smoothing over neighbours helps."""
+"""Total degrees of freedom of all lines above which smoothing over neighbouring lines helps."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
@@ -176,7 +176,7 @@ def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: f
 
 
 def _ratio(numerator: Complexes, denominator: Complexes) -> Complexes:
-    """Return the quotient; NaN for lines without drive."""
+    """Return the quotient of two spectra; NaN for lines without drive."""
     missing = np.full_like(numerator, complex(np.nan, np.nan))
     return np.asarray(np.divide(numerator, denominator, out=missing, where=denominator != 0))
 
