@@ -20,10 +20,10 @@ from ._tracking_model import TrackedSpecimen
 
 _BLOCK_S, _OVERLAP_S = 0.12, 0.02
 _MISFIT = 3.0
-"""Largest mean squared innovation of a valid block."""
+"""Largest mean squared normalised innovation of a valid block."""
 FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
 _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
-"""Values of `closed_share` in successive fits; the first ones tolerate an m1 that is 5 % wrong."""
+"""Values of `closed_share` in successive fits; the first values tolerate an m1 that is 5 % wrong."""
 _FIT_STRETCH_S = 0.12
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
@@ -34,10 +34,10 @@ _LEAST_P_OF_MEDIAN = 0.9
 _DEPTH_POWER = 0.8
 """Power of the impulse to which the depth of a Hertz collision is proportional: d ~ v^(4/5) and J ~ v."""
 _LAW_UNKNOWN = 0.15
-"""Error of a gap if the contact law is not Hertz's, relative to the mean depth."""
+"""Error of a gap if the contact law is not Hertz's, relative to the mean depth of contacts."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
-"""Smallest range of the middle 90 % of depths, relative to their mean, for which a line is fitted."""
+"""Smallest range of the middle 90 % of contact depths over their mean for which a line is fitted."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
 """Largest scatter of |p| at the impacts of a valid block, relative to the gap."""
@@ -115,7 +115,7 @@ def free_motion(
 
 
 def _at_stops(rows: Reals) -> Flags:
-    """Return flags of the rows that are impacts at a stop."""
+    """Return flags of the rows that describe impacts at a stop."""
     kept = np.zeros(len(rows), dtype=np.bool_)
     if not len(rows):
         return kept
@@ -146,7 +146,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     """Return one impact for every window with an impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
-    # The force is held over the step before a sample, so its centre is half a sample earlier.
+    # The force is held over the step before a sample, so the centre of the force is half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in _runs(latent.is_open):
         if begin < 2 or end > force.size - 2 or latent.is_dropout[begin:end].any():
@@ -194,7 +194,7 @@ class FreeGap:
 
     value_m: float
     sd_m: float
-    """Standard deviation from the scatter of impacts and the unknown contact law."""
+    """Standard deviation of the gap, from the scatter of impacts and the unknown contact law."""
     impacts: int
 
 
@@ -217,7 +217,7 @@ def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
 
 
 def free_loss(impacts: FreeImpacts) -> float | None:
-    """Return the loss of the stops [s/m] from speeds before and after impacts; None if there are too few.
+    """Return the loss of the stops [s/m] from speeds before and after impacts; None for too few impacts.
 
     For a small loss of Hunt and Crossley's law, speed after / speed before = 1 - 2/3 loss * speed before. The
     result is only a start value, since both extrapolated speeds are a few per cent low.
@@ -266,7 +266,7 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
 
 
 def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Return the deviation of each value from the median of its side; NaN for values on neither side."""
+    """Return the deviation of each value from the median of its side; NaN for values without a side."""
     apart = np.full(values.size, np.nan)
     for each in sides:
         apart[each] = values[each] - np.median(values[each])
@@ -367,7 +367,7 @@ class Collisions(Labelled):
 
 
 def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiece) -> Collisions:
-    """Return the contacts that start in a piece, simulated from the smoothed flight before each."""
+    """Return the contacts that start in a piece, simulated from the smoothed flight before each contact."""
     smoothed, tables = piece.smoothed, model.tables
     samples = smoothed.states.shape[0]
     rows = np.empty((samples + 1, _COLUMNS))

@@ -29,7 +29,7 @@ from ._tracking import acquire
 from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m, step_tables
 
 _WANDER = 0.02
-"""Random walk of parameters per block, relative to their prior sd; it prevents early overconfidence."""
+"""Random walk of parameters per block over their prior sd; prevents overconfidence of the filter."""
 REBUILT_S = 0.05
 """Interval after which the tables are updated to the current parameters [s]."""
 _LOST = (
@@ -51,9 +51,9 @@ class Estimate:
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]
     begun_at: Reals
-    """Start values of the search, shape (parameters,), SI."""
+    """Start values of the parameter search, shape (parameters,), SI."""
     prior_sd: Reals
-    """Prior standard deviations, shape (parameters,)."""
+    """Prior standard deviations of the parameters, shape (parameters,)."""
     moved: Reals
     """Deviations from the start values in prior standard deviations, shape (parameters,)."""
     covariance: Reals
@@ -62,7 +62,7 @@ class Estimate:
     """Variance that the random walk added to each parameter, in units of the prior."""
     followed_s: float
     innovation_level: float
-    """Mean squared normalised innovation at the end, with the true noise; 1 for a good model."""
+    """Mean squared normalised innovation at the end of the motion, with the true noise; 1 if good."""
 
 
 def estimate(
@@ -109,7 +109,7 @@ class _Search:
                 begun = acquire(inflated, self._motion, looked)
                 match begun:
                     case str():
-                        # Report the first reason; the last one is always the end of the motion.
+                        # Report the first reason; the last reason is always the end of the motion.
                         why, looked = why or begun, looked + block
                         continue
                     case FilterState():
@@ -210,7 +210,7 @@ _FREE_S = 3.0
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return start values found without a contact model, and either their prior or why there is none."""
+    """Return start values found without a contact model, and their prior or the reason why it is missing."""
     rate = motion.sample_rate_hz
     fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
@@ -243,7 +243,7 @@ def search_start(
 
 
 def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
-    """Return ``near`` without the gap of a side that has no stop in the description."""
+    """Return the parameters ``near`` without the gap of a side that has no stop in the description."""
     return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 
 

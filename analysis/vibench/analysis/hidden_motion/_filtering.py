@@ -24,7 +24,7 @@ _ACCELERATION_EXCESS = 1.5
 _IMPULSE_SHARE = 0.003
 """Relative model error of a collision's impulse."""
 _SMOOTHING_S = 8e-3
-"""Averaging time of squared innovations to detect a loss [s]."""
+"""Averaging time of squared innovations to detect the loss of a track [s]."""
 LOSS_LIMIT = 8.0
 """Mean squared normalised innovation above which a track is lost; about 1 is good."""
 _NOTHING = np.empty(0)
@@ -82,14 +82,14 @@ class FilterState:
     """State of a run of the filter, updated in place."""
 
     sample: int
-    """Index of the last used sample in the motion."""
+    """Index in the motion of the last sample that the filter used."""
     state: Reals
     covariance: Reals
     innovation_level: float = 1.0
     """Running mean of the squared normalised innovation."""
 
     def copy(self) -> "FilterState":
-        """Return an independent copy."""
+        """Return an independent copy of this state."""
         return FilterState(self.sample, self.state.copy(), self.covariance.copy(), self.innovation_level)
 
 
@@ -115,7 +115,7 @@ class Filtered:
 
     @classmethod
     def room(cls, first: int, count: int) -> "Filtered":
-        """Allocate arrays for this many samples."""
+        """Allocate arrays for the predictions of this many samples."""
         shapes = (STATES,), (STATES, STATES), (2,), (), (STATES, STATES), ()
         return cls(first, *(np.empty((count, *shape)) for shape in shapes))
 
@@ -125,7 +125,7 @@ class Filtered:
         return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
 
     def samples(self, begin: int, end: int | None = None) -> "Filtered":
-        """Return the samples from ``begin`` to before ``end``."""
+        """Return the predictions for samples ``begin`` to before ``end``."""
         return Filtered(self.first + begin, *(each[begin:end] for each in self.arrays.values()))
 
     @property

@@ -21,9 +21,9 @@ _YIELDING = (X, VX, W)
 _BIN_S = 1e-3
 _WITHIN = 0.68
 _FEWEST, _MOST = 5, 40
-"""Smallest and largest number of newest forecasts from which the error is found."""
+"""Smallest and largest number of newest forecasts from which the forecast error is found."""
 _NOT_MEASURED = 1e30
-"""Variance of a missing sample."""
+"""Variance assigned to a missing sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Forecast(Labelled):
     p: Reals
     """Relative displacement p = y - z [m]."""
     error: Reals
-    """Error that 68 % of recent forecasts did not exceed at this horizon [m]; NaN if they are too few."""
+    """Error that 68 % of recent forecasts did not exceed at this horizon [m]; NaN with too few forecasts."""
 
 
 class Forecaster:

@@ -34,7 +34,7 @@ _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 _LARGEST_SD = 0.5
 """Largest standard deviation of a determined parameter, relative to the description's."""
 _WIDE = 3.0
-"""Standard deviation of the wide prior that replaces the narrow prior, relative to the description's."""
+"""Standard deviation of the wide prior, which replaces the narrow one, over that of the description."""
 _FAR = 3.0
 """Largest standard deviation of a determined parameter, relative to the narrow prior."""
 _SETTLED = 1.0
@@ -50,10 +50,10 @@ _ONE_SIDED_SD = {
     Hidden.FORCE: 0.02,
     Hidden.EXPONENT: 1.5e-3,
 }
-"""Systematic error [SI] if m1 strikes one stop only: on 15 random dwells all gaps were 0.4 to 7 nm too
+"""Systematic error [SI] if m1 strikes one stop only. On 15 random dwells, all gaps were 0.4 to 7 nm too
 small, for an unknown reason."""
 _STARTS_APART = 0.3
-"""Shift of start values in prior standard deviations, so that their influence shows as scatter."""
+"""Shift of start values in prior standard deviations; their influence then shows as scatter."""
 
 
 _SHOWN = {
@@ -91,11 +91,11 @@ class FoundParameter:
     """95 % bounds from the scatter of restarts and the uncertainty of each."""
     described: float
     not_determined: str = ""
-    """Reason for a missing value; otherwise empty."""
+    """Reason why the value is missing; empty if there is a value."""
 
     @property
     def unit(self) -> str:
-        """Unit of the values, SI."""
+        """Unit of the value and its bounds, SI."""
         return unit_of(self.what)
 
     @property
@@ -162,7 +162,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
 
 
 def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estimate]:
-    """Return whether a search tracked the motion for at least half of its part."""
+    """Return whether a search tracked the motion for at least half of the searched part."""
     enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
     return isinstance(answer, Estimate) and answer.followed_s > enough_s
 
@@ -209,7 +209,7 @@ def _restarts(
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # If the shifted start values fail, try the unshifted values, then the latest result.
+        # If the shifted start values fail, try the unshifted values, then the result of the latest restart.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
             if _is_held(answer, motion):

@@ -37,13 +37,13 @@ from ._tracking_model import VY, VZ, TrackedSpecimen, W, tracked_specimen
 
 _RATES = {"m1": VY, "m2": VZ}
 _MOST_EXCESS = 1.25
-"""Largest ratio of mean squared to expected squared deviation, as for the innovations of a track."""
+"""Largest ratio of a sensor's mean squared deviation from the track to the expected squared deviation."""
 _ALLOWED = 0.02
-"""Allowed relative deviation due to mounting, alignment and local modes at the sensor."""
+"""Allowed relative deviation of a sensor from the track due to mounting, alignment and local modes."""
 _MOST_EXPECTED = 0.2
 """Largest expected deviation for a verdict; impacts act as noise in an accelerometer on a colliding mass."""
 _MOST_SCALE = 0.05
-"""Largest deviation of the scale from 1: both calibrations may be wrong by some per cent."""
+"""Largest deviation from 1 of measured over tracked velocity; calibrations may be some per cent wrong."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class MassCheck:
 
     @property
     def sentence(self) -> str:
-        """Return the verdict with its numbers."""
+        """Return the comparison with the track as a sentence with its numbers."""
         verdict = {True: "confirms", False: "refutes", None: "neither confirms nor refutes"}[self.confirms]
         return (
             f"The measured {self.channel} {verdict} the track: "
@@ -82,7 +82,7 @@ class MeasuredMass:
 
     channel: str
     velocity: Reals
-    """Measured velocity [m/s], shape (samples,); NaN where unknown."""
+    """Measured velocity of m1 or m2 [m/s], shape (samples,); NaN where unknown."""
     noise: float
     """RMS noise of the measured velocity [m/s]."""
     _sums: Reals = field(default_factory=lambda: np.zeros(5))
@@ -128,7 +128,7 @@ def measured_masses(recording: Recording, motion: PreparedMotion) -> Iterator[Me
             continue
         try:
             channel = ResponseChannel(recording, role)
-        except UnusableData:  # too short for an integral
+        except UnusableData:  # too short to integrate the acceleration
             continue
         weights = sensor_correction(
             recording.bench, recording.channel(BASE), recording.channel(role), rate_hz
@@ -169,7 +169,7 @@ class TrackedMotion(Labelled):
 
     @property
     def median_sd_m(self) -> float | None:
-        """Median standard deviation of p; None without a track, or if a sensor refutes it."""
+        """Median standard deviation of p; None without a track, or if a sensor refutes the track."""
         known = self.p_sd[~np.isnan(self.p_sd)]
         return float(np.median(known)) if known.size else None
 
@@ -452,7 +452,7 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
 
 
 def _gap_sd(found: FoundSpecimen | None) -> float:
-    """Return the standard deviation of p due to the gaps: a quarter of the width of their bounds."""
+    """Return the standard deviation of p due to the gaps: a quarter of the width of the gaps' bounds."""
     if found is None:
         return 0.0
     gaps = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)

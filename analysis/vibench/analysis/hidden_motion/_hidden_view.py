@@ -15,7 +15,7 @@ from ..tables import Labelled
 from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
-"""Longest part of a recording that is shown [s]; it is computed in about one second."""
+"""Longest part of a recording that is shown [s]; its motion is computed in about one second."""
 _NUMBERS_SHOWN = 3
 """Number of shown parameters: both gaps and m1."""
 _LEAD_S = 0.15
@@ -24,7 +24,7 @@ _LEAD_S = 0.15
 
 @dataclass(frozen=True)
 class HiddenViewRequest:
-    """Part of a recording to show, and the parameters to use."""
+    """Part of a recording to show, and the specimen parameters to use."""
 
     path: Path
     low_s: float
@@ -56,7 +56,7 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
 
     Raises AnalysisError as `hidden_motion` does.
     """
-    # Imported late: the window needs the classes above at its start, and this loads scipy.stats.
+    # Imported late: the window needs this module at its start, and this import loads scipy.stats.
     from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415
 
     try:

@@ -2,7 +2,7 @@
 
 Two relations hold for any law: z follows from m0's motion through a stable first-order filter, and the sum of
 m1 y'' and m2 z'' contains no contact force. A Kalman smoother combines both, with a white force held over
-each sample. In flight the force is zero. Windows around the peaks of the force are found first; elsewhere the
+each sample. In flight the force is zero. Windows around the peaks of the force are found first. Elsewhere the
 force is then set to zero (switched variance, Rogers and Friis, arXiv 2303.03858). With a force in flight, the
 double integral of the second relation would drift.
 """
@@ -18,9 +18,9 @@ from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES
 
 _PEAK_BAND_HZ = 4500.0
-"""Band of the force, a compromise between the width of a collision and noise."""
+"""Frequency band of the force, a compromise between the width of a collision and noise."""
 _WINDOW_S = 6e-5
-"""Half width of a window around a peak [s]."""
+"""Half width of a window around a peak of the contact force [s]."""
 _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
 """Smallest peak relative to the first guess of the force."""
@@ -35,7 +35,7 @@ _RERUNS = 3
 _START_UP_S = 4e-3
 """Start-up time of the filter, in which innovations are ignored [s]."""
 _START_SD = (1e-4, 0.3, 1.0, 0.5)
-"""Initial standard deviations of displacements, velocities, W and B."""
+"""Initial standard deviations of displacements, velocities, base velocity W and acceleration error B."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class LatentMotion:
     is_open: Flags
     """Flags of samples with a possible contact force."""
     is_dropout: Flags
-    """Flags of open samples in or near drop-outs."""
+    """Flags of samples in or near drop-outs that may have a contact force."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""

@@ -47,15 +47,15 @@ BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
 """Smallest mean time between false alarms [s]."""
 OUT_BY_CHANCE = 0.01
-"""Largest share of blocks outside the usual level without a change."""
+"""Largest share of blocks outside the usual level while the specimen is unchanged."""
 _OUT_WHEN_CHANGED = 0.5
 _OUT_ADDS = math.log(_OUT_WHEN_CHANGED / OUT_BY_CHANCE)
 _IN_ADDS = math.log((1.0 - _OUT_WHEN_CHANGED) / (1.0 - OUT_BY_CHANCE))
 THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
-"""Number of blocks to learn the usual level."""
+"""Number of blocks from which the usual innovation level is learnt."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is outside if it exceeds both 1.5 times the usual level and the usual level plus 8 sd."""
+"""A block is outside if its level exceeds both 1.5 times the usual level and the usual level plus 8 sd."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
@@ -65,11 +65,11 @@ class Level(FrozenModel):
 
     mean: float
     sd: float
-    """Standard deviation of the level between blocks."""
+    """Standard deviation of the innovation level between blocks."""
 
     @property
     def limit(self) -> float:
-        """Limit above which a block is outside."""
+        """Innovation level above which a block is outside the usual level."""
         return max(_LARGER * self.mean, self.mean + _SCATTERS * self.sd)
 
 
@@ -89,7 +89,7 @@ class Baseline(FrozenModel):
     numbers: Mapping[Hidden, KnownNumber]
     """Parameters found from collisions."""
     levels: Mapping[str, Level]
-    """Usual levels, keyed by excitation."""
+    """Usual innovation levels, keyed by excitation."""
 
 
 def baseline_path(rig: Rig, specimen: Specimen) -> Path:
@@ -114,10 +114,10 @@ def keep_baseline(baseline: Baseline, path: Path) -> None:
 
 
 class ChangeWatch:
-    """Test whether the levels of blocks have left the usual level."""
+    """Test whether the innovation levels of blocks have left their usual level."""
 
     def __init__(self, usual: Level | None = None) -> None:
-        """Start with the stored level ``usual``; without it, learn the level from the first two seconds."""
+        """Start with the stored usual level; without it, learn the usual level from the first two seconds."""
         self.usual = usual
         self._learnt: list[float] = []
         self._sum = 0.0
@@ -142,10 +142,10 @@ class LiveState(StrEnum):
     """State of the live hidden motion."""
 
     WAITING = "waiting"
-    """There is too little data or motion to start a track."""
+    """There are too few samples or too little motion to start a track."""
     TRACKED = "tracked"
     LOST = "lost"
-    """The data do not fit the parameters; no motion is shown."""
+    """The measured motion does not fit the parameters; no hidden motion is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class LiveMotion(Labelled):
 
     state: LiveState
     why: str
-    """Reason if the motion is not tracked."""
+    """Reason why the motion is not tracked."""
     first: int
     """Index in the recording of the first sample of ``p``."""
     p: Reals
@@ -165,9 +165,9 @@ class LiveMotion(Labelled):
     """Forecast of p; only for a sine drive."""
     gaps_m: tuple[float, float]
     level: float
-    """Level of the last block; 1 if only noise remains."""
+    """Innovation level of the last block; 1 if only noise remains."""
     limit: float
-    """Limit above which a block is outside; NaN while the usual level is being learnt."""
+    """Limit of the innovation level above which a block is outside; NaN while the usual level is learnt."""
 
 
 HELD_S = 3.0
@@ -178,9 +178,9 @@ _LOOKED_S = 0.25
 _FIND_S = 2.4
 """Length of motion in which parameters are searched [s]."""
 _PATIENCE = 2.0
-"""Factor by which the waiting time grows with every search."""
+"""Factor by which the waiting time between parameter searches grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
-"""First and longest time between attempts to start a track, if the motion does not fit the model [s]."""
+"""First and longest time between attempts to start a track while the motion does not fit [s]."""
 _CLIPPED = 25.0
 """Upper limit of squared innovations, so that one late impact does not count as a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
@@ -250,7 +250,7 @@ class LiveTwin:
         self._begin_anew(0)
 
     def begin_run(self, usual: Level | None) -> None:
-        """Discard the last motion but keep its parameters; ``usual`` is the level of the new excitation."""
+        """Discard the last motion but keep its parameters; ``usual`` is the new excitation's level."""
         self.watch = ChangeWatch(usual)
         self.found = ()
         self._begin_anew(0)
@@ -373,7 +373,7 @@ class LiveTwin:
         first = motion.samples - 2 - window
         if first < self._looked:
             return
-        # The next attempt is a third of a window later, so its middle third, where a track starts, is new.
+        # The next attempt is a third of a window later, so the middle third, where a track starts, is new.
         self._looked = first + max(window // 3, self._pause)
         part = slice(max(0, motion.samples - round(_NOISE_S * self._rate)), None)
         if motion.samples < 2 * window:
@@ -407,12 +407,12 @@ class LiveTwin:
         self._squares.append(_clipped_innovations(run))
 
     def _wait_longer(self) -> None:
-        """Retry at once, then less and less often, to limit the computing load."""
+        """Retry the start of a track at once, then less and less often, to limit the computing load."""
         longest = round(_LONGEST_PAUSE_S * self._rate)
         self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
 
     def _check_block(self, sentences: list[str]) -> None:
-        """Compare the finished block with the usual level."""
+        """Compare the innovation level of the finished block with the usual level."""
         squares = np.concatenate(self._squares or [np.empty(0)])
         self._squares = []
         is_out, self._is_out = self._is_out or self._state is LiveState.LOST, False
@@ -429,7 +429,7 @@ class LiveTwin:
                 f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
-            # Drop a running search, because it uses samples from before the change.
+            # Drop a running search, because it uses samples from before the specimen changed.
             self._finding = None
             self._wait = round(_FIND_S * self._rate)
             self._find_at = self.next_sample + self._wait
@@ -454,7 +454,7 @@ class LiveTwin:
             return
         if Hidden.LOWER_GAP in parameters or Hidden.UPPER_GAP in parameters:
             self._find_at = np.iinfo(np.int64).max
-        # Dampers and contact law depend on the level, even if the specimen does not change.
+        # Dampers and contact law depend on the drive level, even if the specimen does not change.
         compared = (
             parameters.values()
             if self.watch.has_changed

@@ -105,5 +105,5 @@ class Numbers(StrEnum):
     """Source of gaps, m1, springs, dampers and contact law for tracking."""
 
     FOUND = "found"
-    """Found from collisions where possible."""
+    """Parameters found from collisions where possible."""
     AS_DESCRIBED = "as described"

@@ -21,7 +21,7 @@ _MOST_SEGMENTS = 4096
 _PIECE = 1 << 19
 """Number of samples that are corrected at once."""
 _LEAST_NOISE = 1e-6
-"""Minimum noise relative to the signal, because the Kalman filter needs a variance."""
+"""Minimum noise of a channel relative to its signal, because the Kalman filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
 """Median over mean of a periodogram line of white noise, which is exponentially distributed."""
 _DARK_MARGIN = 8
@@ -32,7 +32,7 @@ LOWEST_RATE_HZ = 10_000.0
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """White noise of the two channels, rms per sample."""
+    """White noise of base acceleration and m0's velocity, rms per sample."""
 
     OWN_UNITS: ClassVar = {"acceleration": "m s-2", "velocity": "m s-1"}
 
@@ -67,11 +67,11 @@ class PreparedMotion:
         return self.velocity.size
 
     def accelerations(self, start: int, stop: int) -> Reals:
-        """Return the accelerations from sample ``start`` to before ``stop`` [m/s2]."""
+        """Return the base accelerations from sample ``start`` to before ``stop`` [m/s2]."""
         return self.acceleration[start:stop].astype(np.float64, copy=False)
 
     def velocities(self, start: int, stop: int) -> Reals:
-        """Return the velocities from sample ``start`` to before ``stop`` [m/s]; NaN in drop-outs."""
+        """Return m0's velocities from sample ``start`` to before ``stop`` [m/s]; NaN in drop-outs."""
         return np.where(self.is_dropout[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":

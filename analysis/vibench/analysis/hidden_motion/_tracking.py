@@ -46,16 +46,16 @@ class TrackedPiece:
 
     smoothed: Smoothed
     run: Filtered
-    """Run of the filter, over the same samples."""
+    """Run of the filter over these samples."""
 
     @property
     def first(self) -> int:
-        """Index of the first sample in the motion."""
+        """Index in the motion of the first tracked sample."""
         return self.smoothed.first
 
     @property
     def stop(self) -> int:
-        """Index one past the last sample."""
+        """Index in the motion one past the last tracked sample."""
         return self.first + int(self.smoothed.states.shape[0])
 
 

@@ -18,7 +18,7 @@ Deviations of the estimated parameters follow these states. Equations: docs/hidd
 """
 X, Y, Z, VX, VY, VZ, W, B = range(STATES)
 _SMALL_STEPS_A_CONTACT = 36
-"""Steps during the shortest collision; the force at 1 um is then accurate to 1e-3."""
+"""Number of steps in the shortest collision; the force at 1 um is then accurate to 1e-3."""
 _FASTEST_APPROACH_M_PER_S = 0.5
 _FEWEST_SMALL_STEPS = 4
 HERTZ_EXPONENT = 1.5
@@ -31,14 +31,14 @@ class TrackedSpecimen:
 
     specimen: Specimen
     force_at_1um_n: float
-    """f; a parallel spring of the law is not included."""
+    """Force at an indentation of 1 um [N]; a parallel spring of the law is not included."""
     exponent: float
     loss_s_per_m: float
-    """chi; a search may find a negative value within its bounds."""
+    """Loss chi [s/m]; a search may find a negative value within its bounds."""
 
     @property
     def steepness(self) -> float:
-        """K of F = K d^n [N/m^n]."""
+        """Factor K of the force F = K d^n [N/m^n]."""
         return float(self.force_at_1um_n / _MICROMETRE**self.exponent)
 
 
@@ -64,7 +64,7 @@ class StepTables:
     flow: Reals
     """Matrix from state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
     small_flow: Reals
-    """The same matrix for one small step."""
+    """Matrix from state, acceleration and its rise to the next small step, without stops; shape (8, 10)."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
