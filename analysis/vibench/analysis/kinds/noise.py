@@ -1,4 +1,4 @@
-"""Noise: the transmission from base to m0, and its resonances."""
+"""Analysis of noise: the transmission from base to m0, and its resonances."""
 
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -17,7 +17,7 @@ HOLD_S = 1.5
 
 
 class LevelVerdict(Enum):
-    """Assessment of a level: too high, good, or too low."""
+    """Assessment of a channel's level: too high, good, or too low."""
 
     OVER = auto()
     GOOD = auto()

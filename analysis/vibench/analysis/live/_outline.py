@@ -195,7 +195,7 @@ def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
 _COARSER = 16
 """Number of bins of one level that form one bin of the next level."""
 _LEAST_BINS = 20_000
-"""Number of bins up to which no coarser level is needed; reducing these to columns takes 0.1 ms."""
+"""Number of bins up to which no coarser level is needed; reducing these bins to columns takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
 """Parts of a long recording in which periods are counted: number, columns of each, maximum samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
@@ -237,7 +237,7 @@ class RecordingOverview:
 
     recording: Recording
     levels: dict[str, tuple[OverviewLevel, ...]]
-    """Levels keyed by role, from short to long bins."""
+    """Extremes of the bins, keyed by role of the channel, from short to long bins."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
         """Return samples ``start`` to ``stop`` (exclusive) of some channels in about ``columns`` columns.

@@ -13,7 +13,7 @@ from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25
-"""Additional periods at each end of the orbit, needed for integration and drive phase."""
+"""Additional drive periods at each end of the orbit, needed for integration and drive phase."""
 POINTS_A_PERIOD = 120
 """Points per period of the orbit; 2400 points in 20 periods are painted in about 1 ms."""
 MOST_POINTS = 3000
@@ -92,9 +92,9 @@ class PoincareSection:
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most
         self.displacement_m: Reals = np.empty(0)
-        """Displacement of the points, shape (points,)."""
+        """Displacement of the Poincaré points, shape (points,)."""
         self.velocity_m_per_s: Reals = np.empty(0)
-        """Velocity of the points, shape (points,)."""
+        """Velocity of the Poincaré points, shape (points,)."""
         self._newest = -np.inf
 
     def add(self, found: Portrait) -> None:

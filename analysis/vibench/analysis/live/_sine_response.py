@@ -16,7 +16,7 @@ from ._ring import RingWindow
 _LEAST_SHARE = 0.5
 """Minimum share of a sine's power in its strongest spectral line and the neighbouring lines."""
 _NEIGHBOURS = 3
-"""Neighbouring lines on each side of a sine's strongest line (Hann), even at slowly changing frequency."""
+"""Spectral lines on each side of a sine's strongest line (Hann), even at slowly changing frequency."""
 _LEAST_LINE = 4
 """Minimum number of periods to analyse; with fewer, the sine's spectral line merges with the offset's."""
 
@@ -28,7 +28,7 @@ class DriveTone:
     frequency_hz: float
     """Frequency [Hz]; in a sweep, the frequency at the middle of the samples."""
     amplitude: float
-    """Peak amplitude [unit of the channel]."""
+    """Peak amplitude of the sine [unit of the channel]."""
 
 
 @lru_cache(maxsize=32)
@@ -92,7 +92,7 @@ _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
 """Length of the newest signal in which the drive frequency is searched; five periods of 10 Hz [s]."""
 _STRETCH_PERIODS = 25
-"""Number of drive periods for one point, without the disturbed ends; they last at least 0.1 s."""
+"""Number of drive periods for one point of the responses, without disturbed ends; at least 0.1 s."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
@@ -106,7 +106,7 @@ class SinePoint:
     """Responses and amplitudes, computed from some consecutive drive periods."""
 
     time_s: float
-    """Time of the middle of these periods [s since the first sample of the run]."""
+    """Time of the middle of the evaluated drive periods [s since the first sample of the run]."""
     frequency_hz: float
     drive_amplitude_m: float
     """Amplitude A0 of the base displacement at the drive frequency."""
@@ -120,7 +120,7 @@ class SinePoint:
 
 
 def stretch_samples(frequency_hz: float, sample_rate_hz: float) -> int:
-    """Return the number of samples for one point, including the disturbed ends."""
+    """Return the number of samples for one point of the responses, including the disturbed ends."""
     wanted_s = max(_STRETCH_S, _STRETCH_PERIODS / frequency_hz) + 2 * _EDGE_PERIODS / frequency_hz
     return fft.next_fast_len(int(np.ceil(wanted_s * sample_rate_hz)), real=True)
 

@@ -37,7 +37,7 @@ class SpectrumSettings:
     """Length and number of the averaged segments."""
 
     segment_samples: int = 8192
-    """Length of a segment [samples]; at 51.2 kS/s, lines are 6.25 Hz apart."""
+    """Length of a segment [samples]; at 51.2 kS/s, spectral lines are 6.25 Hz apart."""
     averages: int = 24
     """Number of averaged segments; older segments are dropped."""
 
@@ -193,9 +193,9 @@ class LiveSpectra:
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
-"""Half-power width of a line under a Hann window, times the length of the window."""
+"""Half-power width of a spectral line under a Hann window, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
-"""Ratio of the visible range to the default segment length, within the limits above."""
+"""Ratio of the visible time to the default segment length, which has lower and upper limits."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0
@@ -277,7 +277,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Return the edges of the frequency axis and the rows; a row contains its strongest line."""
+    """Return the edges of the frequency axis and the rows; a row contains its strongest spectral line."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

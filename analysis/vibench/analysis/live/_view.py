@@ -36,20 +36,20 @@ _CONTACT_S = 30e-6
 _APART_S = 100e-6
 """Kinks that are closer than this are counted as one [s]."""
 _LEAST_FRESH_S = 20e-3
-"""Shortest piece of signal for an estimate of the noise [s]."""
+"""Shortest piece of signal from which noise is estimated [s]."""
 _MOST_FRESH_S = 0.1
 """Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
-"""Threshold in standard deviations of the noise; noise exceeds it once in two minutes."""
+"""Threshold of a kink in standard deviations of the noise; noise exceeds it once in two minutes."""
 _SMOOTH_FACTOR = 3.0
-"""Threshold relative to the filter output for a sine at the mean frequency of the motion."""
+"""Threshold of a kink relative to the filter output for a sine at the mean frequency of the motion."""
 _REST_SHARE = 0.2
 """Smallest kink relative to a stronger neighbour; smaller kinks are residuals of the neighbour."""
 _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| used as its measure, and its value for normal noise; impacts affect larger values."""
+"""Quantile of |noise| that measures the noise, and its value for normal noise; impacts affect higher ones."""
 
 
 class ImpactCounter:
@@ -92,7 +92,7 @@ class ImpactCounter:
         return int(inside.size)
 
     def _kinks(self, data: Reals) -> "np.ndarray[tuple[int, ...], np.dtype[np.intp]]":
-        """Return the places of kinks; the strongest kink is found first and subtracted before the next."""
+        """Return the sample positions of kinks; the strongest kink is found and subtracted first."""
         strength = np.nan_to_num(np.convolve(data, self._finder[::-1], mode="valid"))
         least = max(_NOISE_FACTOR * self._gain * _noise(data), _SMOOTH_FACTOR * self._smooth(data))
         size, beside = np.abs(strength), np.zeros(strength.size)
@@ -147,13 +147,13 @@ def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
 
 
 MOST_POINTS = 36_000
-"""Maximum number of points: one hour at ten points per second; older points are dropped."""
+"""Maximum number of sweep points: one hour at ten points per second; older points are dropped."""
 _COLUMNS = tuple(each.name for each in fields(SinePoint))
 
 
 @dataclass(frozen=True, eq=False)
 class SweepHistory:
-    """All points of a run in the order of time; arrays of shape (points,)."""
+    """All sweep points of a run in the order of time; arrays of shape (points,)."""
 
     time_s: Reals
     frequency_hz: Reals
@@ -174,11 +174,11 @@ class SweepTrace:
 
     @property
     def points(self) -> int:
-        """Number of stored points."""
+        """Number of stored sweep points."""
         return self._end - self._begin
 
     def add(self, point: SinePoint) -> None:
-        """Add a point; the oldest point is dropped when the memory is full."""
+        """Add a sweep point; the oldest point is dropped when the memory is full."""
         if self._end == self._rows.shape[1]:
             self._rows[:, : self.points] = self._rows[:, self._begin : self._end].copy()
             self._begin, self._end = 0, self.points
@@ -187,7 +187,7 @@ class SweepTrace:
         self._begin = max(self._begin, self._end - self._most)
 
     def history(self) -> SweepHistory:
-        """Return all points."""
+        """Return all stored sweep points."""
         return SweepHistory(*self._rows[:, self._begin : self._end].copy())
 
 
@@ -340,7 +340,7 @@ class LiveView:
         return found
 
     def history(self) -> SweepHistory:
-        """Return Responses I and II, velocity extremes and A0 over the measured drive frequency."""
+        """Return all sweep points: Responses I and II, velocity extremes and A0 over the drive frequency."""
         return self._trace.history()
 
     @property
