@@ -35,14 +35,14 @@ from .simulated_channels import (
 )
 
 _FEWEST_LINES = 50
-"""Minimum number of lines in silence; they determine the noise level to 25 %."""
+"""Minimum number of spectral lines in silence, which determine the noise level to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
-"""Blocks spread over the recording, in addition to the first and last second."""
+"""Number of blocks in which noise is searched, in addition to the first and last second."""
 _BAND = (0.2, 0.4)
-"""Band relative to the sample rate that shows channel noise, without modes."""
+"""Frequency band, relative to the sample rate, that shows channel noise without modes."""
 _ALIKE = 6.0
-"""Blocks whose power is within this many standard deviations of the lowest are equally quiet."""
+"""Blocks whose power is within this many standard deviations of the lowest count as equally quiet."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def _white(samples: Reals) -> float:
 _COMPARED_HZ = (100.0, 2000.0)
 """Band in which drive noise is visible in the base motion; a table has further resonances above it [Hz]."""
 _MEDIAN_SD = 1.44
-"""Relative standard deviation of the median of N exponential values, times sqrt(N)."""
+"""Relative standard deviation of the median of N exponentially distributed values, times sqrt(N)."""
 _HANN_LINES = 1.5
-"""Lines of a Hann-windowed spectrum per statistically independent line."""
+"""Spectral lines of a Hann window per statistically independent line."""
 UNKNOWN_NOISE = (
     "The noise of the amplifier is unknown, because neither its voltage nor a silence in a bench check was "
     "recorded; bands of simulated weak motion may be too narrow"
@@ -106,12 +106,12 @@ class UnseenNoise:
     """White noise that moves the table but is absent from the recorded voltage; referred to that voltage."""
 
     power: float = 0.0
-    """Variance of one sample [V²]."""
+    """Variance of one sample of the noise [V²]."""
     sd: float = 0.0
-    """Standard deviation of this power [V²]."""
+    """Standard deviation of the estimated variance [V²]."""
 
     def drawn(self, rng: np.random.Generator) -> float:
-        """Return a random rms per sample, within the uncertainty [V]."""
+        """Return a random rms of the noise per sample, within its uncertainty [V]."""
         return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
 
 
@@ -148,7 +148,7 @@ def unseen_noise(
         return max(floor, noise.rms[BASE] ** 2 - passed_high * (recorded_v2 + unseen_v2))
 
     def excess(unseen_v2: float) -> float:
-        """Return the median of power / level minus log 2; it is 0 for the true noise."""
+        """Return the median of power / level minus log 2; it is 0 if the level is true."""
         level = passed * (unseen_v2 + own_v2) + sensor(unseen_v2)
         return float(np.median(power / level) - np.log(2.0))
 
@@ -171,7 +171,7 @@ def _base_over_voltage(rig: DrivenRig, frequency_hz: Reals) -> Complexes:
 _FRAME_SAMPLES = 1 << 15
 """Frame length [samples], 0.5 to 1 s; long enough to resolve the drive's lines from noise."""
 _BATCH_FRAMES = 16
-"""Frames per batch, about 10 MB."""
+"""Number of frames per batch of about 10 MB."""
 _LEVEL_LINES = 256
 """Number of lines whose median is the noise level; a few lines of the drive hardly change it."""
 _SURELY = 20.0
@@ -262,11 +262,11 @@ class PlayedVoltage:
 DRAWS, MOST_DRAWS = 16, 1000
 """Usual and largest number of draws of a colliding motion; 16 draws determine the 95 % band to a fifth."""
 FIRST_DRAWS = 8
-"""Number of draws computed first; enough if the agreement is clear or nothing collides."""
+"""Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws computed between checks of whether there are enough."""
+"""Number of draws computed between checks of whether draws suffice."""
 START_M = 5e-9
-"""Standard deviation of each mass's initial position."""
+"""Standard deviation of each mass's initial position [m]."""
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
@@ -276,7 +276,7 @@ _NOISE = 0.15
 _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17
-"""Samples per block of added noise."""
+"""Number of samples per block of added noise."""
 _MOST_BYTES = 0.35e9
 """Memory for draws that run in parallel [bytes]."""
 _BYTES_PER_SAMPLE = 16
@@ -302,7 +302,7 @@ class SimulatedRun:
     """Reason why the recorded voltage was not used, or remarks on the rig."""
     draws: int = 0
     impacts: float = 0.0
-    """Number of contacts during the analysed parts of the recording, mean over the draws."""
+    """Mean number of contacts per draw during the analysed parts of the recording."""
     played_s: float = 0.0
 
     @property
@@ -312,7 +312,7 @@ class SimulatedRun:
 
     @property
     def impact_rate_hz(self) -> float:
-        """Impacts per second."""
+        """Mean number of impacts per second."""
         return self.impacts / self.played_s if self.played_s else 0.0
 
 
@@ -333,7 +333,7 @@ class Draw(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class Drawn(Generic[R]):
-    """All draws: the full estimate of the first, and the compared quantities of each."""
+    """All draws: the full estimate of the first draw, and the compared quantities of each draw."""
 
     run: SimulatedRun
     response: R
@@ -506,7 +506,7 @@ class StretchDraws:
     first: int
     """Index in the recording of the first sample of ``volts``."""
     kept: slice
-    """Slice of ``volts`` that contains this part."""
+    """Slice of ``volts`` with the simulated part of the recording."""
 
     @property
     def measured(self) -> Reals:

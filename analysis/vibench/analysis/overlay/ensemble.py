@@ -16,14 +16,14 @@ from ..signals.arrays import Flags, Integers, Reals
 from ..tables import Labelled
 
 AGREEMENT = 0.99
-"""Probability that a correct simulation has all values within the limit, however many they are."""
+"""Probability that a correct simulation has all |z| within the limit, however many values there are."""
 BAND = 0.95
 MIXED = -1
-"""State of a value that mixes two kinds of motion; it is not compared."""
+"""State of a value that mixes two kinds of motion; such a value is not compared."""
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Part of the normal limit; if all values are within it after half of the draws, no more draws are made."""
+"""Share of the limit of |z|; if all values are within it after half of the draws, no more are made."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -33,10 +33,10 @@ class Quantity:
     """Positive values of one physical quantity, from one analysis; arrays of shape (points,)."""
 
     name: str
-    """Name, such as ``"Response II"`` or ``"band around 201 Hz"``."""
+    """Name of the quantity, such as ``"Response II"`` or ``"band around 201 Hz"``."""
     frequency_hz: Reals
     value: Reals
-    """Values; NaN where missing."""
+    """Values of the quantity; NaN where missing."""
     state: Integers | None = None
     """Kind of motion at each point (colliding or not), if it varies; only equal kinds are compared."""
 
@@ -61,9 +61,9 @@ class EnsembleCurve(Labelled):
     frequency_hz: Reals
     """Frequencies of the points, shape (points,)."""
     measured: Reals
-    """Measured values, shape (points,)."""
+    """Measured values of the quantity, shape (points,)."""
     draws: Reals
-    """Simulated values, shape (draws, points); NaN if the draw has another kind of motion."""
+    """Simulated values of the quantity, shape (draws, points); NaN if the draw has another kind of motion."""
 
     @cached_property
     def count(self) -> Integers:
@@ -131,7 +131,7 @@ class EnsembleCurve(Labelled):
 
     @property
     def outside(self) -> int:
-        """Number of points whose |z| exceeds the limit."""
+        """Number of points whose |z| exceeds the limit for chance."""
         return int(np.sum(np.abs(self.z[np.isfinite(self.z)]) > self.limit))
 
     @property
@@ -287,7 +287,7 @@ class CurveDifference(Labelled):
     """ln(measured / simulated) over the combined standard deviation; infinite if that is zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
-        """Return the difference at the points flagged by ``kept``."""
+        """Return the ratios at the points flagged by ``kept``."""
         return CurveDifference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
 
     @property
@@ -323,7 +323,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If all runs end within this interval, the cause is common, such as the end of the record [s]."""
+"""If the motion of all runs ends within this interval, the cause is common, such as the record's end [s]."""
 
 
 @dataclass(frozen=True)

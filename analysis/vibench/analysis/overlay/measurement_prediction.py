@@ -14,9 +14,9 @@ from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
 
 MOST_POINTS = 60
-"""Maximum number of simulated frequencies; they take some seconds."""
+"""Maximum number of simulated frequencies; their simulation takes some seconds."""
 SIMULATED_S = 6.0
-"""Duration from rest at each frequency; the transient decays to 0.1 % in half of it."""
+"""Duration from rest at each frequency; the transient decays to 0.1 % in half of this time."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
 """Number of frequency steps that imitate a sweep (small steps disturb little), and time per step [s]."""

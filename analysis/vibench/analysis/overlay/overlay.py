@@ -88,7 +88,7 @@ class AbstractOverlay(Labelled, Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class NoiseOverlay(AbstractOverlay[NoiseResponse]):
-    """A transmission with its simulation."""
+    """A measured transmission with its simulation."""
 
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} resonances=response.resonances"
 
@@ -98,17 +98,17 @@ class NoiseOverlay(AbstractOverlay[NoiseResponse]):
 
 @dataclass(frozen=True, eq=False)
 class SweepOverlay(AbstractOverlay[SweptMotion]):
-    """A sweep with its simulation."""
+    """A measured sweep with its simulation."""
 
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} collision_regions=collisions.regions"
 
     collisions: Collisions
-    """Collisions of the first draw."""
+    """Collision regions of the first draw."""
 
 
 @dataclass(frozen=True, eq=False)
 class DwellOverlay(AbstractOverlay[DwellResponse]):
-    """A dwell with its simulation."""
+    """A measured dwell with its simulation."""
 
     OWN_UNITS: ClassVar = {"displacement": "m"}
     DOCUMENT: ClassVar = (
@@ -124,13 +124,13 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     @property
     def shown(self) -> tuple[EnsembleCurve, ...]:
-        """The spectrum, which is not compared."""
+        """Spectrum of the displacement, which is not compared with draws."""
         return (self.spectrum,)
 
 
 @dataclass(frozen=True, eq=False)
 class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
-    """A stepped sine with its simulation."""
+    """A measured stepped sine with its simulation."""
 
     DOCUMENT: ClassVar = (
         f"{AbstractOverlay.DOCUMENT} response_i=response.response_i response_ii=response.response_ii"
@@ -232,7 +232,7 @@ def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity
 
 
 def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
-    """Return the end of the longest collision region, in seconds of the sweep."""
+    """Return the end of the longest collision region, in seconds since the start of the sweep."""
     if not found.regions:
         return ()
     longest = max(found.regions, key=lambda each: each.stop.time_s - each.start.time_s)

@@ -24,9 +24,9 @@ from ..tables import Labelled
 PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 """Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
 PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
-"""Resonances without contact; from the same section of the paper."""
+"""Resonances of m0 without contact [Hz] (Gong et al. 2025, section 5)."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
-"""Resonances with m1 bound to m2; from the same section of the paper."""
+"""Resonances of m0 with m1 bound to m2 [Hz] (Gong et al. 2025, section 5)."""
 PREDICTION_S = 8.0
 WINDOW_S = 5.0
 """Total and observed time [s]: 3 s settling (slowest transient falls to 3e-5), 5 s as in the paper."""
@@ -39,21 +39,21 @@ class ResponsePrediction(Labelled):
     specimen: Specimen
     frequency_hz: Reals
     amplitude_m: Reals
-    """Drive amplitude A0 at each point."""
+    """Base amplitude A0 at each frequency."""
     response_i: Reals
     """Response I; like Response II, NaN if the simulation did not finish."""
     response_ii: Reals
     linear: Reals
     """|x / U| of the linear model, without contact."""
     impacts: Integers
-    """Number of impacts within the window."""
+    """Number of impacts within the observed time."""
     accuracy: Accuracy
     duration_s: float
     window_s: float
 
     @property
     def is_colliding(self) -> Flags:
-        """Flags of points with collisions within the window."""
+        """Flags of points with collisions within the observed time."""
         return np.asarray(self.impacts > 0)
 
 

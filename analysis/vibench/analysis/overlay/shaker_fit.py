@@ -108,7 +108,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starting points: data determine products of parameters better than each factor."""
+    """Search from several starting points: data determine products of parameters better than single ones."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)

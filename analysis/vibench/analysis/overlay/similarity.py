@@ -87,14 +87,14 @@ class Similarity(Labelled):
     logarithm_of: LogarithmOf
     threshold: float
     rate: float
-    """Share of similar points (eq. 7)."""
+    """Share of points at which both curves are similar (eq. 7)."""
     low: float
     high: float
-    """95 % interval of the rate for other choices of frequencies in the same band."""
+    """95 % interval of the similarity rate for other choices of frequencies in the same band."""
     block_points: int
     """Block length of the bootstrap; blocks keep the correlation of neighbouring points."""
     left_out: int
-    """Number of points without a value in either curve."""
+    """Number of points at which one of the curves has no value."""
 
     @property
     def is_similar(self) -> Flags:
@@ -163,7 +163,7 @@ def _relative(base: Reals, other: Reals) -> Reals:
 
 
 def _block_length(flags: Reals) -> int:
-    """Return twice the correlation length of the flags, at least the cube root of their number."""
+    """Return twice the correlation length of similarity flags, at least the cube root of their number."""
     count = flags.size
     usual = int(np.ceil(count ** (1 / 3)))
     centred = flags - flags.mean()

@@ -32,7 +32,7 @@ class RecordedBaseMotion:
     sample_rate_hz: float
     low_hz: float
     high_hz: float
-    """Ends of the frequency band that is kept [Hz]."""
+    """Ends of the frequency band that the displacement contains [Hz]."""
     delay_s: float
     """Corrected delay of the accelerometer channel: sample k is the motion at k / sample_rate_hz."""
 
@@ -83,7 +83,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 
 
 _PIECE_S = 5.0
-"""Duration simulated at once, to limit memory [s]."""
+"""Duration that is simulated at once, to limit memory [s]."""
 _OVERLAP = 48
 """Extra samples on each side of a piece; the end effect of a spline falls to 0.27 with every sample."""
 _VX = 3
@@ -115,7 +115,7 @@ class SimulatedChannels:
 
     @property
     def samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return self.recorded.samples
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
