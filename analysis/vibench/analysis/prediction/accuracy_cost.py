@@ -7,7 +7,7 @@ from vibench.sim import Accuracy, PowerLaw
 from .progress import Exponent, SimulationRequest
 
 MACHINE = "one core of a 2-core AMD EPYC"
-"""Machine of these measurements; `vibench tradeoff` repeats them on any machine."""
+"""Machine on which speeds and errors were measured; `vibench tradeoff` measures them on any machine."""
 
 
 @dataclass(frozen=True)

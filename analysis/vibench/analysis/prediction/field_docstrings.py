@@ -29,7 +29,7 @@ def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
     """
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
-    except OSError:  # installed without sources, so there are no explanations
+    except OSError:  # installed without sources, so fields have no explanations
         return {}
     return {
         (each.name, field.target.id): inspect.cleandoc(text.value.value)

@@ -114,7 +114,7 @@ class MapPicture:
     """Indices in `MOTION_CLASSES`, shape (rows, columns)."""
     response_i: NDArray[np.float32]
     motions: NDArray[np.float32]
-    """Number of motions found in each cell."""
+    """Number of motions found in each cell of the map."""
     text: str
 
 
@@ -128,7 +128,7 @@ class MotionRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class SettledMotion:
-    """Samples of a settled motion, with its kind as text."""
+    """Samples of a settled motion, with the kind of motion as text."""
 
     frequency_hz: float
     amplitude_m: float
@@ -310,11 +310,11 @@ class SimulationRequest(SpecimenChoice):
     stop_hz: PositiveFloat = 600.0
     """Highest drive frequency."""
     step_hz: PositiveFloat = 5.0
-    """Frequency step."""
+    """Step between drive frequencies."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; free flight is exact at every level. Costs and errors are shown below."""
     duration_s: PositiveFloat = 8.0
-    """Simulated time of each run, from rest."""
+    """Simulated time of each run, which starts from rest."""
     window_s: PositiveFloat = 5.0
     """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
@@ -388,7 +388,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
-    """Return the table cells of a motion: responses, error, share of starts, kind."""
+    """Return the table cells of a motion: responses, error, share of initial states, kind."""
     share, period = motion.share, "" if motion.period is None else f", period {motion.period}"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
@@ -412,7 +412,7 @@ class SimulationProgress:
         self._troubles: list[str] = []
 
     def add(self, parts: tuple[PartialResult, ...]) -> None:
-        """Add pieces of the result."""
+        """Add received pieces of the results."""
         for part in parts:
             match part:
                 case SimulatedPoint():

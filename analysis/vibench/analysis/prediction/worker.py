@@ -46,7 +46,7 @@ class _TellingStore(MemoryStore):
         self._tell = tell
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results, and send them."""
+        """Store results, and send them to the window."""
         super().keep(answers)
         self._tell(tuple(self._pieces(answers)))
 

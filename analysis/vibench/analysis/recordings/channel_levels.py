@@ -45,12 +45,12 @@ class ChannelLevel:
 
     @property
     def share_of_range(self) -> float:
-        """Peak over full scale."""
+        """Peak of the channel over full scale."""
         return self.peak / self.full_scale
 
     @property
     def span(self) -> float:
-        """Largest minus smallest value; zero if the channel never moved."""
+        """Largest minus smallest value of the channel; zero if its signal is constant."""
         return float(np.nanmax(self.envelope.upper) - np.nanmin(self.envelope.lower))
 
 
@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; with less, the channel rests there."""
+"""Smallest height of a peak above the median, relative to the span; with less, the signal rests there."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:

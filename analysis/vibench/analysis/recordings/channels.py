@@ -86,9 +86,9 @@ class Stretch:
 
     start: int
     stop: int
-    """Index one past the last sample."""
+    """Index one past the last sample of the stretch."""
     numbers: dict[str, int | float | str]
-    """Values of this part in the plan, such as ``realisation`` or ``frequency_hz``."""
+    """Values of this stretch in the plan, such as ``realisation`` or ``frequency_hz``."""
     is_complete: bool
 
     @property
@@ -223,7 +223,7 @@ class RecordedChannels:
 
 
 def far_from(marks: Flags, reach: int) -> Flags:
-    """Return flags of samples more than ``reach`` samples away from every mark, shape (samples,)."""
+    """Return flags of samples more than ``reach`` samples away from every marked sample, shape (samples,)."""
     if not marks.any():
         return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))

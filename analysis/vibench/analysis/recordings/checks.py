@@ -19,7 +19,7 @@ from .facts import RecordingFacts
 
 
 class Verdict(StrEnum):
-    """Verdict of a check."""
+    """Verdict of a check of a recording."""
 
     PASSED = "passed"
     NOTE = "note"
@@ -30,7 +30,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Check:
-    """Result of one check."""
+    """Result of one check of a recording."""
 
     what: str
     verdict: Verdict
@@ -38,7 +38,7 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""Smallest share of its input range that a channel should use, so that the converter resolves the signal."""
+"""Smallest share of its input range that a channel should use, to be resolved by the converter."""
 _OFTEN_DARK = 0.01
 """Share of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
@@ -181,7 +181,7 @@ def _least_peak_v(facts: RecordingFacts) -> float:
         return 0.0
     try:
         generator = GeneratorConfig.model_validate(facts.bench.get("generator"))
-    except ValidationError:  # imported, or written by another version
+    except ValidationError:  # a recording that was imported, or written by another version
         return 0.0
     terminal_v = excitation.highest_amplitude_vpp / 2 * generator.terminal_factor()
     missed = cos(pi * min(0.5, excitation.band_hz[1] / facts.sample_rate_hz))

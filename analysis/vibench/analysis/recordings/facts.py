@@ -90,7 +90,7 @@ class RecordingFacts(RecordingDescription):
     measurement: Measurement
     channels: tuple[ChannelLevel, ...]
     overload_s: Mapping[str, float]
-    """Time near full scale [s], keyed by role; channels that never came near it are left out."""
+    """Time near full scale [s], keyed by role; channels that stayed below are left out."""
     dropouts: int
     """Number of vibrometer drop-outs, which every analysis bridges."""
     dropout_s: float

@@ -27,9 +27,9 @@ _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
 """Parameter beta of the Kaiser window; truncation errors of the integral are below 3e-5 above 5 Hz."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
-"""Samples on each side, and share of the sample rate up to which the fit errs by 1e-4 (2e-6 below 0.4)."""
+"""Derivative: samples on each side, and share of the sample rate up to which it errs by at most 1e-4."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
-"""Number of frequencies in the fit, and weight above the exact band, which only limits the gain there."""
+"""Derivative: number of fitted frequencies, and weight above the exact band, which limits the gain there."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
 """Smallest block, in kernel lengths and in samples; half a kernel more is read on either side."""
 
@@ -145,7 +145,7 @@ class ResponseChannel:
         return np.concatenate(parts)
 
     def dropouts(self, start: int, stop: int) -> tuple[Dropout, ...]:
-        """Return the drop-outs in these samples; only vibrometers have drop-outs."""
+        """Return the drop-outs between two samples; only vibrometers have drop-outs."""
         if not self._may_drop_out:
             return ()
         return BridgedChannel(self.recording, self.role).between(start, stop)
