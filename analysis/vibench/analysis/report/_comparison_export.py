@@ -28,7 +28,7 @@ class ExportKind(StrEnum):
     PDF = "pdf"
     CSV = "csv"
     HTML = "html"
-    """The report of the recordings."""
+    """Full report of the compared recordings."""
 
 
 def write_comparison(

@@ -163,11 +163,11 @@ class Drawing(Generic[A, L]):
     """Presentation of results of one kind: each result on a card, and several results in common figures."""
 
     figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
-    """Figures of a card; the first is visible, all others are folded."""
+    """Figures of a card; the first figure is visible, all other figures are folded."""
     findings: Callable[[Result[A, L]], Iterator[str]]
-    """Sentences: the main result first, then its statistics."""
+    """Sentences of a card: the main result first, then its statistics."""
     numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]
-    """Main numbers with bounds, the most important first."""
+    """Main numbers of a card with bounds, the most important first."""
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
     together: Callable[[Sequence[Result[A, L]]], Iterator[DrawnFigure]] = lambda _: iter(())
 
@@ -234,7 +234,7 @@ def _budget_numbers(result: AnyResult) -> Iterator[tuple[str, str]]:
 
 
 def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
-    """Yield the resonances, the base level, and the remaining budgets."""
+    """Yield the main numbers of noise: resonances, base level, and other uncertainty budgets."""
     budgets = budgets_of(noise)
     yield from ((each.quantity, each.text) for each in budgets if each.unit == "Hz")
     level = noise.analysis.response.base_level
@@ -244,7 +244,7 @@ def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
 
 
 def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
-    """Yield the onset of collisions and the budgets."""
+    """Yield the main numbers of a sweep: onset of collisions, and uncertainty budgets."""
     for region in sweep.analysis.collisions.regions[:1]:
         yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
     amplitude, *largest = _budget_numbers(sweep)
@@ -252,7 +252,7 @@ def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
 
 
 def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
-    """Yield the first tracked resonance, if any, the budgets, and the base amplitude."""
+    """Yield the main numbers of stepped sines: tracked resonance if any, budgets, and base amplitude."""
     for each in tracked_resonances(stepped.analysis.facts.feedback)[:1]:
         yield "phase resonance", f"{plus_minus(each.frequency_hz, 2 * each.u_frequency_hz)} Hz"
     yield from _budget_numbers(stepped)

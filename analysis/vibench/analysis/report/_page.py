@@ -60,7 +60,7 @@ class Card:
 
     name: str
     result: str
-    """Result in one sentence."""
+    """Result of the recording or of the group of claims in one sentence."""
     agreement: Agreement
     look_at: str
     """Warnings to read before the result is used."""
@@ -133,7 +133,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
 
 
 def _figures(page: Page) -> Iterator[DrawnFigure]:
-    """Yield all figures in the order of their numbers: unfolded figures first, then those in folds."""
+    """Yield all figures in the order of their numbers: unfolded figures first, then figures in folds."""
     yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
     yield from page.further.figures
     for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):

@@ -145,7 +145,7 @@ def edge_text(edge: Edge, instead: str) -> str:
 
 
 def _last(edge: Edge) -> str:
-    """Return the end of a region without bounds; it occurs by chance and differs in another run."""
+    """Return the end of a region without bounds; this end is random and differs between runs."""
     return f"{edge.frequency_hz:.1f} Hz in this run"
 
 

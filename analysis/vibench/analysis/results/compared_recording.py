@@ -101,7 +101,7 @@ def recorded_response(path: Path) -> RecordedLevel:
     Raises NotEnoughData when the recording is of another kind, or has a single frequency; RecordingError when
     the file is not a recording.
     """
-    with open_recording(path) as recording:  # before a long analysis
+    with open_recording(path) as recording:  # raise the error before a long analysis
         if family_of(recording.plan) in {"noise", "dwell"}:
             raise NotEnoughData(_NO_LEVEL.format(path.name))
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)

@@ -39,10 +39,10 @@ class _ChannelsSoFar(RecordedChannels):
 
     stretch: int = 1
     samples_so_far: int = 0
-    """Number of samples up to that time: of the stretch, or of all realisations."""
+    """Number of samples up to the requested time: of the stretch, or of all realisations."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the stretches up to that time."""
+        """Return the stretches up to the requested time."""
         found = super().stretches(label)
         if label == SegmentLabel.REALISATION:
             whole = [each for each in found if each.is_complete]

@@ -139,7 +139,7 @@ class _Played:
     """The parts of an excerpt over which densities are averaged."""
 
     stretches: tuple[Excerpt, ...]
-    """Parts with excitation, each at least one segment long."""
+    """Parts of the excerpt with excitation, each at least one segment long."""
     labels: tuple[str, ...]
     segment: int
     """Number of samples per segment."""
