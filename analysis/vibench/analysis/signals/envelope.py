@@ -19,7 +19,7 @@ class Envelope(Labelled):
     OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}
 
     time_s: Reals
-    """Centre of each bin."""
+    """Time at the centre of each bin."""
     lower: Reals
     upper: Reals
 

@@ -12,7 +12,7 @@ from ..errors import InvalidRequest
 from .arrays import Reals
 
 REACH = 32
-"""Samples on each side used for one value."""
+"""Number of samples on each side used for one interpolated value."""
 TRUSTED_BAND = 0.4
 """Fraction of the sample rate up to which the interpolation is exact to about 1e-9."""
 
@@ -66,7 +66,7 @@ def interpolate(samples: Reals, positions: Reals) -> Reals:
 
 
 _CLOSE = 0.125
-"""Distance of the interpolated values around a maximum, in samples; the parabola's error is at most 1e-6."""
+"""Spacing of the interpolated values around a maximum, in samples; the parabola's error is at most 1e-6."""
 
 
 def sizes_with_maxima(samples: Reals) -> Reals:

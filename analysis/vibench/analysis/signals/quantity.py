@@ -38,13 +38,13 @@ class ConvertedSignal:
     quantity: Quantity
     low_hz: float
     high_hz: float
-    """Lower and upper end of the kept band [Hz]."""
+    """Lower and upper end of the frequency band of the converted signal [Hz]."""
     edge_samples: int
-    """Number of disturbed samples at each end."""
+    """Number of samples at each end that the conversion disturbs."""
 
     @property
     def settled(self) -> Reals:
-        """Samples without the disturbed ends."""
+        """Converted samples without the disturbed ends."""
         return self.samples[self.edge_samples : self.samples.size - self.edge_samples]
 
 

@@ -44,7 +44,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: nearest intervals clearly without and clearly with collisions; ring-down widens them."""
+    """Bounds: nearest intervals clearly without and clearly with collisions; ring-down widens the bounds."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class CollisionRegion:
     DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
 
     start: Edge
-    """First edge in time, which has the higher frequency in a downward sweep."""
+    """First edge of the region in time, which has the higher frequency in a downward sweep."""
     stop: Edge
     reaches_start: bool
     """Whether the sweep started inside the region, so that ``start`` is the start of the sweep."""
@@ -90,7 +90,7 @@ class Collisions(Labelled):
     too_fast_hz: tuple[tuple[float, float], ...]
     """Frequency ranges in which collisions are not determined, because ringing may hide them."""
     noise_rms: float
-    """Noise from which the threshold is computed [m/s]."""
+    """Velocity noise from which the threshold of the residual is computed [m/s]."""
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
@@ -148,7 +148,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
 def _seen_impacts(sweep: SweptMotion) -> Flags:
     """Return flags of the intervals where order 2 or 3 shows impacts of an unknown specimen.
 
-    A mode that the drive has passed may still ring at twice or three times its frequency; ringing above
+    A mode that the drive has passed may still ring at twice or three times the drive frequency. Ringing above
     order 1 leaks into all orders.
     """
     hz, time_s = sweep.frequency_hz, sweep.time_s
@@ -192,7 +192,7 @@ def _merge_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
-    """Move the ends of a run, which the majority blurs, to the split with the fewest wrong intervals."""
+    """Move the ends of a colliding run, blurred by the majority, to the split with fewest wrong intervals."""
     half = votes // 2 + 1
     begin = _best_split(above, max(0, first - half), min(first + half, last))
     end = (
@@ -208,7 +208,7 @@ def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int
 
 
 def _best_split(above: Flags, low: int, high: int) -> int:
-    """Return the first interval of a region: fewest flags before it and fewest gaps after it."""
+    """Return the first interval of a region: fewest flags before and fewest gaps after it."""
     part = above[low : high + 1]
     before = np.concatenate(([0], np.cumsum(part)[:-1]))
     after = np.cumsum(~part[::-1])[::-1]

@@ -48,11 +48,11 @@ class Background:
     """Noise in a window of displacement."""
 
     rms_m: float
-    """RMS; NaN if it cannot be distinguished from motion."""
+    """RMS of the noise; NaN if it cannot be distinguished from motion."""
     frequency_hz: float
     """Rms frequency of the noise; a window has two independent noise values per cycle of this frequency."""
     source: str
-    """Source of the estimate, or the reason why there is none."""
+    """Source of the noise estimate, or the reason why there is none."""
 
     @property
     def is_rest(self) -> bool:
@@ -61,7 +61,7 @@ class Background:
 
     @property
     def is_known(self) -> bool:
-        """Return whether the noise is known."""
+        """Return whether the noise of the displacement is known."""
         return bool(np.isfinite(self.rms_m))
 
 
@@ -135,7 +135,7 @@ _LEAST_CYCLES = 4.0
 """Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
+"""Correlation of neighbouring blocks that random blocks (ten) exceed in one of a hundred records."""
 _ONCE = 0.5
 """Share of the variance at one cycle per record above which the change may continue after the record."""
 _BEYOND = 3.0
@@ -170,7 +170,7 @@ def slow_change(parts: Complexes | Reals) -> float:
 
 
 def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) -> Complexes:
-    """Return the complex amplitude at the drive frequency in blocks of a tenth of the window."""
+    """Return the complex amplitude at the drive frequency in ten equal blocks of the window."""
     block = max(window_samples // _BLOCKS_OF_WINDOW, round(_LEAST_CYCLES / cycles_per_sample))
     taper = np.hanning(block)
     taper *= 2 / np.sum(taper)
@@ -189,7 +189,7 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
 _LOWEST_ORDER = 0.1
 """High-pass frequency for displacement relative to the drive frequency, above drift and hum."""
 _BAND_ABOVE = 0.33
-"""Low-pass frequency relative to the sample rate."""
+"""Low-pass frequency for displacement relative to the sample rate."""
 _HIGHEST_ORDER = 0.45
 """Frequency of the highest order relative to the sample rate; aliases above it look like lower orders."""
 _SCATTER_BLOCKS = 10
@@ -203,7 +203,7 @@ _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 @dataclass(frozen=True)
 class Line:
-    """One line of a displacement spectrum."""
+    """One spectral line of a displacement."""
 
     DOCUMENT: ClassVar = "label frequency_hz amplitude_m sd_amplitude_m decibel_re_drive_line=decibel"
 
@@ -212,14 +212,14 @@ class Line:
     frequency_hz: float
     amplitude_m: float
     sd_amplitude_m: float
-    """Scatter over tenths of the window for orders, noise floor of the spectrum for peaks."""
+    """Uncertainty: scatter over tenths of the window for orders, noise floor of the spectrum for peaks."""
     decibel: float
-    """Level relative to the line at the drive frequency."""
+    """Level of the spectral line relative to the line at the drive frequency."""
 
 
 @dataclass(frozen=True)
 class DwellResponse(Labelled):
-    """Results of one dwell over its window."""
+    """Results of one dwell over its analysed window."""
 
     OWN_UNITS: ClassVar = {
         "order_displacement": "m",
@@ -248,7 +248,7 @@ class DwellResponse(Labelled):
     """Bias of Response I if all of the non-repeating part were noise; NaN if this part is too large."""
     rest_error_i: float
     rest_displacement_m: float
-    """RMS displacement of the part that does not repeat with the drive [m]."""
+    """RMS of the part of the displacement that does not repeat with the drive [m]."""
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
@@ -264,7 +264,7 @@ class DwellResponse(Labelled):
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """RMS displacement noise from this density, or noise measured without drive if larger [m]."""
+    """RMS displacement noise from the velocity noise, or measured without drive if larger [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags

@@ -47,15 +47,15 @@ class Section:
 
     drive_hz: float
     phase_rad: float
-    """Drive phase of the points; the drive is a cosine."""
+    """Drive phase of the Poincaré points; the drive is a cosine."""
     displacement_m: Reals
     velocity_m_per_s: Reals
-    """Displacement and velocity of the points, shape (periods,)."""
+    """Displacement and velocity of the Poincaré points, shape (periods,)."""
     orbit_displacement_m: Reals
     orbit_velocity_m_per_s: Reals
-    """Phase portrait over the same periods, shape (samples,)."""
+    """Phase portrait over the periods of the Poincaré points, shape (samples,)."""
     time_s: Reals
-    """Time of the points, from the first sample of the record; shape (periods,)."""
+    """Time of the Poincaré points, from the first sample of the record; shape (periods,)."""
 
 
 def stroboscope(
@@ -177,9 +177,9 @@ class IrregularMotion:
 
     start_s: float
     stop_s: float
-    """End, from the first sample of the dwell."""
+    """End of the irregular motion, from the first sample of the dwell."""
     ended: bool
-    """Whether a repeating motion followed the irregular one."""
+    """Whether a repeating motion followed the irregular motion."""
 
 
 def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
@@ -208,7 +208,7 @@ def _section(channels: Channels, response: DwellResponse) -> Section:
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:
-    """Return the Poincaré points and their noise, both relative to the size of the orbit."""
+    """Return the Poincaré points and their noise, each relative to the size of the orbit."""
     sizes = np.array(
         [
             np.sqrt(2 * np.mean(section.orbit_displacement_m**2)),
@@ -240,7 +240,7 @@ class TerminalLevel:
     rms_m: float
     relative_sd: float
     decibel: float
-    """RMS of the band relative to the line at the drive frequency."""
+    """RMS of the band relative to the spectral line at the drive frequency [dB]."""
 
 
 def terminal_levels(response: DwellResponse, towards_hz: tuple[float, ...]) -> tuple[TerminalLevel, ...]:
@@ -275,7 +275,7 @@ def terminal_levels(response: DwellResponse, towards_hz: tuple[float, ...]) -> t
 
 DwellPlan = Dwell | HeldDwell
 WINDOW_S = 5.0
-"""The paper's window: the last 5 s of a dwell."""
+"""Analysed window as in the paper: the last 5 s of a dwell."""
 _DWELL_EDGE_PERIODS = 121
 """Drive periods that integration disturbs, at both ends together."""
 _SHORTEST_WINDOW_PERIODS = 50
@@ -294,9 +294,9 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     terminal: tuple[TerminalLevel, ...]
     """Levels in the bands of the bound modes."""
     motion: DwellMotion
-    """Poincaré points and verdict."""
+    """Poincaré points of the dwell, and the verdict on its motion."""
     irregular: IrregularMotion | None
-    """Part of the motion that did not repeat; None if all of it repeats."""
+    """Part of the dwell in which the motion did not repeat; None if the whole motion repeats."""
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
@@ -342,7 +342,7 @@ def settled_envelope(response: DwellResponse) -> Envelope:
 _HIGHEST_ORDER = 2.4
 """Upper end of a shown spectrum relative to the drive frequency."""
 COLUMN_HZ = 1.0
-"""Width of a column [Hz], in which only the largest line is drawn: a figure has no more pixels."""
+"""Width of a column [Hz], in which only the largest spectral line is drawn: a figure has no more pixels."""
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:

@@ -32,24 +32,24 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 @dataclass(frozen=True)
 class Jump:
-    """One jump of a response."""
+    """Jump of a response in a sweep."""
 
     DOCUMENT: ClassVar = "frequency_hz lower_hz upper_hz time_s before after decibel"
 
     frequency_hz: float
     lower_hz: float
     upper_hz: float
-    """95 % bounds, including the neighbouring intervals."""
+    """95 % bounds of the frequency of the jump, including the neighbouring intervals."""
     time_s: float
     before: float
     after: float
     """Response before and after, in the order of time."""
     standard_errors: float
-    """Size of the step, divided by its standard error."""
+    """Size of the jump in ln(response), divided by its standard error."""
 
     @property
     def decibel(self) -> float:
-        """Size of the step; positive if the response grows with time."""
+        """Size of the step [dB]; positive if the response grows with time."""
         return float(20 * np.log10(self.after / self.before))
 
 
@@ -164,7 +164,7 @@ def _likely(logarithm: Reals) -> tuple[int, int, int]:
 def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, logarithm: Reals) -> Jump:
     best = places[1]
     between = [0.5 * float(frequency_hz[each - 1] + frequency_hz[each]) for each in places]
-    # The step lies within the interval before or after its boundary.
+    # The jump lies within the interval before or after its boundary.
     half = 0.5 * abs(float(frequency_hz[best] - frequency_hz[best - 1]))
     size, error = _steps(logarithm[max(0, best - 2 * _SIDE) : best + 2 * _SIDE])
     at = best - max(0, best - 2 * _SIDE)
@@ -193,7 +193,7 @@ class LevelJump:
     """Jump of Response II between two consecutive levels."""
 
     direction: str
-    """``"up"`` or ``"down"``: direction of the level."""
+    """``"up"`` or ``"down"``: direction in which the level is stepped."""
     before_vpp: float
     after_vpp: float
     factor: float
@@ -268,7 +268,7 @@ class Hysteresis(Labelled):
     down: Reals
     """Response II of the up sweep and of the down sweep."""
     differs: Flags
-    """Points where the sweeps differ by more than 1.5 dB, averaged over 2 % of the band."""
+    """Flags of points where the sweeps differ by more than 1.5 dB, averaged over 2 % of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]
     """Pairs of opposite jumps: (up sweep, nearest in the down sweep)."""
 

@@ -64,7 +64,7 @@ class SteppedResponse(Labelled):
     direction: tuple[str, ...]
     """Direction of each step, ``"up"`` or ``"down"``."""
     amplitude_vpp: Reals
-    """Setting of the generator [V]; NaN if feedback set it."""
+    """Generator voltage, peak to peak [V]; NaN if feedback set it."""
     drive_amplitude_m: Reals
     sd_drive_amplitude_m: Reals
     response_i: Reals
@@ -282,13 +282,13 @@ class TrackedResonance:
     """Resonance of a mode at one level of the base."""
 
     number: int
-    """Number of the level in the order of playing, from 0."""
+    """Number of the base level in the order of playing, from 0."""
     base_m_per_s2: float
     """Peak of the fundamental of the base acceleration."""
     frequency_hz: float
     """Frequency at which m0 lags the base by the requested phase."""
     u_frequency_hz: float
-    """Standard uncertainty, including the sensors' phase, which is common to all levels."""
+    """Standard uncertainty of the frequency, including the sensors' phase, which is common to all levels."""
     amplitude_m: float
     """Amplitude of m0 at the drive frequency, or at the resonant harmonic or subharmonic."""
     harmonic: int
@@ -296,7 +296,7 @@ class TrackedResonance:
     subharmonic: int
     """Number of drive periods in a period of m0."""
     mode_hz: float | None
-    """Natural frequency, fitted to both flanks; None if undetermined."""
+    """Natural frequency, fitted to both flanks of the resonance; None if undetermined."""
     u_mode_hz: float | None
     damping_ratio: float | None
 

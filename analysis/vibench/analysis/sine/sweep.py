@@ -35,7 +35,7 @@ _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
 _LEAST_SHARE = 0.5
-"""Minimum share of the channel's power within the drive's band."""
+"""Minimum share of the drive channel's power within the band of the drive."""
 
 
 @dataclass(frozen=True)
@@ -115,13 +115,13 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Difference of the largest Response II from linear simulation, relative, up to which both agree."""
+"""Relative difference of the largest Response II from linear simulation up to which both agree."""
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
 """Periods of the band's lower edge in which a bridge's error of three times the motion decays to 2 %."""
 _ROOM = 1.1
-"""Factor on the length of longer intervals, because the first may start slightly below the band."""
+"""Factor on the length of longer intervals; the first interval may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference with unit gain for white noise, which removes the smooth motion."""
@@ -174,7 +174,7 @@ class SweptMotion(Labelled):
     linear_ii: Reals
     """Response II, simulated without contact in this sweep, including ringing."""
     linear_impacts: Reals
-    """Orders 2 and 3 relative to order 1 in the same simulation: modes may ring at twice the drive."""
+    """Orders 2 and 3 relative to order 1 without contact; modes may ring at twice the drive."""
     steady_over_swept: float
     """Largest Response II without contact for steady sines, divided by the largest in this sweep. NaN if the
     measured Response II differs, for example while the specimen still rings."""

@@ -77,7 +77,7 @@ _NEAR = 12
 
 
 _BEHIND_STEPS = 1.5
-"""Tolerance in steps: a stepped sweep lags by up to half a step; measuring adds up to another half."""
+"""Tolerated lag in steps: a stepped sweep lags by up to half a step; measuring adds up to another half."""
 _LAST = 5
 """Number of intervals that are checked at the end of a sweep."""
 
@@ -193,7 +193,7 @@ def _corrected(found: M, channels: Channels, first_s: float) -> M:
 
 
 _SAME = 1e-3
-"""Relative tolerance of a frequency; two clocks differ by a tenth of this."""
+"""Relative tolerance of a frequency; two clocks differ by a tenth of this tolerance."""
 
 
 def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:

@@ -39,7 +39,7 @@ class SpectralAverages:
     window_energy: float
 
     def frequency_hz(self, sample_rate_hz: float) -> Reals:
-        """Return the frequencies of the lines, from 0 Hz [Hz]."""
+        """Return the frequencies of the spectral lines, from 0 Hz [Hz]."""
         return np.asarray(fft.rfftfreq(self.segment_samples, 1 / sample_rate_hz)[: self.products.shape[-1]])
 
     def density(self, first: int, second: int, sample_rate_hz: float) -> Complexes:
@@ -174,7 +174,7 @@ class SpectralDensity(Labelled):
     """Spectral density [unit^2 / Hz]."""
     lower: Reals
     upper: Reals
-    """Bounds of each line that contain the true value with probability ``confidence``."""
+    """Bounds of each spectral line that contain the true value with probability ``confidence``."""
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float
@@ -261,12 +261,12 @@ class AmplitudeSpectrum(Labelled):
 
     @property
     def amplitude(self) -> Reals:
-        """Peak amplitude of each line, |value| [unit]."""
+        """Peak amplitude of each spectral line, |value| [unit]."""
         return np.abs(self.value)
 
     @property
     def spacing_hz(self) -> float:
-        """Spacing of the lines [Hz]."""
+        """Spacing of the spectral lines [Hz]."""
         return self.sample_rate_hz / self.samples
 
     def converted(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
@@ -322,7 +322,7 @@ class Spectrogram(Labelled):
     frequency_hz: Reals
     """Frequency of each row, shape (rows,)."""
     amplitude: Reals
-    """Peak amplitude of a sine with the same power, shape (rows, columns)."""
+    """Peak amplitude of a sine with the power of each cell, shape (rows, columns)."""
     resolution_hz: float
     """Width of the window's main lobe at half power."""
     noise_bandwidth_hz: float

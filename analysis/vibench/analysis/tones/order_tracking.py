@@ -18,7 +18,7 @@ ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
 """Orders with thirds and high harmonics, which need intervals of twelve drive cycles."""
 _LARGEST_DENOMINATOR = 12
 _BATCH_INTERVALS = 256
-"""Intervals solved at once, about 10 MB."""
+"""Number of intervals that are fitted at once, about 10 MB."""
 
 
 def order_label(order: float) -> str:

@@ -18,7 +18,7 @@ from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spec
 from .order_tracking import tracked_orders
 
 _NOISE_NEIGHBOURS = 50
-"""Number of lines on each side of a peak whose median is the noise floor."""
+"""Number of spectral lines on each side of a peak whose median is the noise floor."""
 _LEAST_RATIO = 5.0
 """Smallest ratio of a peak to the noise floor."""
 _MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
@@ -31,11 +31,11 @@ class Peak:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """Standard deviation [Hz], from the noise around the peak; zero without noise."""
+    """Standard deviation of the frequency [Hz], from the noise around the peak; zero without noise."""
     amplitude: float
     """Amplitude of the peak, corrected for its position between lines [unit of the spectrum]."""
     floor: float
-    """Median amplitude of the lines around the peak [unit of the spectrum]."""
+    """Median amplitude of the spectral lines around the peak [unit of the spectrum]."""
 
 
 def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
@@ -204,7 +204,7 @@ class NoiseDriveLevel:
     """RMS acceleration of the base [m/s2]."""
     rms_displacement_m: float
     relative_sd: float
-    """Relative standard deviation of both rms values, from independent averages and lines."""
+    """Relative standard deviation of both rms values, from independent averages and spectral lines."""
 
 
 def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: float) -> DriveLevel:
@@ -256,7 +256,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
 _REACH_SD = 7.0
 """Noise beyond this many standard deviations is neglected (1e-12 per sample)."""
 _GRID = 141
-"""Number of points, ten per standard deviation; the integration error is 1e-3 standard deviations."""
+"""Number of integration points, ten per standard deviation; the error is 1e-3 standard deviations."""
 
 
 class NoiseLift(NamedTuple):
