@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 10
 _PLAIN = (1e-5, 1e7)
-"""Range of magnitudes that are written without a power of ten."""
+"""Range of absolute values of numbers that are written without a power of ten."""
 
 
 def plus_minus(value: float, half_width: float) -> str:
@@ -54,7 +54,7 @@ class Table:
     columns: tuple[tuple[str, tuple[float | str, ...]], ...]
 
     def column(self, heading: str) -> tuple[float | str, ...]:
-        """Return the column with this heading."""
+        """Return the table column with this heading."""
         return dict(self.columns)[heading]
 
 
@@ -175,7 +175,7 @@ UNITS = {
 }
 """Unit of a value, keyed by the suffix of its name; the longest matching suffix counts."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
-"""Names of independent variables; the first of these in a result is its coordinate."""
+"""Names of independent variables; the first of these names in a result gives the coordinate of its arrays."""
 
 
 class Labelled:

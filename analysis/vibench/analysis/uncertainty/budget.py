@@ -49,7 +49,7 @@ class Contribution:
     relative: float | None
     """Relative standard uncertainty; None if not stated."""
     source: str
-    """Source of the value, or the information that is missing."""
+    """Source of the uncertainty's value, or the information that is missing."""
 
     def __post_init__(self) -> None:
         if self.relative is not None and not 0.0 <= self.relative < np.inf:

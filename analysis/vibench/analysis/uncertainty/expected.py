@@ -48,10 +48,10 @@ from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, St
 from .quantities import of_one_draw
 
 STEADY = 1e-4
-"""Relative scatter below which a simulated motion repeats."""
+"""Relative scatter below which a simulated motion counts as repeating."""
 _SETTLED_S = 2.5
 _EDGE_PERIODS = 80
-"""Drive periods at each end that integration disturbs."""
+"""Drive periods at each end of a window that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
 """Difference of runs, in standard errors, above which they are on different motions."""
@@ -326,7 +326,7 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
     time_s = sum(each.recorded_s or 0.0 for each in notes)
     try:
         expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
-    except ValidationError:  # imported, or written by another version
+    except ValidationError:  # a recording that was imported, or written by another version
         expected_s = None
     forecast = "no time was predicted" if expected_s is None else f"{expected_s:.3g} s were predicted"
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
@@ -490,7 +490,7 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
 
 @dataclass(frozen=True)
 class TimeShare:
-    """Recording time of one measurement."""
+    """Recording time of one measurement of a campaign."""
 
     name: str
     planned_s: float

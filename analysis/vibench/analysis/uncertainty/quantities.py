@@ -22,10 +22,10 @@ from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_un
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
 _ALIKE = 1e-12
-"""Relative difference of maxima up to which it is only rounding error."""
+"""Relative difference of maxima that counts as rounding error."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Chance that is not stated: of a maximum, or of a 0.1 s interval of a sweep, without draws of the twin."""
+"""Chance that is not stated without draws of the twin: of a maximum, or of a 0.1 s interval of a sweep."""
 _ENDS = 2
 """Number of intervals at each end of a sweep; a largest value there depends on where intervals begin."""
 _PEAKED = 1.05
