@@ -23,7 +23,7 @@ PUSH, PUSHED_HZ = 1e-6, 260.0
 
 
 class ExponentsBy(StrEnum):
-    """Method for exponents; responses always use the exact motion."""
+    """Method for Lyapunov exponents; responses always use the exact motion."""
 
     EXACT = "exact"
     ODE45 = "ode45"
@@ -123,13 +123,13 @@ class Alternative:
 
 
 def together(*alternatives: Alternative) -> Alternative:
-    """Return an alternative that combines several."""
+    """Return an alternative that combines the options of several."""
     changes = {key: value for each in alternatives for key, value in each.changes.items()}
     return Alternative(", ".join(each.name for each in alternatives), changes)
 
 
 def damping(damping_time_s: float) -> Alternative:
-    """Return an alternative with another c_i / k_i."""
+    """Return an alternative with another damping time c_i / k_i."""
     changes = {"damping_time_s": damping_time_s, "damping_ratio": None}
     return Alternative(f"c = {damping_time_s:.3g} s · k", changes)
 

@@ -144,7 +144,7 @@ class Finding:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The numbers from rest."""
+        """Numbers of the claim for the motion from rest."""
         return self.draws[0]
 
     @property

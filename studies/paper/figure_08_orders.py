@@ -15,5 +15,5 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 
 
 def draw(options: FigureOptions, results: StudyResults) -> DrawnFigure:
-    """Draw the rates over the amplitude."""
+    """Draw the similarity rates over the amplitude."""
     return rates_figure("figure_8", "Figure 8: similarity of several orders", _MODELS, options, results)

@@ -52,7 +52,7 @@ class FigureOptions:
     threshold: float = SIMILARITY_THRESHOLD
     duration_s: float = 30.0
     window_s: float = 5.0
-    """The paper's window: the last 5 s of 30 s from rest."""
+    """Observed window as in the paper: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
     """Time for runs from further initial states; zero, because each point of the paper is one run."""
 

@@ -39,13 +39,13 @@ class Reproduction:
     scores: tuple[DampingScore, ...]
     tables: tuple[ReportTable, ...]
     options: str
-    """The defaults, in words."""
+    """The default options, in words."""
     made_with: str
     """Versions and computing time."""
 
     @property
     def judgements(self) -> tuple[Judgement, ...]:
-        """Judgements of all sections."""
+        """Judgements of the claims in all sections."""
         return tuple(each for section in self.sections.values() for each in section)
 
     def count(self, verdict: Verdict) -> int:
@@ -191,7 +191,7 @@ def _values(claim: Claim, found: Finding) -> str:
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
-    """Return one number, with its range over several starts."""
+    """Return one number, with its range over several initial states."""
     value = f"{wanted.name}: {wanted.shown(found.values[number])}"
     low, high = (wanted.shown(each, "") for each in found.spread(number))
     return value if low == high else f"{value} ({low} to {high})"

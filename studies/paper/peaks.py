@@ -10,7 +10,7 @@ from .responses import Reals, linear_transmissibility
 LEAST_PROMINENCE = 2.0
 """Smallest ratio of a peak to the minimum beside it; chaos scatters Response I by some per cent."""
 _FINE_POINTS = 60_000
-"""Number of frequencies, 0.01 Hz apart."""
+"""Number of frequencies, 0.01 Hz apart, at which peaks without contact are searched."""
 
 
 def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:

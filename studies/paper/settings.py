@@ -33,7 +33,7 @@ class DampingScore:
 
 
 def holds_from_rest(claim: Claim, evidence: Evidence, case: Case) -> bool:
-    """Return whether a claim holds from rest."""
+    """Return whether a claim holds for the motion from rest."""
     return finding(replace(claim, draws=1), evidence, case).is_met
 
 
@@ -91,7 +91,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")
         top.set_ylim(0, count)
         top.set_ylabel(f"claims that hold, of {count}")
-        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # before plotting: margins depend on it
+        low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # before plotting: margins depend on the scale
         for values, label, colour, marker in (
             (weak, "1 µm: near zero in the paper", report.LEVELS[0], "o"),
             (moderate, "5 µm: above 100 in the paper", report.SIMULATED, "s"),

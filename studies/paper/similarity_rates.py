@@ -36,7 +36,7 @@ def compare_model(
 def rates_figure(
     name: str, title: str, models: Sequence[str], options: FigureOptions, results: StudyResults
 ) -> report.DrawnFigure:
-    """Draw the rates of several models over amplitude."""
+    """Draw the similarity rates of several models over amplitude."""
     columns: dict[str, Reals] = {"amplitude_m": np.asarray(AMPLITUDES_M)}
     with report.styled():
         figure = report.new_figure(3.3)

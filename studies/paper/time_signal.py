@@ -31,7 +31,7 @@ class TimeSignal:
     upper: Reals
     frequency_hz: Reals
     amplitude: Reals
-    """Amplitude of each line over the window, over A0; shape (lines,)."""
+    """Amplitude of each spectral line of the window, over A0; shape (lines,)."""
 
 
 def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> TimeSignal:
