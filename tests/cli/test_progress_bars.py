@@ -6,7 +6,8 @@ from threading import Event
 from rich.console import Console
 from rich.progress import Progress
 
-from vibench.cli.progress_bars import LINE_INTERVAL_S, show_bars
+from vibench.cli.progress_bars import LINE_INTERVAL_S, _bar, progress_line, show_bars
+from vibench.sim.background import Progress as Stage
 
 
 class Log(io.StringIO):
@@ -33,6 +34,15 @@ def test_without_a_terminal_progress_is_printed_as_lines():
         assert log.written.wait(10.0)
     # The time distinguishes slow work from a program that hangs.
     assert log.getvalue().splitlines()[-1] == "progress: noise 15 of 60 (25 %); opening, after 0 s"
+
+
+def test_a_stage_of_unknown_length_shows_no_numbers_of_the_stage_before():
+    bars = Progress(console=Console(file=io.StringIO()))
+    with _bar(bars, "opening", None) as draw:
+        draw(Stage(15, 60, 1.0, ""))
+        assert progress_line(bars) == "opening 15 of 60 (25 %)"
+        draw(Stage(0, 0, None, "simulating"))
+        assert progress_line(bars) == "simulating"
 
 
 def test_work_under_ten_seconds_prints_no_progress():

@@ -65,7 +65,8 @@ def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
 
         def draw(progress: Progress) -> None:
             if not progress.of:
-                bars.reset(bar, total=None, description=progress.note)
+                bars.tasks[0].total = None  # reset alone keeps the total of the previous stage
+                bars.reset(bar, description=progress.note)
                 return
             left = "" if progress.left_s is None else f"{_duration(progress.left_s)} left"
             left += f", {progress.note}" if progress.note else ""

@@ -78,7 +78,7 @@ def overlay(
     source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
     row = ANALYSES[analysis.excitation.kind]
     found = drawn(source, row.draws(analysis), row.compared(analysis))
-    stage("predicting the response to sines")
+    stage("comparing with the simulation")
     model_overlay: AbstractOverlay[Any] = row.lay(analysis, found)
     return model_overlay
 
