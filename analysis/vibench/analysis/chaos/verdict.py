@@ -372,7 +372,7 @@ def _verdict(
         return _noisy(evidence, noise_test)
     if not bent_test.rejects_linear_noise:
         return _undecided(
-            f"noise after a static nonlinearity also explains the points (p = {bent_test.p:.2f})",
+            f"noise after a static nonlinearity also fits the points (p = {bent_test.p:.2f}); record longer",
             evidence,
         )
     if test.is_oversampled:
@@ -382,7 +382,7 @@ def _verdict(
             evidence,
         )
     if test.k < CHAOTIC_K:
-        return _undecided(f"the 0-1 test gives {test.k:.2f}, neither regular nor chaotic", evidence)
+        return _undecided(f"0-1 test: {test.k:.2f}, neither regular nor chaotic; record longer", evidence)
     above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
     why = (
         f"settled points, {above}not on a closed curve; the 0-1 test gives {test.k:.3f}, and linear noise "
