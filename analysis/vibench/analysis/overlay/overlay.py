@@ -272,7 +272,7 @@ def dwell_quantities(
     columns_hz, size = spectrum_columns(response)
     bands = (
         Quantity(
-            f"band around {each.towards_hz:.0f} Hz, re the drive's line",
+            f"band around {each.towards_hz:.0f} Hz, relative to the line of the drive",
             np.array([each.towards_hz]),
             np.array([ratio if (ratio := 10 ** (each.decibel / 20)) > _LEAST_BAND else np.nan]),
             state,
