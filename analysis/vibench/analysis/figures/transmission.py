@@ -178,8 +178,8 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
     if overlay is not None:
         sentences.append(
             f"{run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
-            f"The blue curve is Response I to sines, {overlay.amplitude_basis}; "
-            f"it has another excitation and is not a fit."
+            f"The blue curve is the predicted Response I to sines instead of noise "
+            f"({overlay.amplitude_basis}); it is not fitted."
         )
     return " ".join(sentences)
 

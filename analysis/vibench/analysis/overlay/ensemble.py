@@ -173,8 +173,8 @@ class EnsembleCurve(Labelled):
         worst_hz = self.frequency_hz[np.nanargmax(np.abs(self.z))]
         return (
             f"{self.name}: {100 * self.share_in_band:.0f} % of {self.compared} values within the twin's 95 % "
-            f"band, largest |z| {abs(self.largest_z):.1f} at {worst_hz:.4g} Hz, {verdict} the limit "
-            f"of {self.limit:.1f}"
+            f"band, largest |z| {abs(self.largest_z):.1f} standard deviations at {worst_hz:.4g} Hz, "
+            f"{verdict} the limit of {self.limit:.1f}"
         )
 
     @cached_property

@@ -256,7 +256,7 @@ def measured_table(facts: RecordingFacts) -> ReportTable:
     rows = (
         ("excitation", excitation_text(plan.excitation.model_dump(mode="json"))),
         ("ramps", f"{plan.ramp_s:g} s, half cosine"),
-        ("started", f"{facts.started_utc} UTC"),
+        ("started", f"{facts.started_utc[:19].replace('T', ' ')} UTC"),
         ("length", f"{facts.duration_s:.2f} s, {facts.sample_rate_hz:.6g} samples/s"),
         ("ended", f"{facts.state.value}{reason}"),
         ("file", f"{facts.path.name}, id {facts.recording_id}"),
