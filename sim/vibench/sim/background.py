@@ -199,7 +199,7 @@ class Pool:
                     _call_back(job, kind, value)
 
     def _lose(self, worker: "Worker", error: BaseException) -> None:
-        if worker in self.workers:  # false if a callback has closed the pool
+        if worker in self.workers:  # unless a callback has closed the pool
             self.workers.remove(worker)
             worker.end()
             if worker.job is not None:
@@ -291,7 +291,7 @@ def _serve(connection: Any) -> None:
             dropped = Event()
             done = executor.submit(_pack_answer, work, partial(_tell, connection), dropped.is_set)
             done.add_done_callback(partial(_send_answer, connection))
-    os._exit(0)  # the parent has ended
+    os._exit(0)  # the parent process has ended
 
 
 def _tell(connection: Any, part: object) -> None:
@@ -304,7 +304,7 @@ def _pack_answer(work: Callable[..., Any], *asker: Callable[..., Any]) -> bytes:
 
 def _send_answer(connection: Any, done: Future[bytes]) -> None:
     error = done.exception()
-    with suppress(OSError):  # the parent has ended
+    with suppress(OSError):  # the parent process has ended
         if error is None:
             connection.send_bytes(done.result())
         else:

@@ -51,7 +51,7 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     The first points are the successive results of `refine_scene`, until the target is met. Raises ValueError
     when the scene has no target, or cannot be simulated.
     """
-    next(refine_scene(scene))  # not timed: includes work done only once per process
+    next(refine_scene(scene))  # not timed: the first solution includes work done once per process
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)

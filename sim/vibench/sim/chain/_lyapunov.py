@@ -87,7 +87,7 @@ def chain_lyapunov_exponent(
             f"it must be finite and contain {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
     tables = chain_tables(chain, drive, accuracy)
-    # The work limit applies to the sum of both motions.
+    # The limit of the computing work applies to the sum of both motions.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz

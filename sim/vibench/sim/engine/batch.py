@@ -91,7 +91,7 @@ def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
     places = rng.uniform(-1.0, 1.0, (count, VARIABLES))
-    # Place more collisions near the ends of the ranges, like Chebyshev points.
+    # Draw more collisions near the ends of the variables' ranges, like Chebyshev points.
     places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
     variables = middle + half * places
     solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
@@ -173,7 +173,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
         misfit = (powers * free[:, None, :]).sum(axis=2) - np.einsum("nm,nmi->ni", weights, pushed)
         misfit[:, :POINTS] -= depths
         slopes = np.empty((len(depths), POINTS + 1, POINTS + 1))
-        # Later integrals are small: the Jacobian neglects them, the residual includes them.
+        # Higher time integrals of the force are small: only the residual includes them.
         slopes[:, :, :POINTS] = -np.einsum("nm,mki->nik", weights[:, 1:4], SHARES[1:4])
         slopes[:, :, :POINTS] *= (1.5 * HALF_FORCE * root)[:, None, :]
         slopes[:, range(POINTS), range(POINTS)] -= 1.0

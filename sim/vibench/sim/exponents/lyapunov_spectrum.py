@@ -168,7 +168,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
         return _Taken(
             decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
         )
-    # A motion that settles late leaves too little time. Average at least over the second half of the run.
+    # A motion that settles late leaves little time to average. Use at least the second half of the run.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]
     means = [_mean(each) for each in rates.T]

@@ -57,7 +57,7 @@ class MapPoints(Points):
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Check here and not in the plan, because files of earlier versions contain such maps.
+        # Refuse such maps here and not in the plan, because files of earlier versions contain them.
         of_start = [each.field for each in plan.varied if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(

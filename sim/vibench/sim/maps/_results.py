@@ -70,7 +70,7 @@ class Audit:
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            # An audit without cells gives no information about the filled-in cells.
+            # Without audited cells, nothing is known about errors of the filled-in cells.
             come, gone = (
                 wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
                 for each in (gained, lost)

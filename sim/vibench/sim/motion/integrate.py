@@ -159,7 +159,7 @@ def integrate(
     else:
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
-    # Rounding may place the last sample time just after the end.
+    # Rounding may place the last sample time just after the end of the run.
     states = record.all_samples(run.motion) if is_whole else record.samples
     return Trajectory(
         time_s=start_time_s + np.arange(len(states)) / rate_hz,

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-assert sys.platform != "win32"  # for the type checker
+assert sys.platform != "win32"  # lets the type checker skip this module for Windows
 
 
 def open_to_write(path: Path) -> int:
@@ -27,12 +27,12 @@ def open_for_all(path: Path) -> int:
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         descriptor = os.open(path, os.O_RDWR | flags)
-    except PermissionError:  # reading is enough to lock a file
+    except PermissionError:  # a file that is open for reading can be locked
         descriptor = os.open(path, os.O_RDONLY | flags)
     except FileNotFoundError:
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | flags, 0o666)
-        except FileExistsError:  # created meanwhile
+        except FileExistsError:  # another process has created the file meanwhile
             return open_for_all(path)
         # The sticky bit protects a file from automatic deletion (systemd-tmpfiles, XDG base directories).
         for mode in (0o666, 0o1666):
@@ -118,7 +118,7 @@ def bound_memory(most_bytes: int) -> None:
 def usual_state_folder() -> Path:
     """Return vibench's folder inside the operating system's folder for user-specific program state."""
     home = Path.home()
-    linux = home / ".local" / "state" / os.environ.get("XDG_STATE_HOME", "")  # not in the current folder
+    linux = home / ".local" / "state" / os.environ.get("XDG_STATE_HOME", "")  # never in the current folder
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
 
 

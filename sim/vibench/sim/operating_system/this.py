@@ -97,9 +97,9 @@ def sync_file(path: Path) -> None:
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
     """Yield a path for a new file that finally replaces ``path``; after an error the old file stays."""
-    target = path.resolve()  # follow a link, do not replace it
+    target = path.resolve()  # replace the target of a link, not the link
     if target.exists():
-        target.open("r+b").close()  # raises OSError if write-protected
+        target.open("r+b").close()  # raises OSError if the file is write-protected
     coming = target.with_name(f"{target.name}.{os.getpid()}.coming")
     try:
         yield coming
@@ -165,7 +165,7 @@ def state_folder() -> Path:
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except OSError as error:  # for example, a file has that name
+    except OSError as error:  # for example, a file has the name of the folder
         refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
         refused.add_note(f"{VARIABLE} sets another folder for locks, bench checks, measured run times")
         raise refused from error

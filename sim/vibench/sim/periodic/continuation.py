@@ -222,7 +222,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # Move along this curve to the start: a point of another curve may be equally close.
+    # Move along this curve to its first point: a point of another curve may be equally close.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
@@ -286,7 +286,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: if the same end is kept twice, halve its value so that it will move too.
+        # Illinois method: if an end of the interval stays twice, halve its value so that it will move too.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0

@@ -204,7 +204,7 @@ def _force_harmonics(
     turning = 1j * omega * harmonics[None, :]
     holomorphic = stiffness_lines[difference] + turning * damping_lines[difference]
     conjugate = stiffness_lines[total] - turning * damping_lines[total]
-    # The mean has no conjugate partner, so it counts once and not as half of a pair.
+    # The mean (harmonic 0) has no conjugate partner, so it counts once and not as half of a pair.
     once = np.where(harmonics == 0, 0.5, 1.0)[:, None]
     return ForceHarmonics(
         force=phasors_of(spring.force(p, rate))[harmonics],

@@ -247,7 +247,7 @@ def _damped_step(
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
     """Return the periodic motion from ``state`` with its responses; ``gone`` is the scaled closure error."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # NaN after the end of a run that failed
+    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # the responses are NaN if the run failed
     moved[: len(run.states)] = run.states[: len(moved)]
     waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
@@ -281,7 +281,7 @@ def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
         cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
-            # Both extremes, in a form without cancellation; those outside the interval are ignored.
+            # Both extremes of each cubic, without cancellation; extremes outside the interval are ignored.
             places = np.stack([-first / (square + root), -first / (square - root)])
         inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
         tops = start + inside * (first + inside * (square + inside * cubic))
@@ -331,7 +331,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
     dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
     nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
     rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
-    # Take the speed at the last sample before each contact.
+    # Take the approach speed at the last sample before each contact.
     places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
     slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
     return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))

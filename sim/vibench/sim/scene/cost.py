@@ -82,7 +82,7 @@ class Expected:
         time_s, factor = self.time_s, self.factor
         learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
         text = f"{time_s:.1g} s within a factor of {factor:.2g}"
-        if factor > 10.0:  # a central value would mislead
+        if factor > 10.0:  # with this uncertainty, a central value would mislead
             text = f"between {time_s / factor:.1g} and {time_s * factor:.1g} s"
         return f"Estimated time on one core: {text}, from {learnt} on this machine."
 
@@ -252,7 +252,7 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
         return taken_s
     if report.needed_s is not None:
         return min(limit_s, report.needed_s[0])
-    # Without a requested error, the whole time limit is used.
+    # Without a requested error, a scene uses its whole time limit.
     return limit_s if scene.target.error is None else min(limit_s, UNDECIDED * taken_s)
 
 

@@ -101,7 +101,7 @@ class FixedCourse:
             seen = replace(seen, window=whole, leaked=leaked)
         has_settled = self.way is not None and self.way.repeats is not None
         path = lead if has_settled else (*lead, last, *window.stretches)
-        # The settling time was not determined.
+        # The run did not determine the time at which the motion settled.
         return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
@@ -297,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have become quasi-periodic motion. This does not repeat either, but its growth is zero.
+        # Chaos may have become quasi-periodic, which does not repeat either, but whose growth is zero.
         run.follow_tangent()
         begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
         last = [

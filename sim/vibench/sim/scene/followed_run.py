@@ -224,7 +224,7 @@ class FollowedRun:
             area_x=record.area_x,
             area_p=record.area_p,
             samples=kept,
-            # Rounding may place the last samples just after the end.
+            # Rounding may place the last samples just after the end of the stretch.
             states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )

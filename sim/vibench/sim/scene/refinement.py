@@ -268,7 +268,7 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The parts follow the nominal cost, which is the same on every machine, unless it is far too low.
+            # The nominal cost, which is the same on every machine, sets the length, unless far too low.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
@@ -302,7 +302,7 @@ class _Refinement:
         elif len(near) > 0 and not now < path.distance:
             path.closest = 0.3 * float(changes[near[0]])
             known = self._nearest(recent[-1], KNOWN * size)
-            # A motion that stops approaching a known motion may be near another, such as its mirror image.
+            # A run that stops approaching a known motion may be near another one, such as a mirror image.
             is_new = known is not None and known is not path.orbit
             path.orbit = (known if is_new else self._newton(path.run, int(near[0]) + 1)) or path.orbit
             now = self._away_from(path.orbit, recent[-1], size)

@@ -138,11 +138,11 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Time for which a non-repeating motion is then integrated with a tangent vector, to classify it.
+        # Time for which a non-repeating motion is finally integrated with a tangent vector, to classify it.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
-        # Simulated time at the end of the first round; it doubles with each round.
+        # Simulated time at the end of the first round; the time doubles with each round.
         self._first_s = min(first_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]

@@ -94,7 +94,7 @@ def stated_errors(
         Function that integrates other starts.
     """
     answer = seen.window.responses_m
-    # The stricter run may not repeat yet. Its lines are then taken over another length, so add the leakage.
+    # The stricter run may not repeat yet; its spectral lines then have another length, so add the leakage.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -224,7 +224,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Take the lines over as many drive periods as in the original run.
+    # Take the spectral lines over as many drive periods as in the original run.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 

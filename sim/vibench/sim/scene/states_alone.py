@@ -100,7 +100,7 @@ class StatesAlone:
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
             goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
-            # The last part, up to a period, is integrated without a check.
+            # The last part of the run, shorter than a period, is integrated without a check for repetition.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self.note(stretch)

@@ -164,7 +164,7 @@ class _Resampling:
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
             mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
-            # Band: 1 up to 0.45 cycles per sample, then a cosine edge to 0 at half a cycle per sample.
+            # Band filter: gain 1 up to 0.45 cycles per sample, then a cosine edge to 0 at half a cycle.
             edge = ((frequency_hz / self._sample_rate_hz) - _PASS_PART) / (0.5 - _PASS_PART)
             band = np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
             if gain is None:

@@ -322,7 +322,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     path = folder / specimen
     try:
         is_there = path.exists()
-    except OSError:  # no file can have such a name
+    except OSError:  # no file can have such a name on this system
         is_there = False
     if not is_there:
         raise ValueError(
@@ -371,7 +371,7 @@ def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], table: Ma
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
-    except ValidationError:  # the specimen is refused elsewhere
+    except ValidationError:  # an invalid specimen is refused elsewhere
         return
     for name, (kept, direct) in zip(("stiffnesses", "dampings"), ALTERNATIVES, strict=True):
         old, new = getattr(before, name), getattr(now, name)

@@ -80,7 +80,7 @@ def make_file(path: Path, plan: layout.GridPlan) -> None:
     Raises StudyError when the file exists, the folder does not exist, or the disk is too full.
     """
     try:
-        path.open("xb").close()  # of two runs at the same time, only one can create the file
+        path.open("xb").close()  # if two runs start at the same time, only one can create the file
     except FileExistsError:
         raise StudyError(
             f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."

@@ -371,7 +371,7 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Measure the speed of the workers from the first results on, because workers need time to start.
+            # Measure the workers' speed from the first results on, because workers need time to start.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:

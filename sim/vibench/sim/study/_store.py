@@ -49,7 +49,7 @@ def put(
         if column.name in answer.cells:
             values = arrays[column.name]
             values[answer.number] = answer.cells[column.name]
-            # A slice keeps the padding of text, which numpy removes from a single value.
+            # Take a slice: numpy removes the padding of text from a single value, but not from a slice.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
