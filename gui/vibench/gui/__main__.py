@@ -41,7 +41,7 @@ def display_trouble() -> str:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - tests whether Qt can be loaded
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # A variable, because a type checker for another operating system would call the rest unreachable.
+    # Use a variable: type checkers for other systems would call the rest of the function unreachable.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""

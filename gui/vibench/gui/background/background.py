@@ -18,7 +18,7 @@ Answer = TypeVar("Answer")
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
     """Call ``step`` in the next pass of the event loop, so that drawing and input are handled first."""
-    # Not 0 ms: Qt would then call two steps before it serves another timer.
+    # Do not wait 0 ms: Qt would then call two steps before it serves another timer.
     QTimer.singleShot(1, receiver, step)
 
 
@@ -104,7 +104,7 @@ class LatestRequest(QObject, Generic[Question, Answer]):
 
     def _answered(self, answer: Answer) -> None:
         self._job = None
-        if not isValid(self):  # its page was deleted meanwhile
+        if not isValid(self):  # the page of this request was deleted meanwhile
             return
         if self._wanted is None:
             self._on_answer(answer)

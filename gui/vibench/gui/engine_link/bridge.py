@@ -277,7 +277,7 @@ class Bridge(QObject):
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
             self.rig, request, self.status = found
             self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._emit_news(self.status)  # show these messages now, not at the next tick
+            self._emit_news(self.status)  # show the engine's messages now, not at the next tick
             self.adopted.emit(request)
 
         self._order(_adopt, keep)

@@ -97,7 +97,7 @@ def _limits(field: FieldInfo, unit: str) -> str:
 
 def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:
     constraints = (*field.metadata, *_inner(field.annotation))
-    # Lower bounds before upper ones.
+    # State lower bounds before upper bounds.
     for constraint in sorted(constraints, key=lambda each: isinstance(each, (Le, Lt))):
         match constraint:
             case Ge(ge):

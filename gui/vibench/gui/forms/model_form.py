@@ -227,7 +227,7 @@ class GroupEditor:
         """Change to the chosen kind; fields of the same name keep their values."""
         assert self._kind is not None
         left, chosen = self.form.content(), self._kind.content()
-        if chosen is None:  # a heading
+        if chosen is None:  # the user chose a heading of the list
             self._kind.show_content(left["kind"])
             return
         self._memories[left["kind"]] = left
@@ -260,7 +260,7 @@ class OptionalGroupEditor(GroupEditor):
         self._there = QCheckBox(f"Give {facts.label.lower()}")
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
-        # Left-aligned with its own width, because the form may be wider than a small window.
+        # Align the check box left, with its natural width: the form may be wider than a small window.
         self._layout.insertWidget(0, self._there, alignment=Qt.AlignmentFlag.AlignLeft)
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())

@@ -46,7 +46,7 @@ def file_kind(path: Path) -> FileKind:
         try:
             open_recording(path).close()
         except RecordingError:
-            # Accepted here; the Compare page opens the file, or says why it cannot.
+            # Accept the file here; the Compare page opens it, or says why it cannot.
             return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
         return FileKind.RECORDING
     allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
@@ -122,7 +122,7 @@ class Page(QWidget):
     def retheme(self, theme: Theme) -> None:
         """Change the colours of plots; other widgets follow the palette."""
         for part in self.findChildren(QWidget):
-            # Faster than isinstance: a page has hundreds of parts, and a protocol check takes 80 µs each.
+            # hasattr is faster than isinstance: a page has hundreds of parts, and a check takes 80 µs.
             if hasattr(type(part), "retheme"):
                 cast(Themed, part).retheme(theme)
 
@@ -206,7 +206,7 @@ class SideAndPicture(PageParts):
     def event(self, event: QEvent) -> bool:
         """Adapt the width to a new font, even while the page is hidden."""
         if event.type() in (QEvent.Type.FontChange, QEvent.Type.Show):
-            # Deferred, because the child widgets receive the new font later.
+            # Adapt the width later, because the child widgets receive the new font later.
             QTimer.singleShot(0, self, self._divide)
         return super().event(event)
 

@@ -126,7 +126,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             # Otherwise pyqtgraph updates the label of the invisible axis at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
-            # Paint the axes before the grid, because painting them determines the ticks for the grid.
+            # Paint the axes before the grid, because painting the axes determines the ticks for the grid.
             axis.setZValue(_FIRST)
         # Hide the last number of an axis where it would be cut off.
         self.up.setStyle(hideOverlappingLabels=True)
@@ -160,7 +160,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Fit axes and margins to the font."""
         em = self.fontMetrics().height()
         self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
-        # Fixed: a width that depends on the numbers would require painting twice.
+        # Fix the width of the axis: a width that depends on the numbers would require painting twice.
         self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
@@ -352,7 +352,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def leaveEvent(self, event: QEvent) -> None:
         """Hide the cursor reading."""
         super().leaveEvent(event)
-        # Keep the reading while a context menu is open, because its actions use the position.
+        # Keep the reading while a context menu is open, because the menu's actions use the position.
         if QApplication.activePopupWidget() is None:
             self.reading.hide()
 

@@ -59,7 +59,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
     """
     if path.exists():
         raise FileExistsError(0, "it exists already")
-    memory = QBuffer()  # not a file, because Qt does not report every disk error
+    memory = QBuffer()  # Qt writes to memory, because it does not report every disk error
     match path.suffix.lower():
         case ".csv":
             memory.setData(numbers_of(plot, ",").encode())
@@ -68,7 +68,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
             generator.setOutputDevice(memory)
             generator.setSize(plot.size())
             generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
-            # With any other resolution, axes and curves would not line up.
+            # With any other resolution of the picture, axes and curves would not line up.
             generator.setResolution(plot.logicalDpiX())
             painter = QPainter(generator)
             plot.render(painter)

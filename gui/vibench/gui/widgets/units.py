@@ -59,7 +59,7 @@ class ShownUnit:
     def text(self, value: float, digits: int = 3) -> str:
         """Return an SI value in this unit as text."""
         shown = value * self.per_si
-        # A number of points is not rounded: 8192 points, not 8190.
+        # Do not round a number of points: 8192 points, not 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
         return f"{_number_text(Decimal(number))} {self.name}".strip()
 
@@ -83,7 +83,7 @@ class DisplayUnits:
 
     def __init__(self) -> None:
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
-        # Weak references: this object outlives every window and must not call a closed widget.
+        # Keep weak references: this object outlives every window and must not call a closed widget.
         self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -198,6 +198,6 @@ class SentenceLabel(QLabel):
         return super().text().replace(_BREAK, "")
 
     def _show_converted(self) -> None:
-        # Allow breaks in long words such as paths; Qt would cut them off.
+        # Allow breaks in long words such as paths, which Qt would otherwise cut off.
         super().setText(_LONG_WORD.sub(_with_breaks, UNITS.convert(plain_lines(self.sentence))))
         super().setToolTip(plain_tip(UNITS.convert(self._tip)))

@@ -70,11 +70,11 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(SettingKey.BENCH, str(bench.resolve()))
-        # Changing the theme and saving pictures block the window; an attended run would therefore stop.
+        # Changing the theme and saving pictures block the window, so an attended run would stop.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
-        # As in `open_window`, so that the pictures look like the real window.
+        # Do this as in `open_window`, so that the pictures look like the real window.
         gc.freeze()
         window.resize(*SIZE)
         window.show()
@@ -133,7 +133,7 @@ def _fill(window: Window) -> None:
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
-    # One after the other, so that the displayed computing times are realistic.
+    # Compute the results one after the other, so that the displayed computing times are realistic.
     for view, content in (
         (simulation, {}),
         (maps, MAP),

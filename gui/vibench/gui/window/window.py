@@ -302,12 +302,12 @@ class Window(QMainWindow):
         assert isinstance(application, QApplication)
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
-        # Set part by part: one style sheet for the whole application would block the event loop for 0.3 s.
+        # Set style sheets part by part: one for the whole application would block the event loop for 0.3 s.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
         assert in_sight is not None
-        # Paint once at the end instead of after every step.
+        # Paint the page once at the end instead of after every step.
         in_sight.setUpdatesEnabled(False)
         pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)
         self._unthemed = [

@@ -172,7 +172,7 @@ class ComparePage(Page):
     def _compared(self, found: ComparedRecording) -> None:
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
-            self._recordings.pop(found.path, None)  # absent if the same path was requested twice
+            self._recordings.pop(found.path, None)  # absent if its path was requested twice
             text = copy_sentence(others[first], str(others[first].path), found)
             self.context.warn(f"{found.path} {text}.", "It is shown once.")
             self._end_job()

@@ -59,7 +59,7 @@ class CurvePlots(QWidget):
             "Select a curve and its reference on the left."
         )
         self.differences.always_numbered().setXLink(self.magnitudes)
-        # The lower plot labels the frequency axis for both.
+        # The lower plot labels the frequency axis for both plots.
         self.magnitudes.across.show_nothing()
         parts = splitter("Curves and their difference", self.magnitudes, self.differences, (500, 170))
         fill_box(QVBoxLayout(self), parts, margin=0)
@@ -139,7 +139,7 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-# Cached: a chaotic curve has thousands of peaks, and these are needed whenever a curve is ticked.
+# Cache peaks: a chaotic curve has thousands, and they are needed whenever a curve is ticked.
 _peaks = lru_cache(maxsize=64)(curve_peaks)
 
 

@@ -198,7 +198,7 @@ class FilesPage(Page):
         self._making = None
         if self._opened is None:
             return
-        # Delayed until the plots are drawn, because checking the seal takes as long as drawing.
+        # Check the seal only after drawing the plots, because the check takes as long as the drawing.
         QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)
@@ -237,7 +237,7 @@ class FilesPage(Page):
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
-        # Not pathlib, which raises errors for names that no operating system allows.
+        # Do not use pathlib, which raises errors for names that no operating system allows.
         folder = Path(os.path.expanduser(self._folder_line.text()))  # noqa: PTH111
         if folder == self._folder:
             return

@@ -445,7 +445,7 @@ class RecordingTable(QTableView):
         wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
         if not wanted:
             return
-        # Not selectRow, which would extend the selection while Ctrl is pressed.
+        # Do not use selectRow, which would extend the selection while Ctrl is pressed.
         self.selectionModel().setCurrentIndex(wanted[0], _THIS_ROW_ALONE)
         for index in wanted[1:]:
             self.selectionModel().select(index, _THIS_ROW_TOO)

@@ -52,7 +52,7 @@ class RecordingTimeHistories(PlotStack):
         self._histories: list[_TimeHistory] = []
         self._kept: dict[tuple[str, str], _TimeHistory] = {}
         self.markers = Markers(0.0, 0.0, self)
-        # One move may change the range several times. Draw once, after the last change.
+        # One movement of the view may change the visible range several times. Draw after the last change.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 

@@ -190,6 +190,6 @@ def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPrev
     try:
         planned = planned_recordings(campaign, folder, ExistingRecordings.RESUME)
         complete = frozenset(each.name for each in planned if each.is_complete)
-    except AcquisitionError:  # recorded with another plan; arming will report it
+    except AcquisitionError:  # the folder's recordings belong to another plan; arming will report this
         complete = frozenset()
     return CampaignPreview(rows, levels, complete, campaign.duration_s, size)

@@ -139,7 +139,7 @@ class QueuePage(Page):
             "Load a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
-        # The second column has the remaining width, which otherwise would be only a few letters.
+        # Give the second column the remaining width; otherwise its width would be only a few letters.
         self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",

@@ -167,7 +167,7 @@ class KnobSheetForm(QGroupBox):
         text = f"{knob.instrument}: {knob.setting} at {knob.value}"
         tick = tick_box(text, "Tick when you have checked this setting", lambda _: self.changed.emit())
         tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
-        # Insert above the name.
+        # Insert the check boxes above the field for the operator's name.
         self._layout.insertWidget(self._layout.count() - 1, tick)
         return tick
 
@@ -285,7 +285,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # may differ after taking over an engine
+            self.context.selection.choose_rig(rig)  # the rig may differ after taking over an engine
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:

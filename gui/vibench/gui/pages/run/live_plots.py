@@ -210,7 +210,7 @@ class TransmissibilityPlot(QWidget):
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.3)
         self.coherence.setXLink(self.magnitude)
-        # The lower plot labels the frequency axis for both.
+        # The lower plot labels the frequency axis for both plots.
         self.magnitude.across.show_nothing()
         fill_box(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
@@ -397,7 +397,7 @@ class HiddenMotionPlot(QWidget):
         shade = np.minimum(_SHADES * error / worth, _SHADES - 1).astype(int) if p.size else np.empty(0)
         for number, curve in enumerate(self.forecast):
             here = np.flatnonzero(shade == number)
-            # Each piece begins at the last point of the piece before, so that no gap is visible.
+            # Each piece of the forecast begins at the last point of the piece before, to leave no gap.
             part = slice(max(here[0] - 1, 0), here[-1] + 1) if here.size else slice(0, 0)
             curve.setData(time_s[part], p[part])
 

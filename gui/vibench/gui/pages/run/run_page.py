@@ -222,7 +222,7 @@ class WatchCard(QGroupBox):
         if run is None or not is_running or not averages:
             self._begun = 0
         else:
-            # The number in the status still is that of the average before, while the next one settles.
+            # While the next average settles, the status still has the number of the average before.
             self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
         self.reject_button.setEnabled(self._begun > 0)
         self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
@@ -398,7 +398,7 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The focused button was just hidden. Without this call, Qt would move the focus to the next list.
+            # The button with the focus was just hidden. Otherwise Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._played
