@@ -26,7 +26,7 @@ class RunningProgram:
         self.is_alive = is_alive
         try:
             with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                self._facts = file.read()  # read now, because the program may remove the file
+                self._facts = file.read()  # read at once, because the program may remove the file
         except OSError:
             self._facts = b""
 
@@ -55,7 +55,7 @@ def main() -> None:
             sys.exit(code)
     # pydantic would search every installed package for plug-ins; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # importing leaves little garbage; collecting took a fifth of the start
+    gc.set_threshold(10_000)  # importing leaves little garbage; collecting it took a fifth of the start
     from vibench.cli import main as run_command
 
     run_command()
@@ -113,7 +113,7 @@ def running_programs() -> Iterator[RunningProgram]:
         if not start.startswith(f"{boot}_") and look():
             raise OSError("on another computer")
         program = RunningProgram(path, pid, start, look)
-        # Otherwise it runs in a container, or may have ended with an earlier boot of this computer.
+        # Any other program runs in a container, or may have ended with an earlier boot of this computer.
         if is_here or look() or program.fact("computer") == os.uname().nodename:
             yield program
 
@@ -148,6 +148,6 @@ def _is_locked(path: str) -> bool:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
-    except FileNotFoundError:  # it ended
+    except FileNotFoundError:  # the program has ended
         pass
     return False

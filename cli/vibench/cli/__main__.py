@@ -130,9 +130,9 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if type(error) is typer.BadParameter:  # not a subclass, such as a missing option
+        if type(error) is typer.BadParameter:  # usage errors of another class, such as a missing option
             error.exit_code = ExitCode.FAILED
-        if args:  # without arguments, the message is the help text
+        if args:  # without arguments, the error's message is the help text
             error.message = printable(error.message)
         raise
 
@@ -307,12 +307,12 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # caused by a path; all files contain valid text
+    except UnicodeEncodeError as error:  # caused by a path, because all files contain valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Every command may be given an unusable path, so these errors are handled here for all of them.
+        # Every command may be given an unusable path, so errors of paths are handled here for all.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -323,7 +323,7 @@ def main() -> None:
 def _disk_trouble(error: Exception) -> str:
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
-    name = str(error.filename2 or error.filename or "a file")  # after a copy, filename2 is the target
+    name = str(error.filename2 or error.filename or "a file")  # for a failed copy, filename2 is the target
     return DISK_ERRORS[error.errno].format(name=shortened(name, NAME_SHOWN))
 
 

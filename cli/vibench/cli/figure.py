@@ -49,7 +49,7 @@ def figure(
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
-    # Check the inputs of all figures before the first is drawn.
+    # Check the inputs of all figures before the first figure is drawn.
     figure_studies = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])

@@ -52,7 +52,7 @@ def _shown(each: Any) -> Any:
     return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
-# No markup and no emoji codes, because names and paths may look like them.
+# Allow no markup and no emoji codes, because names and paths may look like such codes.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 

@@ -102,7 +102,7 @@ def predict(
             and cluster is None
             and study_solver(request) is solve_scene
         ):
-            # A single point is solved directly, without workers and file.
+            # A single point is solved directly, without worker threads and without a file.
             taken_s, kept, where = [math.nan], 1, request.coordinates(0)
             try:
                 scene = request.scene((0,) * len(request.axes), Rest())

@@ -80,7 +80,7 @@ class _Following:
         if waiting <= 0:
             return POLL_S
         is_late = waiting > LATEST_S * rate_hz
-        # More samples may have arrived since; if they are too many, the request skips the oldest.
+        # More samples may have arrived since the status; if they are too many, the request skips the oldest.
         most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
         piece = self.client.look(self.live.next_sample, most=most)
         if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
