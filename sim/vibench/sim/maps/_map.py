@@ -54,7 +54,7 @@ KEPT = (
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
 """Additional columns of a map with a requested error or computing time."""
 MESSAGE_BYTES = 100
-ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored")
+ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored during the motion")
 SECTION_STATES = 64
 """Largest number of states (one per drive period) stored for a motion, in a map along one quantity."""
 SECTION_COLUMNS = tuple(

@@ -299,7 +299,7 @@ def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
 
 def _other_starts(budget_s: float) -> str:
     if budget_s == 0.0:
-        return "Other starts are not computed, because there is no budget."
+        return "Runs from other starts are not computed, because there is no budget."
     return (
         "A second run starts a millionth of the gap away. If the two runs separate, or the motion is "
         f"chaotic, the final motion is random. Then {CLEAR} to {MOST} starts are computed and chaos is "

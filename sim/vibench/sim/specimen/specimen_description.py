@@ -252,7 +252,7 @@ class SpecimenDescription(_Described):
         """Stiffnesses k0, k1, k2 [N/m]."""
         if self.stiffnesses_n_per_m is not None:
             return self.stiffnesses_n_per_m
-        assert self.single_frequencies_hz is not None, "one of the two is given"
+        assert self.single_frequencies_hz is not None, "one of the two alternative keys is given"
         k0, k1, k2 = (
             m * (2.0 * math.pi * f) ** 2
             for m, f in zip(self.masses_kg, self.single_frequencies_hz, strict=True)
@@ -271,7 +271,7 @@ class SpecimenDescription(_Described):
     def _dampings(self, damping_time_s: float | None) -> Triple:
         time_s = self.damping_time_s if damping_time_s is None else damping_time_s
         if time_s is None:
-            assert self.dampings_ns_per_m is not None, "one of the two is given"
+            assert self.dampings_ns_per_m is not None, "one of the two alternative keys is given"
             return self.dampings_ns_per_m
         if not 0.0 <= time_s < math.inf:
             raise ValueError(f"Damping time {time_s} s is not allowed: it must be zero or positive.")

@@ -124,13 +124,13 @@ NUMBERS = {
     "period": Column("period", WHOLE, "1", "drive periods after which the motion repeats"),
     "duration_s": Column(DURATION, REAL, "s", "duration of the run"),
     "window_s": Column("window", REAL, "s", "duration of the window at the end of the run"),
-    "settled_s": Column("settled", REAL, "s", "when the motion was found to be settled"),
+    "settled_s": Column("settled", REAL, "s", "time at which the motion was found to have settled"),
     "response_i_error": Column("response_i_error", REAL, "1", "relative error of Response I, estimated"),
     "response_ii_error": Column("response_ii_error", REAL, "1", "relative error of Response II, estimated"),
     "relative_i_error": Column("relative_i_error", REAL, "1", "relative error of relative_i, estimated"),
     "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
-    "error_estimate": Column("error_estimate", REAL, "1", "the largest of the four errors"),
-    "integration_error": Column("integration_error", REAL, "1", "part reduced by a stricter accuracy"),
+    "error_estimate": Column("error_estimate", REAL, "1", "largest of the four responses' errors"),
+    "integration_error": Column("integration_error", REAL, "1", "error that a stricter accuracy reduces"),
     "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
@@ -149,7 +149,7 @@ FOUND_NUMBERS = {
     "response_ii": _of_motion("found_response_ii", REAL, "Response II of this motion"),
     "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
     "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
-    "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
+    "error_estimate": _of_motion("found_error", REAL, "relative error of this motion's responses, estimated"),
     "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }
 """Columns by the field of `FoundMotion` whose value they store."""
@@ -172,7 +172,7 @@ ESCAPE_NUMBERS = {
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
     "high_per_s": Column("escape_rate_high", REAL, "s-1", "upper end of its interval"),
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
-    "chaotic_s": Column("chaotic_time", REAL, "s", "total time of chaos of all starts"),
+    "chaotic_s": Column("chaotic_time", REAL, "s", "total simulated time in chaos of all starts"),
 }
 """Columns by the field of `EscapeRate` whose value they store."""
 OTHERS = (
@@ -187,7 +187,7 @@ OTHERS = (
     Column(TAKEN, REAL, "s", "processor time; missing if it includes loading of modules and tables"),
     Column(SESSION, WHOLE, "1", "row of the session that computed the point"),
     Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of all values of the scene"),
-    Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),
+    Column(MESSAGE, f"S{TEXT_BYTES}", "", "reason why the scene could not be computed"),
     Column(STATE, STATE_DTYPE, "", "state of the point", _meanings(PointState)),
 )
 COLUMNS = (

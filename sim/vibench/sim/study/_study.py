@@ -331,12 +331,12 @@ def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]
     if largest_m > MOST_GAPS * narrowest_m:
         yield (
             f"an amplitude of {largest_m:g} m is {largest_m / narrowest_m:.2g} times the gap of "
-            f"{narrowest_m:g} m and is predicted as given; if {largest_m:g} micrometres were meant, "
+            f"{narrowest_m:g} m and is used as given; if {largest_m:g} micrometres were meant, "
             f"give {_MICRO * largest_m:g}"
         )
     widest_m = max((each for each in gaps_m if math.isfinite(each)), default=0.0)
     if widest_m > WIDEST_M:
         yield (
-            f"a gap of {widest_m:g} m is wide for a specimen on a shaker and is predicted as given; if "
+            f"a gap of {widest_m:g} m is wide for a specimen on a shaker and is used as given; if "
             f"{widest_m:g} micrometres were meant, give {_MICRO * widest_m:g}"
         )
