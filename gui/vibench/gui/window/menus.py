@@ -237,14 +237,14 @@ class MenuAction:
 
 OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Esc, Pause", "abort from any page, with the fastest ramp of the shaker"),
-    ("Space", "freeze the picture (Run page); the recording goes on"),
+    ("Space", "freeze the plots (Run page); the recording continues"),
     ("PgDn, PgUp", "scroll the description of the test (Run page)"),
     ("M", "mark an event in the recording (Run page)"),
     ("A, L", "in a plot: show everything, logarithmic axis"),
     ("G, D", "in a plot: read values; mark a point to read differences"),
     ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
     ("Menu key", "context menu of the focused plot or table"),
-    ("F4, Alt+Down", "open the list of a choice"),
+    ("F4, Alt+Down", "open the list of a combo box"),
 )
 """Keys without a menu entry. No single letter starts the drive."""
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."

@@ -229,7 +229,7 @@ class Window(QMainWindow):
         self.context.say(
             Notice(
                 NoticeKind.INFO,
-                f"The campaign {request.campaign.name} was left unattended and continues.",
+                f"The campaign {request.campaign.name} was left to run unattended and continues.",
                 "It is shown here.",
                 "STOP ramps down as planned; Esc aborts.",
             )

@@ -264,7 +264,7 @@ class ComparePage(Page):
         self._markers.toggled.connect(self.plots.markers.show)
         self._markers.toggled.connect(lambda is_on: tabs.setCurrentIndex(int(is_on)))
         show_all = push_button(
-            "Sho&w all", "Scale the axes to all curves", self.plots.magnitudes.show_everything
+            "Sho&w all", "Fit the axes to all curves", self.plots.magnitudes.show_everything
         )
         self._export = push_button("E&xport…", "Write picture, numbers or report", self._choose_export)
         self._report = push_button(

@@ -296,8 +296,8 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         for text, choice, tip in (
             ("Channel", self.channel, "The channel whose frequencies are shown"),
             ("Frequencies", self.spacing, "Scale of the vertical axis"),
-            ("up to", self.highest, "Upper end of the vertical axis"),
-            ("lines", self.line_width, "Line width: narrow lines resolve frequency, wide lines resolve time"),
+            ("up to", self.highest, "Upper end of the frequency axis"),
+            ("lines", self.line_width, "Spectral line width: narrow resolves frequency, wide resolves time"),
         ):
             choice.setToolTip(tip)
             fill_box(bar, label_for(text, choice, f"Spectrogram: {text.lower()}"), choice)

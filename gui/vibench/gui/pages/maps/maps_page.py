@@ -151,7 +151,7 @@ class MotionView(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self.caption = SentenceLabel("A click on the map shows the motion there.")
+        self.caption = SentenceLabel("A click on the map shows the motion at that point.")
         self.caption.setAccessibleName("Motion at the clicked point")
         self.plots = (
             Plot("Motion of m1 between its stops", TIME, RELATIVE, theme),
@@ -337,7 +337,7 @@ class MapsPage(Page):
 
     def _buttons(self) -> QLayout:
         self._begin = push_button("&Map", "Start the computation in a separate process", self.begin, "first")
-        self._finer = push_button("Fi&ner", "Compute only the range now visible", self.begin_in_sight)
+        self._finer = push_button("Fi&ner", "Compute only the visible range of the map", self.begin_in_sight)
         return row((self._begin, 1), (self._finer, 1), (self.simulator.cancel_button, 1))
 
     def _answer(self) -> QWidget:

@@ -331,7 +331,7 @@ class RigPage(Page):
         if rig is None:
             return
         self.find_button.setEnabled(False)
-        self.instruments.show_rows([("looking", "takes some seconds; a simulated rig is started first")])
+        self.instruments.show_rows([("looking", "opening takes seconds; a simulated rig is started first")])
         self.context.background.ask(list_rig_instruments, self._found, self._not_found, rig)
 
     def _found(self, found: InstrumentList) -> None:

@@ -72,7 +72,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
     """Return the plot of Responses I and II."""
     up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
     plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
-    plot.with_hint("One point per tenth of a second of a dwell or sweep, and the prediction.")
+    plot.with_hint("One point per tenth of a second of a dwell or sweep, and the predicted responses.")
     made = SweepPlot("Responses", plot)
     made.predicted = {
         "response_i": plot.curve(PREDICTED, "I, simulated"),
@@ -300,8 +300,8 @@ class PortraitPlot(QWidget):
         super().__init__()
         self.orbit = Plot("Phase portrait of the newest periods", _ACROSS, _UP, theme)
         self.section = Plot("Poincaré section of the run so far", _ACROSS, _UP, theme)
-        self.orbit.with_hint("Orbit over the newest drive periods of a sine test.")
-        self.section.with_hint("One point per drive period of the run so far.")
+        self.orbit.with_hint("Orbit of m0 over the newest drive periods of a sine test.")
+        self.section.with_hint("One point of the motion per drive period of the run so far.")
         self._orbit = self.orbit.curve(curve_style(0))
         self._strobe = self.orbit.dots(curve_style(3), size=6)
         self._points = self.section.dots(curve_style(3), size=3)

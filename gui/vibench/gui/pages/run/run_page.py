@@ -183,7 +183,7 @@ class WatchCard(QGroupBox):
         self.span = Choice(tip="Seconds in a time history", items=(f"{span_s:g} s" for span_s in SPANS_S))
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
         self.freeze = QCheckBox("Freeze the picture  (Space)")
-        self.freeze.setToolTip("Only the picture stops; the recording continues")
+        self.freeze.setToolTip("Freeze the plots; the recording continues")
         self.twin = QCheckBox("Live twin")
         self.twin.setToolTip(
             "Estimate the motion of m1 between its stops, and report changes of the specimen. The estimate "
@@ -201,7 +201,7 @@ class WatchCard(QGroupBox):
         self.mark = LineField("event")
         self.mark.setToolTip("Text of the mark in the recording")
         self.mark_button = push_button(
-            "Mark  (M)", "Put the mark at the next sample of the recording", self.wish_mark
+            "Mark  (M)", "Put a mark with this text at the next sample of the recording", self.wish_mark
         )
         self._lay_out()
 
@@ -323,7 +323,7 @@ class ArmCard(QGroupBox):
             words = (f"Campaign {armed.campaign}", *armed.lines)
             self._show_words("\n".join((*words, left)))
         elif state in DRIVING:
-            self._show_words("Plan and limits are fixed during a run. STOP ramps down; Esc aborts.")
+            self._show_words("Plan and limits cannot be changed during a run. STOP ramps down; Esc aborts.")
         else:
             self._show_words(_HINTS.get(state) or reason or f"Ready to arm: {test}")
         self.arm_button.setVisible(not is_armed and state not in DRIVING)
