@@ -71,8 +71,8 @@ def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (BASIN, "too few or too many starts are near a boundary."),
-        (LINE, "it needs ranges for two coordinates"),
+        (BASIN, "too few or too many initial states are near a boundary."),
+        (LINE, "ranges for two coordinates of the initial state are needed"),
     ],
 )
 def test_a_basin_map_explains_a_missing_boundary_exponent(output_of, tmp_path, text, why):

@@ -107,7 +107,7 @@ def analyse(
         option("Also estimate the hidden motion of m1: p between its stops, impacts, gaps, m1, contact law."),
     ] = False,
     keep: Annotated[
-        bool, option("With --hidden: save the motion in the recording, for vibench export --results.")
+        bool, option("With --hidden: store this motion in the recording, for vibench export --results.")
     ] = False,
     specimen: SpecimenOption = None,
     branches: Annotated[
@@ -133,7 +133,7 @@ def analyse(
         MagnitudeScale, option("Scale of magnitudes in figures.", panel=NOISE)
     ] = MagnitudeScale.LOG,
     segment: Annotated[
-        float | None, option("Segment length, in place of a resolution.", "S", panel=NOISE)
+        float | None, option("Segment length of spectra, in place of a resolution.", "S", panel=NOISE)
     ] = None,
     *,
     options: Annotated[RequestOptions[AnalysisOptions], Fields(OPTIONS, NOISE)],

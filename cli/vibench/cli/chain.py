@@ -49,7 +49,7 @@ def chain(
     *,
     options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
     error: Annotated[
-        str | None, option("Largest relative error of each transmission under a sine, such as 1%.", "E")
+        str | None, option("Requested relative error of each transmissibility under a sine, such as 1%.", "E")
     ] = None,
     time_limit: Annotated[
         str | None, option("Time limit of each steady run, such as 2s.", "T", name="--time")

@@ -22,7 +22,7 @@ NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
 
 def docs(
-    out: Annotated[Path | None, option("Folder of the site; default: the state folder.", "DIR")] = None,
+    out: Annotated[Path | None, option("Folder for the site; default: the state folder.", "DIR")] = None,
     rebuild: Annotated[bool, option("Build an existing site again.")] = False,
     quick: Annotated[bool, option("Skip running the tutorials (about five minutes).")] = False,
     show: Annotated[bool, option("Open the first page in the browser.", name="--open")] = False,

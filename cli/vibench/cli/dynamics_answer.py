@@ -80,5 +80,5 @@ def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
 def leave(*, is_complete: bool) -> None:
     """Exit with the code `STOPPED` if the computation was stopped before all parts were finished."""
     if not is_complete:
-        errors.print("stopped: the result contains what was computed until then")
+        errors.print("stopped: the result contains the parts computed so far")
         raise typer.Exit(ExitCode.STOPPED)

@@ -34,7 +34,7 @@ def export(
     ],
     to: Annotated[Format, option("Format of the new file.")],
     out: Annotated[
-        Path | None, option("New file, or its folder; by default beside the recording.", "PATH")
+        Path | None, option("Path of the new file or its folder; by default beside the recording.", "PATH")
     ] = None,
     channels: Annotated[str, option("Channels, separated by commas; by default all.", "NAMES")] = "",
     from_s: Annotated[float | None, option("Seconds since the first sample.", "S", name="--from")] = None,

@@ -21,10 +21,10 @@ from .progress_bars import transfer_bar
 def import_file(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV file.")],
     mapping: Annotated[
-        Path | None, option("Mapping of the channels; without a mapping, they are listed.", "MAP.toml")
+        Path | None, option("File that maps the channels; without it, the channels are listed.", "MAP.toml")
     ] = None,
     out: Annotated[
-        Path | None, option("New recording, or its folder; by default beside FILE.", "NAME.h5")
+        Path | None, option("Path of the new recording or its folder; by default beside FILE.", "NAME.h5")
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

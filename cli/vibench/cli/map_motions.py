@@ -132,10 +132,10 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
 def _boundary_words(results: MapResults) -> str:
     unknown = "The uncertainty exponent is not determined:"
     if len(results.plan.varied) == 1:
-        return f"{unknown} it needs ranges for two coordinates of the start."
+        return f"{unknown} ranges for two coordinates of the initial state are needed."
     rough = _roughness(results)
     if rough is None:
-        return f"{unknown} too few or too many starts are near a boundary."
+        return f"{unknown} too few or too many initial states are near a boundary."
     return (
         f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to {rough.high:.2f}), "
         f"so its dimension is {2.0 - rough.exponent:.2f}."

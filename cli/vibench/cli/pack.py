@@ -19,11 +19,11 @@ def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with recordings and other files.")],
     licence: Annotated[str, option("https://creativecommons.org/licenses/by/4.0/", "URL", name="--license")],
     out: Annotated[
-        Path | None, option("New file, or its folder; by default DIR.zip beside DIR.", "CRATE.zip")
+        Path | None, option("Path of the new file or its folder; by default DIR.zip beside DIR.", "CRATE.zip")
     ] = None,
     author: Annotated[list[str] | None, option("Author; may be repeated.", "NAME")] = None,
-    title: Annotated[str, option("Title; by default the name of the folder.")] = "",
-    description: Annotated[str, option("Description in one or two sentences.")] = "",
+    title: Annotated[str, option("Title of the package; by default the name of the folder.")] = "",
+    description: Annotated[str, option("Description of the data in one or two sentences.")] = "",
     organisation: Annotated[str, option("Publisher and affiliation of the authors.", "NAME")] = "",
     organisation_url: Annotated[str, option("Its home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,

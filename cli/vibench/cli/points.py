@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 SHOWN_FAILURES = 5
 
-Workers = Annotated[int | None, option("Threads; by default one per processor.", "N", min=1)]
+Workers = Annotated[int | None, option("Number of threads; by default one per processor.", "N", min=1)]
 Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
 """The values on the axes of each failed point, and the reason of the failure."""

@@ -45,7 +45,7 @@ _SHOWN = 24
 
 def predict(
     amplitude: Annotated[float, option("Amplitude of the base displacement.", "M")],
-    frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
+    frequency: Annotated[str, option("One drive frequency or a range [Hz].", "F|START:STOP:STEP")],
     duration: Annotated[
         str | None, option("Length of each run; auto: until the motion settles.  [default: 30]", "S|auto")
     ] = None,

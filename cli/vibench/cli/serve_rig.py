@@ -26,11 +26,11 @@ class ServedPace(StrEnum):
 def serve_rig(
     bench: Annotated[Path | None, option("Rig with a table 'virtual'.", "BENCH")] = None,
     address: Annotated[
-        str, option("Address to listen on; other computers need a token.", "HOST:PORT")
+        str, option("Address at which the rig is served; other computers need a token.", "HOST:PORT")
     ] = "127.0.0.1:31763",
-    scpi_port: Annotated[int, option("Socket port of the generator; 0 selects a free one.", "N")] = 0,
+    scpi_port: Annotated[int, option("Socket port of the generator; 0 selects a free port.", "N")] = 0,
     pace: Annotated[
-        ServedPace, option("Run the rig in real time, or as fast as a program samples.")
+        ServedPace, option("Run the rig in real time, or as fast as a program reads samples.")
     ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:

@@ -20,7 +20,7 @@ OPTIONS = (*SPECIMEN, "duration_s", "settle_s", "accuracy", "confidence")
 
 def spectrum(
     amplitude: Annotated[str, option("Amplitude of the base displacement.", "M|START:STOP:STEP")],
-    frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
+    frequency: Annotated[str, option("One drive frequency or a range [Hz].", "F|START:STOP:STEP")],
     options: Annotated[RequestOptions[SpectrumRequest], Fields(OPTIONS)],
     out: Annotated[Path | None, option("Folder for spectrum.h5, figure and table.", "DIR")] = None,
     as_json: AsJson = False,

@@ -59,10 +59,10 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
 
 
 def stop(
-    pid: Annotated[int | None, option("Process id; default all; hold: the only process.", "N")] = None,
+    pid: Annotated[int | None, option("Process id; default: all; for hold: the only one.", "N")] = None,
     level: Annotated[
         StopLevel,
-        option("hold until vibench release; ramp of the plan; abort: shortest ramp; off: at once."),
+        option("hold until vibench release; ramp as planned; abort: shortest ramp; off: at once."),
     ] = StopLevel.RAMP,
     reason: Annotated[str, option("Reason, stored in the recording.")] = "vibench stop",
 ) -> None:
