@@ -33,7 +33,7 @@ GRACE_S = 2.0
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a job."""
+    """Progress report of a job: finished and total work, remaining time, and a note."""
 
     done: int
     of: int

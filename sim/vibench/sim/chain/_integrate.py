@@ -139,7 +139,7 @@ MOST_CELL_WINDOWS = 10**10
 
 @dataclass(frozen=True, eq=False)
 class ChainImpacts:
-    """Times and cells of contacts."""
+    """Start times and cells of all contacts in a run."""
 
     times_s: Floats
     """Start times of contacts, ascending, shape (count,) [s]."""

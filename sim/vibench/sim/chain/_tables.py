@@ -208,9 +208,9 @@ class Pieces(NamedTuple):
     """Coefficients of the force, in powers of the time since the start of each piece, shape (pieces,
     PIECE_TERMS)."""
     start_s: float
-    """Start of the first piece [s]."""
+    """Start time of the first piece [s]."""
     length_s: float
-    """Length of each piece [s]."""
+    """Duration of each piece [s]."""
 
 
 def pieces_between(

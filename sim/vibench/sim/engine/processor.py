@@ -15,7 +15,7 @@ _X86 = {"x86_64", "amd64"}
 _V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
 _V4 = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
 _WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
-"""Arguments of IsProcessorFeaturePresent (winnt.h)."""
+"""Codes of processor features for IsProcessorFeaturePresent (winnt.h)."""
 
 
 def usable_families() -> tuple[str, ...]:

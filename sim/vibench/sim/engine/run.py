@@ -256,14 +256,14 @@ class GrowthReadings:
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
         self.structure = readings = native_engine().new("Readings")
-        """Structure that the engine fills."""
+        """Structure `Readings` that the engine fills."""
         readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
         readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
         readings["motions"], readings["room"] = self._motions.ctypes.data, room
 
     @property
     def made(self) -> int:
-        """Number of completed intervals."""
+        """Number of time intervals that were completed."""
         return int(self.structure["made"])
 
     @property

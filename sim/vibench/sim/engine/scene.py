@@ -39,7 +39,7 @@ from .shapes import (
 )
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
-"""Values of `Law` in native/structures.hpp."""
+"""Number of each contact law in the enum `Law` of native/structures.hpp."""
 Phasors = NDArray[np.complex128]
 
 
@@ -92,13 +92,13 @@ def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
 
 
 def power_structure(engine: Engine) -> Structure:
-    """Return the `PowerShapes` of native/structures.hpp."""
+    """Return the engine's `PowerShapes`: the tables for time steps under power laws."""
     with _ONE_THREAD:
         return _power_structure(engine)
 
 
 def collision_structure(engine: Engine) -> Structure:
-    """Return the `CollisionShapes` of native/structures.hpp."""
+    """Return the engine's `CollisionShapes`: the tables for Hertz collisions."""
     with _ONE_THREAD:
         return _collision_structure(engine)
 

@@ -164,7 +164,7 @@ COURSE_DEGREE = 5
 END_WEIGHT = 3.0
 """Weight of the force F at the end of the preceding step, in the fit that predicts F."""
 POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
-"""Gauss points c_i on [0, 1]."""
+"""Gauss points c_i of a time step, on [0, 1]."""
 GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
 
 

@@ -103,7 +103,7 @@ class LyapunovEstimate:
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
-    """Final motion of the run."""
+    """Kind of the final motion of the run."""
     since_s: float
     """Time from which on growth is averaged, or at which the final motion begins [s]."""
     blocks: BlockedMean | None

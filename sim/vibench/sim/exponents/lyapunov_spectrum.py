@@ -47,12 +47,12 @@ class LyapunovSpectrum:
     blocks: NDArray[np.int64]
     """Number of independent blocks from which each standard error is estimated, shape (6,)."""
     verdict: ExponentVerdict
-    """Verdict on the largest exponent."""
+    """Verdict on the sign of the largest exponent."""
     source: Source
     motion: FinalMotion
     since_s: float
     impacts: int
-    """Number of impacts since time zero."""
+    """Number of impacts of m1 since time zero."""
     impact_rate_hz: float
     """Mean impact rate in the final motion [1/s]."""
     dimension_standard_error: float

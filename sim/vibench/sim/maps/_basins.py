@@ -108,7 +108,7 @@ class KickStability:
     """Stability of a motion under random kicks of all displacements and velocities."""
 
     motion: int
-    """Index of the motion in `MapResults.motion_numbers`."""
+    """Index of the motion, as in `MapResults.motion_numbers`."""
     size: float
     """Standard deviation of the kicks: displacements over the gap, velocities over gap * 2 pi f."""
     returned: Share

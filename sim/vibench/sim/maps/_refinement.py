@@ -117,7 +117,7 @@ class _Sketch:
         self.donors = np.arange(seen.codes.size).reshape(seen.codes.shape)
 
     def compute(self, cells: Mask) -> None:
-        """Mark these cells as computed."""
+        """Mark these cells of the map as computed."""
         self.is_computed |= cells
         self.codes[cells] = self.seen.codes[cells]
         self.sizes[cells] = self.seen.sizes[cells]

@@ -115,7 +115,7 @@ class MapResults(GridResults[Map]):
 
     @property
     def computed(self) -> int:
-        """Number of computed points."""
+        """Number of computed points of the map."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
 
     @cached_property

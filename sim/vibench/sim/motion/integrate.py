@@ -33,7 +33,7 @@ class BaseMotion(NamedTuple):
     """Base displacement as cubic polynomials on equal intervals."""
 
     interval: float
-    """Length of an interval [s]."""
+    """Length of a time interval of the drive [s]."""
     pieces: NDArray[np.float64]
     """Coefficients c0 to c3 of U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3, shape (intervals, 4)."""
 
@@ -80,7 +80,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Impacts:
-    """Impacts of m1 on its stops."""
+    """Impacts of m1 on its stops during a run."""
 
     times_s: Floats
     """Start times of contacts, ascending, shape (count,) [s]."""

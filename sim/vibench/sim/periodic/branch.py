@@ -17,7 +17,7 @@ NEUTRAL = 1e-9
 
 
 class Parameter(StrEnum):
-    """Parameter of a branch."""
+    """Parameter along which a branch is followed."""
 
     FREQUENCY = "frequency"
     """Drive frequency [Hz]."""

@@ -219,7 +219,7 @@ class _Followed:
     """Points and events of a branch while it is followed."""
 
     family: Family
-    """Family at the current resolution."""
+    """Family of motions at the current resolution."""
     steps: ArcSteps
     reports: list[OrbitReport] = field(default_factory=list)
     events: list[BranchEvent] = field(default_factory=list)
@@ -268,7 +268,7 @@ class _Followed:
         return self.branch(ArcEnd.STEP_TOO_SHORT)
 
     def branch(self, end: ArcEnd) -> Branch:
-        """Return the branch followed so far."""
+        """Return the branch as followed so far."""
         reports = self.reports
         return Branch(
             parameter=self.family.path.parameter,

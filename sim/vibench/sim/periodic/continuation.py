@@ -37,7 +37,7 @@ class ArcSteps:
     """Length of the first step along the curve."""
     longest: float = 0.05
     shortest: float = 1e-7
-    """Shortest length of a step."""
+    """Shortest length of a step along the curve."""
     most_turn_rad: float = 0.3
     """Largest rotation of the tangent in a step."""
     tolerance: float = 1e-10

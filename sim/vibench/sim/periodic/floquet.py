@@ -39,7 +39,7 @@ class Motion:
     frequency_hz: float
     harmonics: Harmonics
     relative: Complex
-    """Phasors P_k, shape (m,) [m]."""
+    """Phasors P_k of the harmonics of p, shape (m,) [m]."""
 
     def p(self, turn: Floats) -> Floats:
         """Return p at the phases ``turn`` [rad] of the drive, shape (k,) [m]."""

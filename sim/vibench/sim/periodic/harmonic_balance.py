@@ -143,7 +143,7 @@ class ForceHarmonics(NamedTuple):
     """Harmonics of the spring's force, and their derivatives by the harmonics of the motion."""
 
     force: Complex
-    """Force harmonics F_k, shape (m,) [N]."""
+    """Harmonics F_k of the spring's force, shape (m,) [N]."""
     holomorphic: Complex
     """Derivative dF_k / dP_l, shape (m, m) [N/m]."""
     conjugate: Complex
@@ -228,7 +228,7 @@ ROUNDING = 1e-12
 
 
 class HarmonicSet(StrEnum):
-    """Which harmonics a solution contains."""
+    """Choice of the harmonics that a solution contains."""
 
     ODD = "odd"
     """Odd harmonics only: for motions that equal their mirror image half a period later (equal gaps)."""

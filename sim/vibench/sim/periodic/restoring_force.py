@@ -88,7 +88,7 @@ class GapSpring:
 
     @property
     def length(self) -> float:
-        """Length scale: the smaller gap [m]."""
+        """Length scale of the spring: the smaller gap [m]."""
         return min(self.upper, self.lower)
 
     @property

@@ -296,7 +296,7 @@ class ObservedWindow:
     begins: FollowedRun
     """Run at the start of the window."""
     stretches: tuple[Stretch, ...]
-    """Consecutive stretches of the window."""
+    """Consecutive stretches of which the window consists."""
     blocks: tuple[Block, ...]
     """Blocks of the window; their lengths differ by at most one drive period."""
     line_periods: int
@@ -425,9 +425,9 @@ class LineSpectrum:
     """Amplitude spectrum of x without taper, exact at multiples of the drive frequency."""
 
     frequency_hz: Floats
-    """Frequencies [Hz], shape (lines,)."""
+    """Frequencies of the spectral lines, shape (lines,) [Hz]."""
     amplitude_m: Floats
-    """Amplitudes [m], shape (lines,)."""
+    """Amplitude of x at each frequency, shape (lines,) [m]."""
 
 
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:

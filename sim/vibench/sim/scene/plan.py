@@ -45,7 +45,7 @@ class LinearMotion:
 
     @property
     def steady_x(self) -> complex:
-        """Phasor of the steady x [m]."""
+        """Phasor of the steady displacement x of m0 [m]."""
         return complex(self.steady[X])
 
     @property
@@ -182,7 +182,7 @@ class ScenePlan:
         return self.cost.time_s
 
     def explain(self) -> str:
-        """Return the plan as text."""
+        """Return method, reasons and cost of the scene as text."""
         return "\n".join((*self.sentences, str(self.cost)))
 
 

@@ -173,14 +173,14 @@ class ScenePrediction:
     relative_ii: float | None
     """Response II of p: amplitude of p at the drive frequency, over the drive amplitude."""
     impacts: int
-    """Contacts that began within the window."""
+    """Number of contacts that began within the window."""
     impact_rate_hz: float
-    """Impacts per second within the window."""
+    """Mean number of impacts per second within the window."""
     motion: MotionKind
     period: int | None = None
     """Period of a periodic motion, in drive periods."""
     duration_s: float
-    """Simulated time [s]."""
+    """Simulated time of the run [s]."""
     window_s: float
     """Length of the window at the end of the simulated time [s]."""
     settled_s: float | None = None
@@ -192,9 +192,9 @@ class ScenePrediction:
     scatter: float | None = None
     """Relative standard deviation of Response I between windows of a motion that never repeats."""
     lyapunov_per_s: float | None = None
-    """Largest Lyapunov exponent [1/s]."""
+    """Largest Lyapunov exponent of the motion [1/s]."""
     lyapunov_error_per_s: float | None = None
-    """Standard error of the exponent [1/s]."""
+    """Standard error of the Lyapunov exponent [1/s]."""
     start: str
     """Name of the start: "rest", or the name given in the scene."""
     final_state: State
@@ -223,7 +223,7 @@ class ScenePrediction:
 
     @property
     def is_one_of_several(self) -> bool:
-        """Whether other starts reached other motions."""
+        """Whether runs from other starts reached other motions."""
         return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:

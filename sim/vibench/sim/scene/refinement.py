@@ -108,7 +108,7 @@ class _Clock:
 
 @dataclass(frozen=True, eq=False)
 class _Orbit:
-    """Stable periodic motion, with its responses."""
+    """Stable periodic motion found in a scene, with its responses."""
 
     period: int
     run: FollowedRun
@@ -185,7 +185,7 @@ class _Refinement:
         """Copies of the run and of the stricter run beside it, made at the last check of both."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
-        """All periodic motions found so far."""
+        """All periodic motions found in this scene so far."""
         self._size_m = self._spent_s = 0.0
         self._run_error: float | None = None
         """Relative integration error of the responses of each start; None if not yet measured."""

@@ -58,7 +58,7 @@ class Growth:
     logarithms: Floats
     """Natural logarithm of the growth over each stretch, shape (stretches,)."""
     duration_s: float
-    """Total duration of the stretches [s]."""
+    """Total duration of the observed stretches [s]."""
 
     @property
     def total(self) -> float:

@@ -21,7 +21,7 @@ CLEAR, FEWEST, MOST = 8, 16, 64
 
 
 class Observable(StrEnum):
-    """Quantity that a scene computes."""
+    """Quantity that the simulation of a scene can compute."""
 
     RESPONSE = "response"
     """Responses I and II of x and of p."""
@@ -49,7 +49,7 @@ class FixedDuration(Strict):
 
     @property
     def longest_s(self) -> float:
-        """Length of the run [s]."""
+        """Simulated time of the run [s]."""
         return self.duration_s
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class AutomaticDuration(Strict):
 
 @dataclass(frozen=True)
 class Target(Strict):
-    """Requested error or time, or both."""
+    """Requested error or computing time, or both."""
 
     error: float | None = None
     """Largest relative error of each response; None for the smallest that the time allows."""
@@ -104,12 +104,12 @@ class Rest(Strict):
 
     @property
     def state(self) -> State:
-        """State at rest: zeros."""
+        """State x, y, z, vx, vy, vz at rest: zeros."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def name(self) -> str:
-        """Name of the start in results."""
+        """Name of this initial state in results."""
         return "rest"
 
 
@@ -120,7 +120,7 @@ class Given(Strict):
     state: State
     """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
     name: str = "given"
-    """Name of the start in results."""
+    """Name of this initial state in results."""
     kind: Literal["given"] = "given"
 
     def __post_init__(self) -> None:
@@ -131,7 +131,7 @@ class Given(Strict):
 
 @dataclass(frozen=True)
 class Scene(Strict):
-    """Request for one simulation."""
+    """Request for one simulation of a specimen under a drive."""
 
     specimen: Specimen
     drive: Harmonic

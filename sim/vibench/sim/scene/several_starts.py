@@ -47,7 +47,7 @@ LASTING_S = 300.0
 
 @dataclass(frozen=True, eq=False)
 class ReachedMotion:
-    """Final motion from one start."""
+    """Final motion of the run from one start (initial state)."""
 
     run: FollowedRun
     """Run from this start, at the end of its response window."""

@@ -96,7 +96,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
 
 @dataclass(frozen=True)
 class Count:
-    """Number of trials with one outcome."""
+    """Number of trials that had one outcome."""
 
     trials: float
     """Number of trials; fractional if trials that depend on each other count less."""

@@ -66,7 +66,7 @@ class StatedErrors:
 
 
 UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
-"""Errors of a run that failed."""
+"""Errors of a run that failed: all unknown."""
 
 
 def stated_errors(
@@ -146,7 +146,7 @@ class _StrictRun:
     responses_m: Floats | None
     """Responses in the window [m], shape (4,); None if the runs separated before."""
     is_together: bool
-    """Whether the two runs never separated."""
+    """Whether the stricter run stayed together with the original run."""
 
 
 def _more_starts(

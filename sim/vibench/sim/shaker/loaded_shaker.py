@@ -40,7 +40,7 @@ class Amplifier:
     high_cut_hz: float = math.inf
     """Upper -3 dB frequency of the amplifier [Hz]."""
     clip_v: float = math.inf
-    """Largest output voltage, peak [V]."""
+    """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: float = math.inf
     """Largest current, peak [A]; the amplifier reduces its voltage so as not to exceed it."""
 
@@ -64,7 +64,7 @@ class StateSpace:
     """Linear system s' = A s + B u; for a shaker s = (displacement, velocity, current) in SI units."""
 
     A: FloatArray
-    """State matrix, shape (3, 3)."""
+    """State matrix A, shape (3, 3)."""
     B: FloatArray
     """Input matrix, for the voltage at the coil [V] and an external force on the table [N], shape (3, 2)."""
 
@@ -83,7 +83,7 @@ class Shaker:
     force_constant_n_per_a: float
     """Force per current [N/A], equal to induced voltage per table velocity [V s/m] (Beranek, ch. 3)."""
     coil_resistance_ohm: float
-    """Resistance of coil and cable [ohm]."""
+    """Resistance of coil and cable in series [ohm]."""
     coil_inductance_h: float
     stroke_m: float = math.inf
     """Displacement from rest at which the table touches its rubber stops [m]."""

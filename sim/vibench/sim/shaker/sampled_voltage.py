@@ -59,9 +59,9 @@ class SampledMotion:
     """Outputs of the sensors, shape (samples,); single precision is far finer than converter noise."""
 
     base_acceleration: Singles
-    """Base acceleration [m/s2]."""
+    """Measured base acceleration [m/s2]."""
     m0_velocity: Singles
-    """Velocity of m0 [m/s]."""
+    """Measured velocity of m0 [m/s]."""
     impact_times_s: FloatArray
     """Time zero and the ends of blocks of 20 ms, shape (blocks + 1,)."""
     impacts: FloatArray

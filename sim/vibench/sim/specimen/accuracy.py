@@ -13,7 +13,7 @@ class Accuracy(StrEnum):
     QUICK = "quick"
     """Error 1e-5: enough for chaotic motion, whose results a stricter level does not improve."""
     STANDARD = "standard"
-    """Error 1e-6."""
+    """Error 1e-6: between the two other levels."""
     REFERENCE = "reference"
     """Error 1e-9: reference with which the two other levels are checked."""
 

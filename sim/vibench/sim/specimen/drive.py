@@ -112,7 +112,7 @@ class Sampled:
 
     @property
     def duration_s(self) -> float:
-        """Time of the last sample [s]."""
+        """Time of the last sample, at which the drive ends [s]."""
         return (len(self.displacement_m) - 1) / self.sample_rate_hz
 
 

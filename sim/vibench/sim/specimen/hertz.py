@@ -39,7 +39,7 @@ class Elasticity:
     """Elastic constants of one of the two bodies in contact."""
 
     youngs_modulus: float
-    """Young's modulus E [Pa]."""
+    """Young's modulus E of the body [Pa]."""
     poissons_ratio: float
 
     def __post_init__(self) -> None:

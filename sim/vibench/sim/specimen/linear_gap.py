@@ -14,7 +14,7 @@ class LinearGap(Strict):
     OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
 
     stiffness: float
-    """Stop stiffness [N/m]."""
+    """Stiffness of a stop [N/m]."""
     kind: Literal["linear_gap"] = "linear_gap"
 
     def __post_init__(self) -> None:

@@ -76,7 +76,7 @@ class ModalForm(NamedTuple):
     rates: Complex
     """Eigenvalues: one of each conjugate pair, and all real ones; shape (n,), d <= n <= 2d [1/s]."""
     shapes: Complex
-    """Right eigenvectors, shape (n, 2d)."""
+    """Right eigenvectors of the modes, shape (n, 2d)."""
     rows: Complex
     """Left eigenvectors, doubled for a conjugate pair, shape (n, 2d)."""
 
@@ -213,9 +213,9 @@ class BaseResponse:
     """Response of x and p = y - z to the base U; each field has shape (n,); time factor exp(+i w t)."""
 
     free_p: Complex
-    """Ratio p / U without contact."""
+    """Ratio p / U of relative motion to base motion, without contact."""
     free_x: Complex
-    """Ratio x / U without contact."""
+    """Ratio x / U of m0 to base motion, without contact."""
     stuck_x: Complex
     """Ratio x / U while m1 sticks to m2."""
     lever: Complex

@@ -51,7 +51,7 @@ class Reference:
     """Hertz contact and clearance to which a law without explicit numbers is fitted."""
 
     stiffness: float
-    """Contact stiffness k_contact [N/m^1.5]."""
+    """Hertz contact stiffness k_contact [N/m^1.5]."""
     gap_m: float
 
     def __post_init__(self) -> None:

@@ -32,7 +32,7 @@ class Bundle:
 
 @dataclass(frozen=True, eq=False)
 class Reply:
-    """Results of a bundle."""
+    """Results of a bundle, as a worker returns them."""
 
     bundle: Bundle
     solved: tuple[Solved, ...]
@@ -53,7 +53,7 @@ class Executor(Protocol):
         """Number of bundles that can be computed at the same time; it may change, even to 0."""
 
     def submit(self, bundle: Bundle) -> None:
-        """Add a bundle to the queue."""
+        """Add a bundle to the queue of the executor."""
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
         """Return the replies that have arrived; wait at most ``timeout_s`` for the first.
@@ -127,7 +127,7 @@ class ThreadExecutor:
 
     @property
     def slots(self) -> int:
-        """Number of threads."""
+        """Number of threads of the executor."""
         return self._workers
 
     def submit(self, bundle: Bundle) -> None:
@@ -147,7 +147,7 @@ class ThreadExecutor:
         return self.replies(0.0)
 
     def close(self) -> None:
-        """End the threads."""
+        """End the threads of the executor."""
         self.cancel()
 
     def _solve_into(self, solved: list[Solved], scenes: Sequence[Scene]) -> None:

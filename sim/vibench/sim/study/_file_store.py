@@ -207,7 +207,7 @@ class FileStore:
             _require_same(path, read_plan(path, type(plan)), plan)
             self._places = places_of(path, plan)
             self.arrays = read_arrays(path, plan)
-            """All results in the file."""
+            """All results that the file contains."""
         except BaseException:
             self._disk.close()
             raise

@@ -75,7 +75,7 @@ MEMORY, STARTS = "start_memory", "starts_followed"
 
 @dataclass(frozen=True)
 class Column:
-    """One stored quantity of all points."""
+    """Stored quantity, with one value or row per point."""
 
     name: str
     dtype: str
@@ -211,7 +211,7 @@ class Grid:
 
     @property
     def size(self) -> int:
-        """Number of points."""
+        """Number of points of the grid."""
         return math.prod(self.shape)
 
     def place(self, number: int) -> tuple[int, ...]:
@@ -246,7 +246,7 @@ class StudyAxis:
 
     name: str
     values: tuple[float | str, ...]
-    """Ascending numbers, or labels."""
+    """Values of the axis: ascending numbers, or labels."""
     units: str
     """Unit of the axis as UDUNITS text; empty for labels."""
     long_name: str
@@ -268,7 +268,7 @@ class GridPlan(FrozenModel, ABC):
     @property
     @abstractmethod
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Axes of the results, in order."""
+        """Axes of the results, the slowest-varying first."""
 
     @property
     @abstractmethod
@@ -277,7 +277,7 @@ class GridPlan(FrozenModel, ABC):
 
     @property
     def grid(self) -> Grid:
-        """Grid of all points."""
+        """Grid of all points of the plan."""
         return Grid(
             tuple(len(axis.values) for axis in self.axes), tuple(axis.is_ordered for axis in self.axes)
         )

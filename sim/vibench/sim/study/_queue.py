@@ -96,7 +96,7 @@ class PointScheduler:
         self._queue: list[tuple[float, int]] = []
 
     def release(self, numbers: NDArray[np.int64]) -> None:
-        """Release these points, so that those without a result can be started."""
+        """Release points for computation, except points that already have a result."""
         new = numbers[~self._is_released[numbers]]
         self._is_released[new] = True
         self.left += int(np.count_nonzero(~self._is_done[new]))
@@ -148,7 +148,7 @@ class PointScheduler:
             self._push(follower)
 
     def put_back(self, number: int) -> None:
-        """Return a point that was taken from the queue to the queue."""
+        """Put a point that was taken from the queue into the queue again."""
         self._is_out[number] = False
         self._push(number)
 
@@ -202,7 +202,7 @@ LOOK_S = 0.2
 
 
 class StudyEnd(StrEnum):
-    """Reason why a session ended."""
+    """Reason why a session of a study ended."""
 
     COMPLETE = "complete"
     CANCELLED = "cancelled"
@@ -339,7 +339,7 @@ class _Session:
 
     @property
     def is_unfinished(self) -> bool:
-        """Whether any wanted point is missing."""
+        """Whether any point to be computed has no result yet."""
         return self._scheduler.left > 0
 
     def feed(self) -> None:

@@ -167,7 +167,7 @@ class GridResults(Generic[Plan]):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Axes of the arrays."""
+        """Axes of the result arrays."""
         return self.plan.axes
 
     @property
@@ -233,7 +233,7 @@ class GridResults(Generic[Plan]):
 
 @dataclass(frozen=True, eq=False)
 class StudyResults(GridResults[Study]):
-    """Results of a study."""
+    """Results of a study, over the study's axes."""
 
     @property
     def study(self) -> Study:

@@ -83,7 +83,7 @@ class Expansion(Points):
         self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the numbers of all points."""
+        """Return the numbers of all points of the study."""
         return np.arange(len(arrays[FINAL_STATE]))
 
     def unchained(self, number: int) -> Scene:

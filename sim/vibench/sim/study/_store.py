@@ -27,7 +27,7 @@ class PointAnswer:
     cells: dict[str, layout.Cell]
     """Values by column name; columns without a value stay missing."""
     taken_s: float = math.nan
-    """Processor time [s]; NaN if unknown."""
+    """Processor time of the point [s]; NaN if unknown."""
 
 
 def empty_arrays(plan: layout.GridPlan) -> Arrays:
@@ -78,14 +78,14 @@ class Store(Protocol):
         """Record that a session begins, and its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results; return when they are safely stored."""
+        """Store the results of points; return once they are safe."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Store the interpolated points of a map, given by column, with the point state FILLED."""
 
 
 class MemoryStore:
-    """Store in memory."""
+    """Store that keeps the results in memory."""
 
     def __init__(self, plan: layout.GridPlan) -> None:
         self.arrays, self._columns = empty_arrays(plan), plan.columns
@@ -94,7 +94,7 @@ class MemoryStore:
         """Do nothing, because a store in memory has no sessions."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results."""
+        """Store the results of points in memory."""
         for answer in answers:
             for _ in put(self.arrays, self._columns, answer):
                 pass

@@ -88,7 +88,7 @@ AS_DESCRIBED = "as described"
 
 
 class Start(StrEnum):
-    """Initial state of a point."""
+    """Initial state from which a point is computed."""
 
     REST = "rest"
     UP = "up"
