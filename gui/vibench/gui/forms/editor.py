@@ -22,7 +22,7 @@ class Editor(Protocol):
 
     @property
     def widget(self) -> QWidget:
-        """The widget in the form."""
+        """Widget with which the user edits the value in the form."""
 
     @property
     def complaint(self) -> str:
@@ -32,7 +32,7 @@ class Editor(Protocol):
         """Return the value as stored in a plan file; None for an empty field."""
 
     def show_content(self, content: Any) -> None:
-        """Show a value from a file."""
+        """Show a value as read from a plan file; None for an empty field."""
 
 
 _LEFT_OPEN = "default"
@@ -55,11 +55,11 @@ class QuantityEditor:
         return self._edit.complaint
 
     def content(self) -> float | int | None:
-        """Return the number."""
+        """Return the typed number; None for an empty field."""
         return self._edit.value()
 
     def show_content(self, content: Any) -> None:
-        """Show a number."""
+        """Show a number in the field."""
         self._edit.set_value(content)
 
 
@@ -133,11 +133,11 @@ class ChoiceEditor:
         self.widget = self._box
 
     def content(self) -> Any:
-        """Return the chosen value."""
+        """Return the value chosen in the list."""
         return self._box.currentData()
 
     def show_content(self, content: Any) -> None:
-        """Choose a value."""
+        """Choose a value in the list."""
         place = self._box.findData(content)
         if place >= 0 and content is not None:
             self._box.setCurrentIndex(place)
@@ -172,11 +172,11 @@ class TextEditor:
         self.widget = self._line
 
     def content(self) -> str:
-        """Return the text."""
+        """Return the typed text."""
         return self._line.text()
 
     def show_content(self, content: Any) -> None:
-        """Show a text."""
+        """Show a text in the field."""
         self._line.setText("" if content is None else str(content))
 
 
@@ -200,11 +200,11 @@ class SuggestionEditor:
         self.widget = self._box
 
     def content(self) -> str:
-        """Return the text."""
+        """Return the chosen or typed text."""
         return self._box.currentText()
 
     def show_content(self, content: Any) -> None:
-        """Show a text."""
+        """Show a text in the field."""
         self._shown = "" if content is None else str(content)
         self._box.setCurrentText(self._shown)
 
@@ -237,7 +237,7 @@ class ListEditor:
         return self._complaint
 
     def content(self) -> Any:
-        """Return the values."""
+        """Return the numbers of the typed list."""
         self._complaint, text = "", self._line.text()
         if text == self._shown[0]:
             return self._shown[1]
@@ -257,7 +257,7 @@ class ListEditor:
         return []
 
     def show_content(self, content: Any) -> None:
-        """Show values."""
+        """Show a list of numbers in the field."""
         values = list(content or ())
         texts = (quantity_text(each, self._unit) for each in values)
         text = ", ".join(texts) if self._unit else json.dumps(values)[1:-1]

@@ -52,7 +52,7 @@ class FieldFacts:
 
     @property
     def limits(self) -> str:
-        """Allowed values, in the chosen units."""
+        """Allowed range of the field, in the chosen units."""
         return UNITS.convert(self.allowed)
 
     @property
@@ -68,12 +68,12 @@ class FieldFacts:
 
     @property
     def accessible_name(self) -> str:
-        """Name for screen readers."""
+        """Name of the field for screen readers."""
         return f"{self.label} in {self.shown_unit}" if self.unit else self.label
 
 
 def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
-    """Return the description of a field."""
+    """Return the description of a model's field for the form."""
     suffix, unit = next(((s, u) for s, u in _ENDINGS if name.endswith(s)), ("", ""))
     words = name.removesuffix(suffix).replace("_", " ")
     return FieldFacts(

@@ -73,7 +73,7 @@ class ModelForm(QWidget):
 
     @property
     def editors(self) -> dict[str, Editor]:
-        """Editors by field name."""
+        """Editors of the form, by field name."""
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
@@ -354,7 +354,7 @@ class ValidatedForm(QWidget, Generic[Model]):
 
     @property
     def complaint(self) -> str:
-        """All complaints, as one text."""
+        """All complaints about the content, as one text."""
         return self._complaint.text()
 
     @property

@@ -133,7 +133,7 @@ class QuantityEdit(QAbstractSpinBox):
         return self._value
 
     def set_value(self, value: float | int | None) -> None:
-        """Set the number."""
+        """Set the number that the field shows."""
         self._value, self.complaint, self._value_to_confirm = value, "", None
         text = "" if value is None else quantity_text(value, self._unit)
         self._shown_unit = unit_of(text, self._unit)

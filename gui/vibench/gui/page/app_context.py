@@ -57,7 +57,7 @@ class Settings:
         )
 
     def text(self, key: SettingKey, otherwise: str = "") -> str:
-        """Return a stored text, or ``otherwise``."""
+        """Return a stored text of the settings; ``otherwise`` if none is stored."""
         value = self._store.value(key.value)
         return value if isinstance(value, str) and value else otherwise
 
@@ -69,7 +69,7 @@ class Settings:
             return otherwise
 
     def keep_text(self, key: SettingKey, value: str) -> None:
-        """Store a text."""
+        """Store a text in the settings file."""
         self._store.setValue(key.value, value)
 
     def state(self, key: SettingKey, name: str = "") -> QByteArray:
@@ -111,19 +111,19 @@ class Selection(QObject):
         """Predicted response of the specimen to the current test; None until it is computed."""
 
     def choose_rig(self, rig: Rig | None) -> None:
-        """Select another rig."""
+        """Select another rig for all pages."""
         if rig != self.rig:
             self.rig = rig
             self.rig_changed.emit()
 
     def choose_measurement(self, measurement: Measurement | None) -> None:
-        """Select another test."""
+        """Select another test for all pages."""
         if measurement != self.measurement:
             self.measurement, self.prediction = measurement, None
             self.measurement_changed.emit()
 
     def choose_campaign(self, campaign: Campaign | None) -> None:
-        """Select another campaign."""
+        """Select another campaign for all pages."""
         if campaign != self.campaign:
             self.campaign = campaign
             self.campaign_changed.emit()
@@ -194,7 +194,7 @@ class AppContext(QObject):
 
     @property
     def folder(self) -> Path:
-        """Folder of recordings."""
+        """Folder into which new recordings are written."""
         return Path(self.settings.text(SettingKey.FOLDER, str(Path.home() / "vibench")))
 
     def choose_folder(self, folder: Path) -> None:
@@ -221,5 +221,5 @@ class AppContext(QObject):
         self.say(Notice(NoticeKind.WARNING, what, done, next_step, details=details))
 
     def fail(self, error: BaseException) -> None:
-        """Show an error."""
+        """Show an error in the message strip."""
         self.say(notice_of(error))

@@ -111,7 +111,7 @@ class Page(QWidget):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Displayed results with their inputs."""
+        """Results that the page displays, each with the inputs from which it was computed."""
         return ()
 
     @property

@@ -18,7 +18,7 @@ from ..widgets.units import CHOICES, UNITS, ShownUnit
 
 
 class Scale(Enum):
-    """Scale of an axis."""
+    """Scale of an axis: linear or logarithmic."""
 
     LINEAR = auto()
     LOGARITHMIC = auto()
@@ -58,7 +58,7 @@ class PlotAxis:
 
     @property
     def text(self) -> str:
-        """Label and unit."""
+        """Label of the axis: quantity and unit."""
         return self._with_unit(self.label)
 
     @property
@@ -99,11 +99,11 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     @property
     def axis(self) -> PlotAxis:
-        """Quantity, unit and scale."""
+        """Quantity, unit and scale of this axis."""
         return self._axis
 
     def show_unit(self, axis: PlotAxis) -> None:
-        """Replace quantity, unit and scale."""
+        """Replace quantity, unit and scale of this axis."""
         self._axis = axis
         self._show_other_unit()
 

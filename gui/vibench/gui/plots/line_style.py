@@ -144,5 +144,5 @@ class Band:
         return (float(below[place]), float(above[place])) if np.isfinite(below[place]) else None
 
     def paint(self, shade: object) -> None:
-        """Set the colour of the area."""
+        """Set the colour of the filled area."""
         self.item.setFillBrush(shade)

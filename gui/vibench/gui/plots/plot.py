@@ -89,7 +89,7 @@ class LegendLine(QLabel):
         self.setFont(font)
 
     def show_entries(self, entries: tuple[LegendEntry, ...]) -> None:
-        """Show the names of these curves."""
+        """Show the names of these curves in the legend."""
         text = "&nbsp;&nbsp;&nbsp; ".join(
             f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
             f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
@@ -195,7 +195,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return item
 
     def dots(self, line_style: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
-        """Add points without a line."""
+        """Add a set of points that no line connects."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
         self._add(item, name)
         if name:
@@ -220,7 +220,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return item
 
     def rules(self, line_style: LineStyle) -> Rules:
-        """Add vertical lines without labels."""
+        """Add a set of vertical lines without labels."""
         item = Rules(self.scales[0].drawn)
         self.addItem(item, ignoreBounds=True)
         self._line_style(
@@ -246,7 +246,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._place_levels()
 
     def wipe(self) -> None:
-        """Remove all curves, bands and lines."""
+        """Remove all curves, bands and lines from the plot."""
         self.getPlotItem().clear()
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
@@ -346,7 +346,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
                 self._place_legend()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave all keys to the page."""
+        """Pass every key on to the page."""
         event.ignore()
 
     def leaveEvent(self, event: QEvent) -> None:

@@ -24,11 +24,11 @@ class PlotStack(QWidget):
         self._layout.setSpacing(2)
 
     def retheme(self, theme: Theme) -> None:
-        """Use other colours for new plots."""
+        """Use the colours of another theme for new plots."""
         self._theme = theme
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep all plots equally high."""
+        """Keep all plots of the stack equally high."""
         super().resizeEvent(event)
         self._share_height()
 

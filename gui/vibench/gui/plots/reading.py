@@ -108,7 +108,7 @@ class Reading:
         self._place_marks()
 
     def hide(self) -> None:
-        """Hide the crosshair; the mark stays."""
+        """Hide the crosshair; the mark stays visible."""
         if self._label is not None:
             self.place = None
             self._label.hide()

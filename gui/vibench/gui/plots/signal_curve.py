@@ -26,7 +26,7 @@ class SignalCurve:
         plot.getViewBox().sigXRangeChanged.connect(self._redraw)
 
     def set_samples(self, samples: NDArray[np.floating], sample_rate_hz: float, start_s: float = 0.0) -> None:
-        """Set the signal, shape (samples,)."""
+        """Set the samples of the signal, shape (samples,)."""
         self._samples = np.asarray(samples)
         self._rate_hz, self._start_s = sample_rate_hz, start_s
         self._drawn = None

@@ -46,7 +46,7 @@ class Stripes(_UprightMarks):
         self.update()
 
     def dress(self, shade: object) -> None:
-        """Set the colour."""
+        """Set the colour of the stripes."""
         self._shade = shade
         self.update()
 
@@ -75,12 +75,12 @@ class Rules(_UprightMarks):
         self._places: NDArray[np.float64] = np.empty(0)
 
     def show_at(self, values: Iterable[float]) -> None:
-        """Show a line at each value."""
+        """Show a vertical line at each value."""
         self._places = np.array([self._across(value) for value in values], dtype=np.float64)
         self.update()
 
     def dress(self, pen: QPen) -> None:
-        """Set the pen."""
+        """Set the pen of the lines."""
         self._pen = pen
         self.update()
 

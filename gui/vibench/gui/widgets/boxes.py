@@ -222,7 +222,7 @@ class ElidedLabel(QLabel):
         self.setText(text)
 
     def setText(self, text: str) -> None:
-        """Show a text on one line."""
+        """Show a text on one line, cut off if necessary."""
         super().setText(printable(text))
 
     def setToolTip(self, text: str) -> None:

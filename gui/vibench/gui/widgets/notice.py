@@ -21,9 +21,9 @@ class Notice:
 
     kind: NoticeKind
     what: str
-    """What happened."""
+    """What happened, as a sentence."""
     done: str = ""
-    """What was done about it."""
+    """What the program did about it."""
     next_step: str = ""
     """Advice to the user on what to do next."""
     code: str = ""

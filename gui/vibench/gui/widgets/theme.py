@@ -38,9 +38,9 @@ class Theme:
     window: Colour
     base: Colour
     raised: Colour
-    """Background of buttons and headers."""
+    """Background colour of buttons and headers."""
     line: Colour
-    """Borders of groups and grids."""
+    """Colour of the borders of groups and grids."""
     edge: Colour
     """Borders of input fields, with a contrast ratio of at least 3."""
     text: Colour

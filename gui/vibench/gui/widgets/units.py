@@ -95,7 +95,7 @@ class DisplayUnits:
 
     @property
     def chosen(self) -> Mapping[str, str]:
-        """The chosen units by SI unit."""
+        """The chosen units, keyed by their SI unit."""
         return MappingProxyType(self._chosen)
 
     def choose(self, chosen: Mapping[str, str]) -> None:

@@ -64,7 +64,7 @@ class StatusLine(QFrame):
         frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
 
     def explain(self, field: StatusField, text: str) -> None:
-        """Set the tooltip of a field."""
+        """Set the tooltip of a field of the status line."""
         if self.labels[field].toolTip() != text:
             self.labels[field].setToolTip(text)
 
@@ -308,7 +308,7 @@ class MessageStrip(QFrame):
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """All messages, the newest last."""
+        """All messages that Details lists, the newest last."""
         return tuple(self._notices)
 
     def say(self, notice: Notice) -> None:

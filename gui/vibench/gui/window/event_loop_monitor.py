@@ -71,17 +71,17 @@ class EventLoopMonitor(QObject):
 
     @property
     def noted(self) -> tuple[Wait, ...]:
-        """Delays above `BOUND_S`, the newest last."""
+        """Delays of the event loop above `BOUND_S`, the newest last."""
         return tuple(self._noted)
 
     def begin(self) -> None:
-        """Discard all delays and measure again."""
+        """Discard all measured delays and start again."""
         self._waits.clear()
         self._noted.clear()
         self._before = self._clocks()
 
     def stop(self) -> None:
-        """Stop the measurement."""
+        """Stop the measurement of delays."""
         self._timer.stop()
         self._delays.close()
 

@@ -92,7 +92,7 @@ class SettingsDialog(QDialog):
         )
 
     def accept(self) -> None:
-        """Apply and store the settings."""
+        """Apply the settings to the window and store them."""
         wanted = self.form.value
         if wanted is None:
             return
@@ -261,7 +261,7 @@ def key_text(actions: tuple[MenuAction, ...]) -> str:
 
 
 def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
-    """Return all actions, menu by menu."""
+    """Return the actions of all menus, menu by menu."""
     context, actions = window.context, window.user_actions
     return (
         MenuAction("&File", "&Open…", lambda: _open(window), "Ctrl+O", "open any file"),
@@ -298,7 +298,7 @@ def menu_actions(window: "Window") -> tuple[MenuAction, ...]:
 
 
 def build_menus(window: "Window") -> None:
-    """Add the menus to a window."""
+    """Add the menu bar to a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
     table = menu_actions(window)

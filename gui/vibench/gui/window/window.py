@@ -364,19 +364,19 @@ class Window(QMainWindow):
         act(path)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accept a drag that contains files."""
+        """Accept a drag onto the window if it contains files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open the dropped files."""
+        """Open the files that were dropped onto the window."""
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         for path in paths[:MOST_DROPPED]:
             self.open_path(path)
         event.acceptProposedAction()
 
     def reset_layout(self) -> None:
-        """Restore the default layout."""
+        """Restore the default layout of the window."""
         self.context.settings.forget_layout()
         self.showNormal()
         self.resize(1280, 800)

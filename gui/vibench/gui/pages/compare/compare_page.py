@@ -143,7 +143,7 @@ class ComparePage(Page):
         self._say_progress()
 
     def add_prediction(self, curves: tuple[Curve, ...]) -> None:
-        """Overlay the curves of a prediction."""
+        """Overlay the curves of a prediction on the plotted curves."""
         for source in dict.fromkeys(each.source for each in curves):
             self.curves.replace_source(source, tuple(each for each in curves if each.source == source))
 
@@ -153,7 +153,7 @@ class ComparePage(Page):
         self.add_recordings(tuple(self._recordings))
 
     def cancel(self) -> None:
-        """Cancel unfinished analyses."""
+        """Cancel the analyses that are not finished."""
         for job in self._jobs:
             job.drop()
         self._jobs.clear()

@@ -112,7 +112,7 @@ class NumberTable(ReadTable):
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
     def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-        """Replace the displayed columns and rows."""
+        """Replace the columns and rows of the table."""
         self.setColumnCount(len(headings))
         self.setHorizontalHeaderLabels(list(headings))
         self.show_rows(rows)
@@ -193,7 +193,7 @@ class CurveList(QListWidget):
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """All curves."""
+        """All curves of the list, ticked or not."""
         return tuple(self._curves)
 
     def ticked(self) -> tuple[tuple[Curve, LineStyle], ...]:

@@ -101,7 +101,7 @@ class ListedCampaign:
 
 @dataclass(frozen=True)
 class Listing:
-    """Recordings and campaigns in a folder."""
+    """Contents of a folder: its recordings and campaigns."""
 
     recordings: tuple[ListedRecording, ...] = ()
     campaigns: tuple[ListedCampaign, ...] = ()
@@ -311,19 +311,19 @@ class RecordingModel(QAbstractTableModel):
         return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
-        """Add thumbnails to the rows."""
+        """Add thumbnails to the rows of their recordings."""
         self._thumbnails |= found
         if self.entries:
             self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self.entries) - 1, PICTURE))
 
     def retheme(self, theme: Theme) -> None:
-        """Redraw the thumbnails in other colours."""
+        """Redraw the thumbnails in the colours of another theme."""
         self._theme = theme
         self._pictures.clear()
         self.show_thumbnails({})
 
     def rowCount(self, parent: Index = _NOWHERE) -> int:
-        """Return the number of files."""
+        """Return the number of rows: one per recording."""
         return 0 if parent.isValid() else len(self.entries)
 
     def columnCount(self, parent: Index = _NOWHERE) -> int:
@@ -423,7 +423,7 @@ class RecordingTable(QTableView):
             hint_in_list(self, words)
 
     def retheme(self, theme: Theme) -> None:
-        """Redraw the thumbnails in other colours."""
+        """Redraw the thumbnails in the colours of another theme."""
         self.recordings.retheme(theme)
 
     def search(self, text: str) -> None:

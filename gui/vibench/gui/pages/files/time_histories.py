@@ -92,12 +92,12 @@ class RecordingTimeHistories(PlotStack):
         return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
 
     def show_all(self) -> None:
-        """Show the whole recording."""
+        """Show the time histories over the whole recording."""
         if self._overview is not None:
             self.show_range(0.0, self._overview.recording.duration_s)
 
     def show_range(self, low_s: float, high_s: float) -> None:
-        """Show a time range [s]."""
+        """Show the time histories in a time range [s]."""
         if self._histories:
             self._histories[0].plot.setXRange(low_s, high_s, padding=0.0)
 
@@ -115,12 +115,12 @@ class RecordingTimeHistories(PlotStack):
         self.show_range(low_s + step_s, high_s + step_s)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Redraw for the new width."""
+        """Redraw the time histories for the new width."""
         super().resizeEvent(event)
         self._later.start()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move and zoom with keys."""
+        """Move and zoom the visible time range with keys."""
         match event.key():
             case Qt.Key.Key_Left:
                 self.move(-_STEP)

@@ -206,12 +206,12 @@ class QueuePage(Page):
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
     def left(self) -> None:
-        """Store the campaign."""
+        """Store the edited campaign in the settings."""
         campaign = self.context.selection.campaign
         self.context.settings.keep_text(SettingKey.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
     def open_file(self, path: Path) -> None:
-        """Load the campaign of a file."""
+        """Load the campaign of a file for editing."""
         try:
             self.context.selection.choose_campaign(load_campaign(path))
             self.context.note_file(path)

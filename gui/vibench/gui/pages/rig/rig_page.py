@@ -74,7 +74,7 @@ class RigChoice(QWidget):
 
     @property
     def path(self) -> Path | None:
-        """The selected file."""
+        """Path of the selected hardware configuration."""
         row = self._box.currentIndex()
         return self._paths[row] if 0 <= row < len(self._paths) else None
 
@@ -144,7 +144,7 @@ class KnobSheetForm(QGroupBox):
 
     @property
     def ticks(self) -> tuple[QCheckBox, ...]:
-        """Check boxes of the knobs."""
+        """Check boxes with which the user confirms the knobs."""
         return tuple(self._ticks.values())
 
     def show_rig(self, rig: Rig | None) -> None:
@@ -281,7 +281,7 @@ class RigPage(Page):
             self.context.warn("A bench is open.", "It was kept.", "Close it, then choose another.")
 
     def open_bench(self) -> None:
-        """Open the chosen bench."""
+        """Open the bench of the selected rig."""
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])

@@ -228,7 +228,7 @@ class TransmissibilityPlot(QWidget):
         show_predicted(self._predicted, seen)
 
     def clear(self) -> None:
-        """Clear the plot."""
+        """Clear the plot of the transmissibility."""
         for curve in (self._measured, self._coherence):
             curve.clear()
         self._band.set_data([], [], [])
@@ -275,7 +275,7 @@ class SpectrumPlot(QWidget):
             self.show_view(self._view)
 
     def clear(self) -> None:
-        """Clear the plot."""
+        """Clear the plot of the spectra."""
         self._view = None
         for curve in self._curves:
             curve.clear()
@@ -323,7 +323,7 @@ class PortraitPlot(QWidget):
         self._points.setData(section.displacement_m, section.velocity_m_per_s)
 
     def clear(self) -> None:
-        """Clear the plots."""
+        """Clear phase portrait and Poincaré section."""
         for item in (self._orbit, self._strobe, self._points):
             item.clear()
 

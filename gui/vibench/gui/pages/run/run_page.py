@@ -107,7 +107,7 @@ class LevelMeters(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
 
     def show_view(self, view: LiveView) -> None:
-        """Show the newest levels."""
+        """Show the newest levels of all channels."""
         words = [channel_word(channel.role) for channel in view.channels]
         rows = tuple(zip(words, view.levels, strict=False))
         if len(rows) != len(self._rows):

@@ -37,7 +37,7 @@ class AnswerPicture(Protocol[Shown_contra]):
 
     @property
     def widget(self) -> QWidget:
-        """Widget of the plots."""
+        """Widget that contains the plots."""
 
     def show_answer(self, answer: Shown_contra) -> None:
         """Draw a result."""
@@ -88,7 +88,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     @property
     def summary(self) -> str:
-        """Text below the plots."""
+        """Text below the plots: computing time and error."""
         return self._state.text()
 
     @property
@@ -104,7 +104,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
             self.picture.show_answer(self.answer)
 
     def begin(self) -> None:
-        """Compute the request of the form."""
+        """Start to compute the request that the form describes."""
         request = self.form.value
         if request is None:
             return

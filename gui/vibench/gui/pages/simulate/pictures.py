@@ -165,7 +165,7 @@ class ChainPicture:
 
     @property
     def plots(self) -> tuple[Plot, Plot, Plot]:
-        """All plots."""
+        """All plots of a chain."""
         return self.across, self.motion, self.energies
 
     def show_answer(self, answer: ChainAnswer) -> None:
@@ -248,7 +248,7 @@ class AnswerPlots(QWidget):
 
     @property
     def plots(self) -> tuple[Plot, ...]:
-        """All plots, row by row."""
+        """All plots of a simulation, row by row."""
         return (self.responses, self.motion, self.exponents, self.likeness)
 
     def show_progress(self, progress: SimulationProgress | None) -> None:

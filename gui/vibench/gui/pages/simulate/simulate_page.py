@@ -78,7 +78,7 @@ class SimulatePage(Page):
             view.refresh()
 
     def left(self) -> None:
-        """Store the scene."""
+        """Store the scene of the form in the settings."""
         self.context.settings.keep_text(SettingKey.SCENES, json.dumps(self.form.form.content()))
 
     @property

@@ -394,7 +394,7 @@ class TestPage(Page):
         return nameless, self.context.selection.rig
 
     def left(self) -> None:
-        """Store the test."""
+        """Store the edited test in the settings."""
         measurement = self.form.value
         if measurement is not None:
             self.context.settings.keep_text(SettingKey.TEST, toml_text(measurement))
@@ -512,7 +512,7 @@ class TestPage(Page):
             self.open_file(Path(given))
 
     def open_file(self, path: Path) -> None:
-        """Load the test of a file."""
+        """Load the test of a file for editing."""
         try:
             self.form.show_value(load_test(path))
             self.context.note_file(path)
