@@ -41,7 +41,7 @@ from .output import ExitCode, errors
 
 
 class Panel(StrEnum):
-    """Headings in the list of commands."""
+    """Headings under which `vibench --help` lists the commands."""
 
     MEASURE = "Measure"
     ANALYSE = "Analyse"
@@ -53,7 +53,7 @@ class Panel(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a command is defined, and what it requires."""
+    """Place where a command is defined, and what the command needs to run."""
 
     panel: Panel
     function: str
@@ -246,7 +246,7 @@ class OneLine(logging.Formatter):
     """Formatter that writes a log message on one line, without control characters from names or replies."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
-        """Return a message as one line."""
+        """Return a log message as one line."""
         return printable(super().formatMessage(record))
 
 
@@ -258,7 +258,7 @@ class LogBeside(logging.StreamHandler[TextIO]):
         self._beside = Beside("log")
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue a message to be written."""
+        """Queue a log message, which another thread writes."""
         self._beside.do(lambda: super(LogBeside, self).emit(record))
 
     def close(self) -> None:

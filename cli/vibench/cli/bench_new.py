@@ -85,7 +85,7 @@ class Answers:
 
     @property
     def operator(self) -> str:
-        """Name of the operator."""
+        """Name of the operator who sets up the bench."""
         return _name_in_a_comment(self.given.get(_OPERATOR, ""))
 
 

@@ -72,7 +72,7 @@ class Analyst:
                     yield results
 
     def together(self) -> CampaignResults:
-        """Return all results as one campaign."""
+        """Return the results of all recordings as one campaign."""
         return merged_results(self._name, tuple(self.results()))
 
 

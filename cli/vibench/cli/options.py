@@ -234,7 +234,7 @@ class SectionedGroup(TyperGroup):
     """Group whose help lists the commands by heading, each with the whole first line of its help."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
-        """Write a section for each heading."""
+        """Write a section of the command list for each heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
         for name, each in self.commands.items():
             heading = getattr(each, "rich_help_panel", None) or "Commands"
