@@ -28,7 +28,7 @@ MOST_BYTES = 6 << 30
 MOST_WAITING = 200
 """Number of unread messages at which a worker waits until `Pool.poll` reads them."""
 GRACE_S = 2.0
-"""Time that a cancelled job has to end before its process is killed [s]."""
+"""Time allowed for a cancelled job to end, before its process is killed [s]."""
 
 
 @dataclass(frozen=True)
@@ -276,7 +276,7 @@ class Worker:
 
 
 def _serve(connection: Any) -> None:
-    """Run jobs in a thread until the other end of the pipe is closed."""
+    """Run jobs in a worker process until the parent closes its end of the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     with suppress(OSError):
         lower_priority(NICE)

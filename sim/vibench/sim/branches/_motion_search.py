@@ -1,4 +1,4 @@
-"""Periodic motions at one drive, from many starts: from rest, between the stops, and at random. SI units."""
+"""Periodic motions at one drive, from many initial states: rest, free motion and random states. SI units."""
 
 import math
 import time

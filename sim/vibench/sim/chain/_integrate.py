@@ -115,7 +115,7 @@ class ChainRun:
 
     @property
     def impact_times_s(self) -> Floats:
-        """Start times of the contacts, shape (count,) [s]; not sorted within a window."""
+        """Times at which contacts begin, shape (count,) [s]; not sorted within a time window."""
         return self._times[: self.impacts]
 
     @property
@@ -142,7 +142,7 @@ class ChainImpacts:
     """Start times and cells of all contacts in a run."""
 
     times_s: Floats
-    """Start times of contacts, ascending, shape (count,) [s]."""
+    """Times at which contacts begin, ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
     """Number of the cell of each contact, counted from 0 at the base, shape (count,)."""
     per_cell: NDArray[np.int64]

@@ -142,7 +142,7 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Return the second motion moved to the small distance from the first, on the line between them."""
+    """Return the second motion, moved on the line between both to the small distance from the first."""
     apart = second - first
     # Compare at least with a displacement of all masses by the drive amplitude: at rest the size is zero.
     base = np.zeros_like(first)

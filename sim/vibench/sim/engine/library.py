@@ -239,7 +239,7 @@ class Engine:
         readings: Structure,
         last: int,
     ) -> int:
-        """Advance to the end of interval ``last`` and fill ``readings``; return the same as `run`."""
+        """Advance to the end of interval ``last`` and fill ``readings``; return an outcome as `run` does."""
         filled = (each.ctypes.data for each in (record, tangent, readings))
         return int(
             self._library.vibench_take_readings(

@@ -41,7 +41,7 @@ KNOWN_MOTION = (
     2.63303389e-02,
     -1.20895040e-02,
 )
-"""Known state at this time of the paper's specimen, loss 0.5 s/m, driven from rest by 20 um at 130 Hz."""
+"""Known state of the paper's specimen (loss 0.5 s/m), 30 ms after rest, driven at 20 um and 130 Hz."""
 KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 
@@ -188,7 +188,7 @@ class NativeRun(_Run):
         return twin
 
     def carry(self, changes: Floats) -> None:
-        """Propagate tangent vectors of shape (n, 6) from now on; n = 0 ends this."""
+        """Propagate tangent vectors of shape (n, 6) from now on; n = 0 ends the propagation."""
         self._tangent["changes"] = len(changes)
         self._tangent["rows"][: len(changes)] = changes
         self._tangent["growth"] = 0.0

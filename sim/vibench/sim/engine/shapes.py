@@ -50,7 +50,7 @@ def _cardinal(at: Table, points: Vector) -> Table:
 
 
 def _about_middle() -> Table:
-    """Return the matrix from depths at the points to Taylor coefficients in phi about its middle."""
+    """Return the matrix from depths at the Gauss points to Taylor coefficients about the middle of phi."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
@@ -63,7 +63,7 @@ at a tenth of it they have rounding error."""
 
 
 def _top_of(terms: Vector) -> float:
-    """Return the maximum of a Taylor polynomial near its centre."""
+    """Return the maximum of a Taylor polynomial near the centre of expansion."""
     polynomial = np.polynomial.Polynomial(terms)
     slope, bend = polynomial.deriv(), polynomial.deriv(2)
     at = 0.0
@@ -154,7 +154,7 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
 # these values (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
-"""Number of Gauss points in a step. Ten would cost 50 % more and allow only 10 % longer steps."""
+"""Number of Gauss points in a time step; ten would cost 50 % more for only 10 % longer steps."""
 ORDER = 32
 """Number of terms of the series; in the longest step, the next term is 1e-20 of the largest."""
 POWER_QUADRATURE = 24

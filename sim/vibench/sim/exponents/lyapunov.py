@@ -83,7 +83,7 @@ class Precision:
             raise ValueError(f"Precision {self} is not allowed: give zero or positive numbers.")
 
     def is_reached_by(self, exponents: Floats) -> bool:
-        """Return whether the mean of local exponents, shape (n,), has this precision."""
+        """Return whether the mean of local exponents, shape (n,), has the required precision."""
         if len(exponents) < FEWEST_INTERVALS:
             return False
         found = block_mean(exponents)
@@ -187,7 +187,7 @@ def lyapunov_exponent(
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
-    """Return the number of settling intervals; raise ValueError if too few intervals follow them."""
+    """Return the number of intervals for settling; raise ValueError if too few are left for the average."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
             f"Duration {duration_s} s after {settle_s} s of settling: both must be finite, the first > 0."

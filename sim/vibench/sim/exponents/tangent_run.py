@@ -41,7 +41,7 @@ CONFIDENCE = 0.99
 
 @dataclass(frozen=True)
 class BlockedMean:
-    """Mean of a series with its standard error."""
+    """Mean of a correlated series, with the standard error of the mean."""
 
     mean: float
     standard_error: float
@@ -262,7 +262,7 @@ class FinalMotion(StrEnum):
 
 @dataclass(frozen=True)
 class Settling:
-    """Final kind of motion of a run, and the interval in which it begins."""
+    """Final kind of motion of a run, and the interval in which this motion begins."""
 
     motion: FinalMotion
     since: int

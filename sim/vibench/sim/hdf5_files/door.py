@@ -21,7 +21,7 @@ LARGEST_CHUNK_BYTES = 256_000_000
 LARGEST_RATIO = 1100
 """Largest ratio of declared to stored bytes; Deflate compresses by at most 1030 (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
-"""Largest size that a dataset may declare beyond its stored data; HDF5 fills it with a constant."""
+"""Largest size [bytes] that a dataset may declare beyond its stored data, for constant fill values."""
 OWN_FILTERS = frozenset(
     {
         h5py.h5z.FILTER_DEFLATE,
@@ -46,7 +46,7 @@ _allowances: list[None] = []
 
 
 class UnsafeHdf5(ValueError):
-    """Error: a file refers to other files or is inconsistent; the message does not contain its path."""
+    """Error: a file refers to other files or is inconsistent; the message does not name the file."""
 
 
 def system_error(error: BaseException) -> str:

@@ -52,7 +52,7 @@ def map_solver(plan: Map) -> Solver:
 
 
 class MapPoints(Points):
-    """The points of a map as scenes."""
+    """Points of a map, converted to scenes."""
 
     bundle_s = BUNDLE_S
 
@@ -176,7 +176,7 @@ class MapEstimate:
 
     points: int
     coarse_points: int
-    """Number of points of the first lattice, which are computed in any case."""
+    """Number of points of the first lattice; all of these are computed."""
     work_s: float
     """Computing time of all points on one core [s], from recent run times on this machine."""
     longest_work_s: float

@@ -128,7 +128,7 @@ class Quantity:
     field: str
     """Name of the field of `Map` for this parameter."""
     axis: str
-    """Name of the axis for this parameter in the results."""
+    """Name of the results' axis for this parameter."""
     units: str
     long_name: str
 

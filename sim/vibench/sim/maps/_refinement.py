@@ -17,7 +17,7 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Largest number and largest share of filled-in cells that are computed to check them (audit)."""
+"""Largest number and largest share of filled-in cells that are computed as a check (audit)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
 
 @dataclass(frozen=True)
 class MapMotion:
-    """A motion in a map or in one cell. A motion and its mirror image count as one."""
+    """Motion found in a map or in one cell; a motion and its mirror image count as one motion."""
 
     motion: MotionKind
     period: int | None

@@ -1,4 +1,4 @@
-"""Compute the points of a map that are needed, then fill in the others."""
+"""Compute the necessary points of a map, then fill in all other points."""
 
 from pathlib import Path
 from typing import Literal

@@ -83,7 +83,7 @@ class Impacts:
     """Impacts of m1 on its stops during a run."""
 
     times_s: Floats
-    """Start times of contacts, ascending, shape (count,) [s]."""
+    """Times at which contacts begin, ascending, shape (count,) [s]."""
 
     @property
     def count(self) -> int:
@@ -257,7 +257,7 @@ def integrate_cubics(
 
 
 def _place(time_s: float, interval_s: float) -> tuple[int, float]:
-    """Return the index of the interval that contains a time, and the time since its start [s]."""
+    """Return the index of the interval that contains a time, and the time since the interval's start [s]."""
     position = time_s / interval_s
     nearest = round(position)
     if abs(position - nearest) < ROUNDING * max(1.0, position):

@@ -63,7 +63,7 @@ class OpenFile:
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``; only after `sync` it is certainly on the disk."""
+        """Write ``data`` at ``offset``; the data are certainly on the disk only after `sync`."""
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
@@ -131,13 +131,13 @@ class Place(Enum):
 
     HERE = auto()
     CONTAINER = auto()
-    """On this computer since its last boot, but in another container."""
+    """The process was started on this computer since its last boot, but in another container."""
     ELSEWHERE = auto()
-    """On another computer, or on this computer before its last boot."""
+    """The process was started on another computer, or on this computer before its last boot."""
 
 
 def place_of(start: str) -> Place:
-    """Return the place where a process was started; `Place.HERE` if it is unknown."""
+    """Return the place where a process was started; `Place.HERE` if the place is unknown."""
     own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
     if len(own) != len(other) or own[:-1] == other[:-1]:
         return Place.HERE

@@ -150,7 +150,7 @@ class OrbitSigns:
     apart: Vector = field(default_factory=lambda: np.zeros(0))
     """Difference of the state after half a period or mirrored, shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
-    """Bifurcation by which this branch leaves the branch of motions with half the period or mirrored."""
+    """Bifurcation at which this branch meets the branch of motions with half the period or mirrored."""
     grazing_distance: float = math.inf
     """Distance from grazing: p to the stop over the gap or, at a contact, dp/dt over the gap times 2 pi f."""
 
@@ -209,7 +209,7 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
-    """Return the test function for an event of this kind; it changes sign at the event."""
+    """Return the value of the test function for a kind of event; the function changes sign at the event."""
     match kind:
         case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0

@@ -69,7 +69,7 @@ class ArcPoint:
     tangent: Vector
     """Unit tangent in the direction of travel, shape (n + 1,)."""
     arc: float = 0.0
-    """Arc length from the start of the curve."""
+    """Arc length from the first point of the curve."""
     is_fold: bool = False
     """Whether the parameter reverses at this point (a fold); such a point is inserted between two steps."""
     end: ArcEnd | None = None

@@ -160,7 +160,7 @@ def first_order_states(
 
 
 def _describing(size: float, spring: PowerSpring) -> float:
-    """Return the describing function N = F_1 / P at abs(P) = size * length [N/m]; inf if it overflows."""
+    """Return the describing function N = F_1 / P at abs(P) = size * length [N/m]; inf on overflow."""
     with np.errstate(over="ignore"):
         return float(
             sum(

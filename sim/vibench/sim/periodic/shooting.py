@@ -86,7 +86,7 @@ class PeriodMap:
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
-        """Return the motion over its whole period, sampled ``samples`` times per drive period."""
+        """Return the motion from a state over its whole period, with ``samples`` samples per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
@@ -155,7 +155,7 @@ class ShootingEnd(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
-    """A periodic motion with its stability and responses."""
+    """Periodic motion found by shooting, with its stability and responses."""
 
     drive: Harmonic
     period_map: PeriodMap

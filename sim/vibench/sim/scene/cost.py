@@ -71,7 +71,7 @@ class Expected:
     """Expected computing time with its uncertainty."""
 
     time_s: float
-    """Expected time on one core of this machine [s]."""
+    """Expected computing time on one core of this machine [s]."""
     factor: float
     """Uncertainty factor: 95 % of such runs take from ``time_s / factor`` to ``time_s * factor``."""
     runs: int
@@ -195,7 +195,7 @@ PILOTS, PILOT_S, PILOT_SHARE = 16, 1.0, 0.25
 """Pilot runs of scenes with a target: largest number of scenes, total time [s], and share of the remaining
 time that each scene may use."""
 UNDECIDED = 3.0
-"""Assumed time of a scene over the time of its pilot run, if this run did not reach the target."""
+"""Assumed ratio of a scene's time to its pilot run's time, if the pilot run missed the target."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",

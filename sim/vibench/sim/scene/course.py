@@ -36,7 +36,7 @@ from .states_alone import StatesAlone
 
 @dataclass(frozen=True, eq=False)
 class SceneRun:
-    """Observed window of a run, and kind of its motion."""
+    """Observed response window of a run, and the kind of the motion."""
 
     window: ObservedWindow
     blocks: tuple[Block, ...]
@@ -327,7 +327,7 @@ def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
 
 
 def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretch], pace: Pace) -> SceneRun:
-    """Observe one period of a repeating motion, and find the time at which it settled."""
+    """Observe one period of a repeating motion, and find the time at which the motion settled."""
     settled_s, begins = run.time_s, run.apart()
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)

@@ -27,7 +27,7 @@ class FixedPoint:
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
-    """Return the stable motion with this period, in drive periods, near a run; None if there is none."""
+    """Return the stable periodic motion near a run, with this period in drive periods; None if none."""
     try:
         return _fixed_point(near, period)
     except (ValueError, np.linalg.LinAlgError):

@@ -294,7 +294,7 @@ class ObservedWindow:
     """Observations of a motion in a window. SI units."""
 
     begins: FollowedRun
-    """Run at the start of the window."""
+    """State of the run at the start of the window."""
     stretches: tuple[Stretch, ...]
     """Consecutive stretches of which the window consists."""
     blocks: tuple[Block, ...]
@@ -323,7 +323,7 @@ class ObservedWindow:
 
     @property
     def responses_m(self) -> Floats:
-        """Largest abs(x), amplitude of x at the drive frequency, and the same for p, shape (4,) [m]."""
+        """Largest abs(x) and amplitude of x at the drive frequency, then both for p, shape (4,) [m]."""
         return np.array([self.largest_x_m, abs(self.line_x_m), self.largest_p_m, abs(self.line_p_m)])
 
     @property

@@ -166,7 +166,7 @@ class ScenePlan:
 
     @property
     def alike(self) -> tuple[str, ...]:
-        """Key that is the same for scenes solved in the same way, whatever their parameters."""
+        """Key of the solution method; scenes that are solved in the same way have equal keys."""
         return (self.method.value, *self.sentences[1:])
 
     @property
@@ -364,5 +364,5 @@ def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
 
 
 def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Return whether the drive is below all natural frequencies, so that other starts are not needed."""
+    """Return whether the drive is below all natural frequencies, so that a run from one start suffices."""
     return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

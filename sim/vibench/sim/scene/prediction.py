@@ -67,7 +67,7 @@ class FoundMotion:
     error_estimate: float | None
     """Expected relative change of Response I in another run that reaches this motion."""
     starts: int
-    """Number of starts that reached this motion."""
+    """Number of starts (initial states) that led to this motion."""
     share: Share
     """Share of all starts; the 95 % intervals of all motions hold together. They allow for longer runs, in
     which starts that are undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
@@ -91,7 +91,7 @@ class Ensemble:
     scatter: float | None
     """Relative standard deviation of Response I over all starts."""
     followed_s: float
-    """Sum of the simulated times of all starts [s]."""
+    """Sum of the simulated times of the runs from all starts [s]."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class ScenePrediction:
     lyapunov_error_per_s: float | None = None
     """Standard error of the Lyapunov exponent [1/s]."""
     start: str
-    """Name of the start: "rest", or the name given in the scene."""
+    """Name of the initial state: "rest", or the name given in the scene."""
     final_state: State
     outcome: Outcome
     method: Method
@@ -211,11 +211,11 @@ class ScenePrediction:
     section: Floats | None = None
     """States once per drive period in the window, shape (n, 6), if a Poincaré section was requested."""
     spectrum_hz: Floats | None = None
-    """Frequencies of the spectrum, shape (lines,) [Hz], if a spectrum was requested."""
+    """Frequencies of the spectral lines, shape (lines,) [Hz], if a spectrum was requested."""
     spectrum: Floats | None = None
-    """Amplitude of x at each frequency over the drive amplitude, shape (lines,)."""
+    """Amplitude of x at each spectral line over the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
-    """Whether the start determines the final motion."""
+    """Whether the start (initial state) determines the final motion."""
     ensemble: Ensemble | None = None
     """Motions reached from other starts; None if the start determines the motion, or no time was allowed."""
     target: TargetReport | None = None

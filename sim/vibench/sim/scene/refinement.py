@@ -58,14 +58,14 @@ FIRST_CYCLES = 1e4
 CLOSE = 3e-3
 """Relative change of the state from one period to the next below which Newton's iteration is tried."""
 KNOWN = 0.03
-"""Relative distance from a known periodic motion below which the run may be approaching it."""
+"""Relative distance from a known periodic motion, below which a run may be approaching that motion."""
 MOST_PUSH = 1000.0
 """Largest length, over the drive amplitude, that replaces the gap as the size of changes of the start."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
-"""Number of checks of another start before its window begins."""
+"""Number of checks of the run from another start before the run's window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""
@@ -124,7 +124,7 @@ class _Orbit:
 
 @dataclass(eq=False)
 class _Path:
-    """Motion from a start, with the periodic motion that it may approach."""
+    """Run from one start, with the periodic motion that the run may approach."""
 
     run: FollowedRun
     recent: Floats
@@ -190,7 +190,7 @@ class _Refinement:
         self._run_error: float | None = None
         """Relative integration error of the responses of each start; None if not yet measured."""
         self._kind: MotionKind | None = None
-        """Kind of the first start's motion if it does not repeat; None if not yet known."""
+        """Kind of the motion from the first start if that does not repeat; None if not yet known."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
@@ -327,7 +327,7 @@ class _Refinement:
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Return a stable motion near a run, with this period (in drive periods) or a divisor of it."""
+        """Return a stable periodic motion near a run, with this period (in drive periods) or a divisor."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
             return None
@@ -507,7 +507,7 @@ class _Refinement:
         return window is not None
 
     def _mean(self, starts: Sequence[Start], begins_s: float) -> ScenePrediction:
-        """Return the result for the mean over all starts and windows so far."""
+        """Return the result with mean responses over all starts and windows so far."""
         windows, window_s = windows_of(starts), self._window_periods / self._frequency_hz
         means = [each.mean(windows) for each in starts]
         responses, mean = np.array(means), np.mean(means, axis=0)

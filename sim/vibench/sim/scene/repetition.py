@@ -196,7 +196,7 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Decay times of the slowest mode after which a non-repeating motion counts as being on its attractor."""
+"""Number of decay times (slowest mode) after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
 """Ratio of the longest run to the longest decay time that is used; longer decay times are cut to it."""
 MOST_STATES = 2_000_000

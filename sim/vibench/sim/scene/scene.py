@@ -14,7 +14,7 @@ from .prediction import State
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 """Length of the paper's runs from rest, and of the window at their end [s] (Gong et al. 2025, section 2)."""
 BUDGET_S = 1.0
-"""Default budget of computing time for other starts and for chaos [s]."""
+"""Default budget of computing time for runs from other starts and for continued chaos [s]."""
 CLEAR, FEWEST, MOST = 8, 16, 64
 """Numbers of starts, including the requested one. `CLEAR` if all reach one motion, or chaos certainly lasts.
 `MOST` if they reach several motions and the budget allows it. `FEWEST` in all other cases."""
@@ -41,7 +41,7 @@ MOST_PERIODS = 1e12
 
 @dataclass(frozen=True)
 class FixedDuration(Strict):
-    """Simulate a given time and observe a window at its end."""
+    """Duration setting: simulate a given time, and observe a window at its end."""
 
     duration_s: float = PAPER_DURATION_S
     window_s: float = PAPER_WINDOW_S
@@ -64,7 +64,7 @@ class FixedDuration(Strict):
 
 @dataclass(frozen=True)
 class AutomaticDuration(Strict):
-    """Simulate until the motion settles, then observe one period, or a window if it never repeats."""
+    """Duration setting: simulate until the motion settles, then observe a period, or a window."""
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0

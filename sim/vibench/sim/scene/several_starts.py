@@ -54,7 +54,7 @@ class ReachedMotion:
     motion: MotionKind
     period: int | None
     responses_m: Floats
-    """Largest abs(x), amplitude of x at the drive frequency, and the same for p [m], shape (4,)."""
+    """Largest abs(x) and amplitude of x at the drive frequency, then both for p, shape (4,) [m]."""
     scatter: WindowScatter | None
     """Scatter of the largest abs(x) between windows, if the motion does not repeat."""
     wandered_until_s: float
@@ -156,7 +156,7 @@ class SeveralStarts:
 
     @property
     def followed_s(self) -> float:
-        """Sum of the simulated times of all starts [s]."""
+        """Sum of the simulated times of the runs from all starts [s]."""
         return sum(each.run.time_s for each in self.reached)
 
     @property
@@ -339,7 +339,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Kinds of motion that may still turn into another motion if the run is continued."""
 FEWEST_DRAWS = 3
-"""Fewest starts on a motion from which its scatter between starts is estimated."""
+"""Fewest starts on one motion from which the scatter of Response I between starts is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion; None if unknown."""
@@ -438,7 +438,7 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 ALONE = 0.5
-"""Part of the budget for integrating chaos further; the rest is for other starts."""
+"""Part of the budget for integrating chaos further; runs from other starts use the rest."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:

@@ -134,9 +134,9 @@ class EscapeRate:
     high_per_s: float
     """One-sided upper 97.5 % confidence limit of the rate; the 95 % limit without escapes."""
     escapes: int
-    """Number of starts whose chaos died out."""
+    """Number of starts whose chaos ended."""
     chaotic_s: float
-    """Total time of all starts in chaos [s]."""
+    """Total simulated time in chaos of the runs from all starts [s]."""
 
     @property
     def lifetime_above_s(self) -> float:

@@ -176,7 +176,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]
 
 @contextmanager
 def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
-    """Share the processor time of the `with` block equally among these scenes; add it to ``taken_s``."""
+    """Divide the processor time of the `with` block equally among scenes, and add it to ``taken_s``."""
     began_s = time.thread_time()
     yield
     part_s = (time.thread_time() - began_s) / max(1, len(places))

@@ -50,7 +50,7 @@ FIRST_LOOK = 16
 PARTED = 0.05
 """Difference over the gap, or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
-"""Decay times of the slowest mode after which a chaotic motion counts as stationary."""
+"""Number of decay times (slowest mode) after which a chaotic motion counts as stationary."""
 MEMBERS = 5
 """Number of additional starts if the window cannot show how much two random samples differ."""
 
@@ -139,7 +139,7 @@ def _rounding(answer: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _StrictRun:
-    """Motion integrated from its start with a smaller tolerance."""
+    """Stricter run: the motion, integrated from its start with a smaller tolerance."""
 
     run: FollowedRun
     """Stricter run, at the time at which it separated from the original run, else at the window's end."""

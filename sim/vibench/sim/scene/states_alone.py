@@ -90,7 +90,7 @@ class StatesAlone:
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """Set the time and the nominal cost [s] at which the run ends, both counted from the start."""
+        """Set the time and the nominal computing cost [s] at which the run ends, counted from its start."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
@@ -134,7 +134,7 @@ class StatesAlone:
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Integrate for ``length_s`` with a tangent vector; return its growth (empty for no length)."""
+        """Integrate for ``length_s`` with a tangent vector; return its growth (empty for zero length)."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -205,7 +205,7 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Integrate each motion in a batch for its number of periods; return those that must go on."""
+    """Integrate each motion in a batch for its number of periods; return the motions that must go on."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
     # A motion that the batch cannot integrate keeps its state and is integrated without a batch.
     return [

@@ -22,7 +22,7 @@ FloatArray = NDArray[np.float64]
 STOP_STIFFNESS_N_PER_M = 2e5
 """Assumed stiffness of the rubber stops at the ends of the table's stroke: 45 N compress them by 0.23 mm."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Assumed damping of these rubber stops: the table rebounds with about half its energy."""
+"""Assumed damping of the rubber stops at the stroke's ends: the table rebounds with half its energy."""
 
 
 @dataclass(frozen=True)

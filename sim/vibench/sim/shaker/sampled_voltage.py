@@ -65,7 +65,7 @@ class SampledMotion:
     impact_times_s: FloatArray
     """Time zero and the ends of blocks of 20 ms, shape (blocks + 1,)."""
     impacts: FloatArray
-    """Number of contacts up to each of these times, shape (blocks + 1,)."""
+    """Number of contacts up to time zero and to the end of each block, shape (blocks + 1,)."""
 
 
 def follow_voltage(
@@ -134,7 +134,7 @@ class _Resampling:
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
     def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the last sample of each piece, and the mean voltages of its steps."""
+        """Yield the last sample of each piece of the recording, and the mean voltages of its time steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
         length = ceil(_PIECE / block) * block

@@ -51,7 +51,7 @@ class Elasticity:
 
     @property
     def plane_strain_compliance(self) -> float:
-        """Plane-strain compliance (1 - nu^2) / E [1/Pa]; those of the two bodies in contact add up."""
+        """Plane-strain compliance (1 - nu^2) / E [1/Pa]; the compliances of two bodies in contact add up."""
         return (1.0 - self.poissons_ratio**2) / self.youngs_modulus
 
 

@@ -250,7 +250,7 @@ class BoundMotion(NamedTuple):
     """Motion while m1 sticks to m2: n modes (2 to 4) and the steady part; y is without the constant gap."""
 
     modes: ModalForm
-    """Modal form for x, y, z, vx, vy, vz; rows are nonzero only at x, z, vx, vz."""
+    """Modal form for x, y, z, vx, vy, vz; left eigenvectors are nonzero only at x, z, vx, vz."""
     steady: Complex
     """Phasors of the steady motion, shape (6,)."""
     pulls: Complex

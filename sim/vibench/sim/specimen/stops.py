@@ -12,7 +12,7 @@ Law_co = TypeVar("Law_co", covariant=True)
 HERTZ_EXPONENT = 1.5
 """Exponent of the indentation for a sphere on a plane."""
 PAPER_INDENTATION_M = 1e-6
-"""Indentation at which the paper fits its power laws to the Hertz contact (its section 2)."""
+"""Indentation at which the paper (section 2) fits its power laws to the Hertz contact [m]."""
 
 
 class Strict:

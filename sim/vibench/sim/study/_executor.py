@@ -50,7 +50,7 @@ class Executor(Protocol):
 
     @property
     def slots(self) -> int:
-        """Number of bundles that can be computed at the same time; it may change, even to 0."""
+        """Number of bundles that can be computed at the same time; this number may change, even to 0."""
 
     def submit(self, bundle: Bundle) -> None:
         """Add a bundle to the queue of the executor."""

@@ -258,7 +258,7 @@ class FileStore:
         self._sync()
 
     def close(self) -> None:
-        """Close the file and release its lock."""
+        """Close the file of the study and release its lock."""
         self._disk.close()
 
     def __enter__(self) -> Self:

@@ -33,14 +33,14 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """State of a point, which is written after its numbers."""
+    """State of a point; the file receives the state after the point's numbers."""
 
     MISSING = 0
     """The point has not been computed."""
     DONE = 1
     """The run of the point reached its end."""
     STOPPED = 2
-    """The run did not reach its end; ``outcome`` contains the reason. Numbers may be NaN."""
+    """The run of the point did not reach its end; ``outcome`` is the reason. Numbers may be NaN."""
     FAILED = 3
     """The scene could not be computed; ``message`` contains the reason. Numbers are NaN."""
     FILLED = 4
@@ -263,7 +263,7 @@ class GridPlan(FrozenModel, ABC):
     called: ClassVar[str]
     """Name of this kind of plan in messages."""
     format: ClassVar[str]
-    """Name of the format of its files."""
+    """Name of the file format for this kind of plan."""
 
     @property
     @abstractmethod

@@ -111,11 +111,11 @@ class PointScheduler:
 
     @property
     def is_missing(self) -> NDArray[np.bool_]:
-        """Whether each point is released and has no result (perhaps it is running), shape (points,)."""
+        """Whether each point is released and has no result yet, shape (points,); it may be running."""
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Return the longest ready point, and more points up to ``worth_s`` in total and ``most``."""
+        """Take the longest ready point, and more points up to ``worth_s`` [s] in total or ``most`` points."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -179,7 +179,7 @@ class PointScheduler:
         return None
 
     def _times_behind(self) -> NDArray[np.float64]:
-        """Return the planned time of all points that must wait for each point, shape (points,) [s]."""
+        """Return the planned computing time of all points that must wait for each point, (points,) [s]."""
         behind = np.zeros(len(self._after))
         for last in np.flatnonzero(self._next == NOBODY):
             number, sum_s = int(last), 0.0
@@ -239,7 +239,7 @@ class Points(ABC):
 
     @cached_property
     def planned_s(self) -> Floats:
-        """Planned time of each point, shape (points,) [s]."""
+        """Planned computing time of each point, shape (points,) [s]."""
         return self.times_s()
 
     def times_s(self, *, may_repeat: bool = True) -> Floats:

@@ -75,7 +75,7 @@ class Store(Protocol):
         """Results stored so far; do not change them."""
 
     def begin(self, executor: str) -> None:
-        """Record that a session begins, and its executor."""
+        """Record that a session begins, with the description of its executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Store the results of points; return once they are safe."""

@@ -225,7 +225,7 @@ class Study(GridPlan):
 
     @property
     def start_labels(self) -> tuple[str, ...]:
-        """Names of the starts in the file and in results."""
+        """Names of the initial states in the file and in results."""
         return tuple(str(start) for start in self.starts)
 
     @property
@@ -295,12 +295,12 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
 
 
 def continued_from(frequency_hz: float) -> str:
-    """Return the name of a start that is the final state at this frequency [Hz]."""
+    """Return the name of an initial state that is the final state at this frequency [Hz]."""
     return f"end at {frequency_hz:g} Hz"
 
 
 OTHER_STARTS = 8
-"""Assumed number of runs per point if the motion may depend sensitively on its start."""
+"""Assumed number of runs per point if the motion may depend sensitively on its initial state."""
 
 
 def study_solver(study: Study) -> Solver:
