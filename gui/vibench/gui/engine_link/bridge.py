@@ -145,11 +145,11 @@ class EngineLine:
             tell()
 
     def leave(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running; return without waiting."""
+        """End the engine after a ramp-down, or leave the engine running; return without waiting for this."""
         self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave it running; return when this is done."""
+        """End the engine after a ramp-down, or leave the engine running; wait until this is done."""
         self.leave(how)
         self._thread.join()
 
@@ -256,7 +256,7 @@ class Bridge(QObject):
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
 
     def beat(self) -> None:
-        """Report that the window's thread is alive; a separate process passes this to the engine."""
+        """Report that the window's thread is alive; a separate process passes the report to the engine."""
         attendant = None if self._line is None else self._line.attendant
         if attendant is not None:
             attendant.live()

@@ -18,7 +18,7 @@ from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, q
 
 
 class Editor(Protocol):
-    """Widget that edits one value of a plan; the value has the type that it has in a plan file."""
+    """Widget that edits one value of a plan; the value has the same type as in a plan file."""
 
     @property
     def widget(self) -> QWidget:
@@ -26,7 +26,7 @@ class Editor(Protocol):
 
     @property
     def complaint(self) -> str:
-        """Why the typed text cannot be read; empty if it can."""
+        """Reason why the typed text cannot be read; empty if it can be read."""
 
     def content(self) -> Any:
         """Return the value as stored in a plan file; None for an empty field."""
@@ -51,7 +51,7 @@ class QuantityEditor:
 
     @property
     def complaint(self) -> str:
-        """Why the typed text cannot be read; empty if it can."""
+        """Reason why the typed text is not a number; empty if it is one."""
         return self._edit.complaint
 
     def content(self) -> float | int | None:
@@ -120,7 +120,7 @@ class _LineOnEach(QStyledItemDelegate):
 
 
 class ChoiceEditor:
-    """Editor of a choice from given values; it needs no validation."""
+    """Editor of a choice from given values, which need no validation."""
 
     complaint = ""
 
@@ -232,7 +232,7 @@ class ListEditor:
 
     @property
     def complaint(self) -> str:
-        """Why the typed text cannot be read; empty if it can."""
+        """Reason why the typed text is not a list of numbers; empty if it is one."""
         self.content()
         return self._complaint
 

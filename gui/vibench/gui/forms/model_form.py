@@ -172,7 +172,7 @@ class GroupEditor:
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
         self._memories: dict[str, dict[str, Any]] = {}
-        """Last content of each kind; shown again when this kind is chosen again."""
+        """Last content of each kind, which is shown again when the user chooses that kind again."""
         self._usual: Mapping[str, Any] = {}
         self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
@@ -296,7 +296,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether leaving a field empty differs from its default."""
+    """Return whether a field may be left empty, with another meaning than the field's default."""
     return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
@@ -311,7 +311,7 @@ def _as_content(value: Any) -> Any:
 
 
 def _after_kind(editor: Editor, loc: Loc) -> Loc:
-    """Remove the kind from the location of an error: pydantic includes it, the form does not."""
+    """Remove the kind from the location of an error: pydantic includes the kind, the form does not."""
     if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
         return loc[1:]
     return loc
@@ -330,7 +330,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class ValidatedForm(QWidget, Generic[Model]):
-    """Form with the complaints and warnings of its model below it."""
+    """Form of a model, with the model's complaints and warnings below the fields."""
 
     changed = Signal()
 

@@ -119,7 +119,7 @@ class QuantityEdit(QAbstractSpinBox):
         self._shown_unit = ""
         self._value: float | int | None = None
         self.complaint = ""
-        """Why the typed text cannot be read; empty if it can."""
+        """Reason why the typed text is not an allowed quantity; empty if it is one."""
         self._value_to_confirm: float | int | None = None
         """Value that becomes valid when the user presses Return again; None if there is none."""
         self._is_confirmed = False

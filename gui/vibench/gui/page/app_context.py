@@ -103,7 +103,7 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self.rig: Rig | None = None
-        """Selected rig; its bench need not be open."""
+        """Rig that the user has selected; the rig's bench need not be open."""
         self.measurement: Measurement | None = None
         """Test on the Test page; None while it is not valid."""
         self.campaign: Campaign | None = None
@@ -161,7 +161,7 @@ class AppContext(QObject):
         super().__init__(parent)
         self.settings = settings
         self.first_bench: Path | None = None
-        """Configuration named on the command line; stored in the settings only after it was opened."""
+        """Hardware configuration from the command line; stored in the settings only after it was opened."""
         self.is_armed_read: Callable[[], bool] = lambda: True
         """Whether the user has read the description of the armed test; set by the Run page."""
         self.selection = Selection(self)

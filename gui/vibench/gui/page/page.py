@@ -98,7 +98,7 @@ class Page(QWidget):
 
     @property
     def is_done(self) -> bool:
-        """Whether the navigation bar shows a tick beside this page."""
+        """Whether the page's task is done, which the navigation bar shows by a tick."""
         return False
 
     def refresh(self) -> None:

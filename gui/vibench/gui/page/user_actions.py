@@ -95,7 +95,7 @@ class UserActions(QObject):
         self._context.bridge.stop(StopLevel.ABORT, ABORT_KEY)
 
     def hold_or_resume(self) -> None:
-        """Hold the run with the drive on, or resume it."""
+        """Hold the run with the drive on, or resume the held run."""
         if self._context.bridge.state is EngineState.HELD:
             self._context.bridge.order(EngineClient.resume)
         else:

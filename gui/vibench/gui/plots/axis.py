@@ -133,7 +133,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self.showLabel(False)
 
     def blank(self, blankness: Blankness) -> None:
-        """Hide the numbers while the plot is empty, or show them again."""
+        """Hide the numbers of the axis while the plot is empty, or show the numbers again."""
         if blankness is not self._blankness:
             self._blankness = blankness
             self.update()
@@ -283,7 +283,7 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         self.update()
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Draw lines at the ticks that the axes have just painted."""
+        """Draw the grid lines at the ticks that the axes have just painted."""
         to_pixels = painter.transform()
         visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()

@@ -23,7 +23,7 @@ class Markers(QObject):
         self._are_shown = False
         self._plots: tuple[Plot, ...] = ()
         self.lines: list[list[pg.InfiniteLine]] = []
-        """Lines of each marker, one per plot."""
+        """Vertical lines of each marker, one line per plot."""
 
     @property
     def values(self) -> tuple[float, ...]:

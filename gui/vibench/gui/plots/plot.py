@@ -60,7 +60,7 @@ _MARGIN = 4
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A curve's name, with the colour and sign of its line."""
+    """Entry of a legend: a curve's name, with the colour and sign of its line."""
 
     sign: str
     """Line style as text: ``━━``, ``╍╍``, ``●``."""
@@ -140,7 +140,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
-        """All lines and sets of points, with their names for the legend; a name may be empty."""
+        """All curves and sets of points of the plot, with their names for the legend; a name may be empty."""
         self.bands: list[Band] = []
         self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
         """Function that returns additional text for the cursor reading at a point of the plot."""
@@ -231,7 +231,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def upright(
         self, line_style: LineStyle, value: float, label: str = "", label_at: float = 0.92
     ) -> pg.InfiniteLine:
-        """Add a vertical line at a value; ``label_at`` is the height of its label."""
+        """Add a vertical line at a value; ``label_at`` is the height of the line's label (0 to 1)."""
         return self._line(line_style, self.scales[0].drawn(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:

@@ -28,7 +28,7 @@ class Reading:
     def __init__(self, plot: "Plot") -> None:
         self._plot = plot
         self._lines: tuple[pg.InfiniteLine, ...] = ()
-        """Two lines of the crosshair, then two of the mark; created when first needed."""
+        """Two lines of the crosshair, then two lines of the mark; created when first needed."""
         self._label: QLabel | None = None
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None

@@ -67,7 +67,7 @@ class Stripes(_UprightMarks):
 
 
 class Rules(_UprightMarks):
-    """Vertical lines; if they would be too close together, none is drawn."""
+    """Vertical lines of a plot; if the lines would be too close together, none is drawn."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)

@@ -51,7 +51,7 @@ _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 @dataclass(frozen=True)
 class ShownUnit:
-    """Unit in which a quantity is displayed, and its factor from SI."""
+    """Unit in which a quantity is displayed, and the factor from SI values to this unit."""
 
     name: str
     per_si: float = 1.0

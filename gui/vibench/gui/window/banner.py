@@ -146,7 +146,7 @@ class Banner(QFrame):
         self._stop.setMinimumWidth(max(widths))
 
     def show_indicator(self, indicator: StateIndicator) -> None:
-        """Show a state; if it has not changed, nothing is repainted."""
+        """Show a state of the rig; if the state has not changed, nothing is repainted."""
         if indicator == self.indicator:
             return
         announced = indicator.word != self.indicator.word

@@ -18,7 +18,7 @@ SPAN_S = 10.0
 """Period for which the longest delay is reported [s]."""
 MOST_NOTED = 20
 _DELAYS = "/proc/thread-self/schedstat"
-"""File of Linux with the time for which this thread waited for a processor [ns]."""
+"""File in which Linux states for how long this thread has waited for a processor [ns]."""
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ class Preferences(FrozenModel):
 
 
 class SettingsDialog(QDialog):
-    """Dialog that applies the settings if they are valid; Cancel discards them."""
+    """Dialog that applies valid settings; Cancel discards the changes."""
 
     def __init__(self, context: AppContext, parent: QWidget) -> None:
         super().__init__(parent)

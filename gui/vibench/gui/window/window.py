@@ -352,7 +352,7 @@ class Window(QMainWindow):
         self.page.edits.redo()
 
     def open_path(self, path: Path) -> None:
-        """Open a file or folder on the page that opens its kind."""
+        """Open a file or folder on the page that opens this kind of file."""
         try:
             kind = file_kind(path)
         except ConfigurationError as error:

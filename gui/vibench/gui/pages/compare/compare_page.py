@@ -83,7 +83,7 @@ FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPO
 
 
 class ComparePage(Page):
-    """Curves on the left, their plot on the right, numbers below it."""
+    """Page with a list of curves on the left, their plot on the right, and numbers below the plot."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)

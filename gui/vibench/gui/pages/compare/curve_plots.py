@@ -336,7 +336,7 @@ class PairBox(QGroupBox):
             box.replace_items([_NOBODY, *names], chosen if chosen in names else default)
 
     def pair(self) -> tuple[Curve, Curve] | None:
-        """Return the curve and its reference; None unless two different curves are selected."""
+        """Return the selected curve and its reference; None unless they are two different curves."""
         curve, reference = (self._curves.get(box.currentText()) for box in (self._curve, self._reference))
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 

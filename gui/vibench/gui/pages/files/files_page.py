@@ -123,7 +123,7 @@ class FilesPage(Page):
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording even if it is open already; selecting a row of the table opens its file."""
+        """Open a recording, even if it is already open; a newly selected row of the table opens its file."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:

@@ -236,7 +236,7 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """Choice between all recordings and those of one campaign; hidden in a folder without campaigns."""
+    """List to show all recordings or those of one campaign; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
     """Files of the selected campaign, as a set; None for all recordings."""
@@ -333,7 +333,7 @@ class RecordingModel(QAbstractTableModel):
     def headerData(
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
-        """Return the column headings; rows have none."""
+        """Return the headings of columns; rows have no headings."""
         if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             return HEADINGS[section]
         return None

@@ -239,7 +239,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         return self._images[self._spacing]
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Show another recording, or none, and offer its channels."""
+        """Show another recording, or none, and list its channels for the choice."""
         super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):

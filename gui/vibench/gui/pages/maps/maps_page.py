@@ -72,7 +72,7 @@ class MapPlot(QWidget):
         return (left, right), (10.0**bottom, 10.0**top)
 
     def show_picture(self, picture: MapPicture, quantity: str) -> None:
-        """Draw a complete or partial map; the axes change only if its limits changed."""
+        """Draw a complete or partial map; the axes change only if the map's limits have changed."""
         self.show_range(picture.frequency_hz, picture.amplitude_m)
         (left, right), (low, high) = picture.frequency_hz, picture.amplitude_m
         self.image.setImage(COLOURINGS[quantity](picture), autoLevels=False, levels=(0, 255))
@@ -88,7 +88,7 @@ class MapPlot(QWidget):
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
-        """Remove the map; the next map sets the axes to its own range."""
+        """Remove the map; the next map will set the axes to its own range."""
         self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)

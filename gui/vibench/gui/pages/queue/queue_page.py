@@ -201,7 +201,7 @@ class QueuePage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Summary and entries, with their campaign and rig as inputs."""
+        """Summary and table of the campaign, with campaign and rig as inputs."""
         wanted = (self.context.selection.campaign, self.context.selection.rig)
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
@@ -284,7 +284,7 @@ class QueuePage(Page):
 
     @property
     def _chosen_entry(self) -> int:
-        """Row number of the selected entry; -1 if none is selected, or the rows are outdated."""
+        """Row number of the selected test or sweep; -1 if none is selected, or the table is outdated."""
         return self.entries.currentRow() if self.entries.isEnabled() else -1
 
     def _remove(self) -> None:

@@ -148,7 +148,7 @@ class KnobSheetForm(QGroupBox):
         return tuple(self._ticks.values())
 
     def show_rig(self, rig: Rig | None) -> None:
-        """Show the knobs of a rig, none of them confirmed."""
+        """Show the knobs of a rig, with no knob confirmed."""
         for tick in self._ticks.values():
             self._layout.removeWidget(tick)
             tick.deleteLater()

@@ -48,7 +48,7 @@ class SweepPlot(QWidget):
         fill_box(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw all points so far, in the order of time."""
+        """Draw all measured responses so far, in the order of time."""
         history = view.history()
         if len(history.time_s) == self._shown:
             return
@@ -108,7 +108,7 @@ _SHORT = {"amplifier_voltage": "amp."}
 
 
 def channel_word(role: str) -> str:
-    """Return a short name of a channel, given by its role."""
+    """Return a short name of the channel with this role."""
     return _WORDS.get(role, role.replace("_", " "))
 
 

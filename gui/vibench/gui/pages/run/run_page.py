@@ -276,7 +276,7 @@ class ArmCard(QGroupBox):
     cancel_wanted = Signal()
     hold_wanted = Signal()
     news = Signal()
-    """Emitted when another plan was armed, whose description must be shown from its beginning."""
+    """Emitted when another plan was armed; its description must then be shown from the beginning."""
 
     def __init__(self) -> None:
         super().__init__("What will happen")

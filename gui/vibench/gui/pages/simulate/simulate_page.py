@@ -27,7 +27,7 @@ from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
 from .pictures import AnswerPlots, BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
-"""Number of visible lines of the table of motions, with the heading."""
+"""Height of the table of motions, in lines of text including the heading."""
 
 
 class SimulatePage(Page):
@@ -91,7 +91,7 @@ class SimulatePage(Page):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """The tabs, because each of them has as many widgets as a page."""
+        """The tabs, which are styled one by one because each has as many widgets as a page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:

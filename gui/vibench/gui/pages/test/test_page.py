@@ -111,7 +111,7 @@ class TestForm(ValidatedForm[Measurement]):
         choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
 
     def _rename(self, kind: str) -> None:
-        """Rename the test after a change of kind, because its name was that of the former kind."""
+        """Rename the test after a change of kind, because the old name was that of the former kind."""
         self.form.editors["name"].show_content(kind)
         self.form.changed.emit()
 
@@ -124,7 +124,7 @@ MOST_OF_ONE = 12
 
 @dataclass(frozen=True)
 class NamedTest:
-    """Test with a label that names its origin."""
+    """Test in the list, with a label that names the test's origin."""
 
     label: str
     measurement: Measurement
@@ -196,7 +196,7 @@ _FLOOR = 1e-5
 _LEAST_HZ = 1.0
 """Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
-"""Smallest useful height of a plot, in lines of text."""
+"""Smallest useful height of a plot, measured in lines of text."""
 
 
 class PreviewPlots(QWidget):
