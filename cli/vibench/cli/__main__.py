@@ -116,7 +116,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
-    """Refuse empty arguments, and add given and allowed values to usage errors, inside this context."""
+    """Inside this context, refuse empty arguments, and name given and allowed values in usage errors."""
     words = ["", *words_of(args)]
     empty = next((before for before, word in pairwise(words) if not word), None)
     try:
@@ -239,7 +239,7 @@ class LogLevel(StrEnum):
     INFO = "info"
     """Also log the messages that are stored in recordings."""
     DEBUG = "debug"
-    """Also log the messages to instruments and their replies."""
+    """Also log every message to an instrument, with the instrument's reply."""
 
 
 class OneLine(logging.Formatter):

@@ -53,7 +53,7 @@ class DrivenBy(StrEnum):
 
     @property
     def simulation(self) -> Simulation:
-        """The `Simulation` of the analysis that this input selects."""
+        """Member of the analysis' `Simulation` that this kind of input selects."""
         return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
 
 

@@ -62,7 +62,7 @@ def keep(
     *,
     is_path_printed: bool,
 ) -> None:
-    """Write the results, their figure and its tables into a folder, if one was given."""
+    """Write the results, their figure and the figure's tables into the folder that the user gave, if any."""
     if out is None:
         return
     out.mkdir(parents=True, exist_ok=True)

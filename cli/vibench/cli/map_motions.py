@@ -148,7 +148,7 @@ def _roughness(results: MapResults) -> UncertaintyExponent | None:
 
 
 def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
-    """Return a summary of a map as a JSON document; the points themselves are in the file."""
+    """Return a summary of a map as a JSON document; the HDF5 file contains the points."""
     audit = results.audit
     rough = _roughness(results)
     return {

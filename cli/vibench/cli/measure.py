@@ -91,7 +91,7 @@ def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...
 
 
 def estimate_text(expected: CampaignEstimate) -> str:
-    """Return an estimate as text of several lines."""
+    """Return the estimate of a campaign as text of several lines."""
     most = "at most " if expected.searching else ""
     length = f"{most}{timedelta(seconds=round(expected.duration_s))}"
     kept = f" ({expected.kept} kept)" if expected.kept else ""
@@ -244,7 +244,7 @@ def measure(
 
 @contextmanager
 def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[Engine]:
-    """Open a bench in this process, with progress bars, so that `vibench watch` and `stop` can reach it."""
+    """Open a bench in this process, with progress bars; `vibench watch` and `vibench stop` can reach it."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     try:

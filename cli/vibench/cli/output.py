@@ -42,7 +42,7 @@ class PrintableConsole(Console):
         super().print(*map(_shown, objects), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Render tables, bars and lines, with control characters escaped."""
+        """Render tables, progress bars and lines of text, with control characters escaped."""
         for segment in super().render(renderable, options):
             text = "\n".join(map(printable, segment.text.split("\n")))
             yield segment if segment.control else Segment(text, segment.style)

@@ -59,7 +59,7 @@ MINUTES_OF_AN_HOUR = 60.0
 
 @contextmanager
 def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
-    """Show one bar; yield the function that updates it."""
+    """Show one progress bar; yield the function that updates it."""
     with show_bars(bars):
         bar = bars.add_task(what, total=total, left="")
 
