@@ -30,7 +30,7 @@ class BranchContinuation(AbstractFeedback):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.BRANCH,)
     kind: Literal["branch_continuation"] = "branch_continuation"
     base_level: BaseLevel
-    """Level of the base motion at every point."""
+    """Level of the base motion, the same at every point of the branch."""
     start_hz: FrequencyHz
     """Frequency at the start of the branch [Hz]."""
     low_hz: FrequencyHz
@@ -38,7 +38,7 @@ class BranchContinuation(AbstractFeedback):
     high_hz: FrequencyHz
     """Upper end of the frequency range [Hz]."""
     begin: Literal["up", "down"] = "up"
-    """Direction in which the frequency changes first."""
+    """Direction in which the frequency changes at the start of the branch."""
     begin_from: Literal["rest", "above"] = "rest"
     """Approach to the base level at the start: from rest, or from three times the drive that the model
     without stops predicts. The second choice finds motions with impacts."""

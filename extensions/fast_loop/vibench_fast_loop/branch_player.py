@@ -66,7 +66,7 @@ class BranchPlayer:
         self._most_vpp = loop.most_vpp
         self._feedback = fast.feedback
         self._blocks: list[LoopBlock] = []
-        """Blocks of the current setting since the motion settled."""
+        """Blocks of coefficients at the current setting since the motion settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
         """Sum of squared deviations of blocks in earlier measurements, and its degrees of freedom."""
 

@@ -44,7 +44,7 @@ class MeasuredPoint:
     residual: Vector
     """Deviation of the base from the required sine, relative to the level."""
     ratio: complex
-    """Fundamental of m0 over fundamental of the base."""
+    """Fundamental of m0 over fundamental of the base, complex."""
     noise: Vector
     """Standard errors of the residual, and of real and imaginary part of this ratio."""
 

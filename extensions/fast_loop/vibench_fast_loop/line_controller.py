@@ -61,7 +61,7 @@ class LineController:
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program; return the controller's report."""
+        """Make the controller play another program; return the controller's report."""
         return self._request(LoopRequest(ask="play", program=program), LoopReport)
 
     def report(self) -> LoopReport:

@@ -29,9 +29,9 @@ class LoopFeedback(FrozenModel):
     """A linear law: u = output m + direct s; then m = step m + inlet s, for input volts s and memory m."""
 
     step: tuple[Row, ...] = Field(max_length=MOST_MEMORY)
-    """Matrix of shape (n, n), as rows."""
+    """Matrix from memory to next memory, shape (n, n), as rows."""
     inlet: tuple[Row, ...]
-    """Matrix of shape (n, 2), as rows [per V]."""
+    """Matrix from samples to next memory, shape (n, 2), as rows [per V]."""
     output: Row
     """Row from memory to output voltage, shape (n,) [V]."""
     direct: Row

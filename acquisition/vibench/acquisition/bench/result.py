@@ -31,7 +31,7 @@ class Finding(FrozenModel):
 
     name: str = Field(min_length=1)
     value: str
-    """Value as text, with unit and uncertainty."""
+    """Measured value as text, with unit and uncertainty."""
     expected: str
     verdict: Verdict
     number: float | None = None
@@ -40,7 +40,7 @@ class Finding(FrozenModel):
     """Standard uncertainty of the number, in ``unit``."""
     unit: str = ""
     advice: str = ""
-    """What to do; empty if the finding is ok."""
+    """Advice on what to do; empty if the finding is ok."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Bounds:
     fail: float
 
     def verdict(self, deviation: float) -> Verdict:
-        """Return the verdict on a deviation; NaN fails."""
+        """Return the verdict on a deviation; a NaN counts as FAIL."""
         if deviation <= self.well:
             return Verdict.OK
         return Verdict.WARN if deviation <= self.fail else Verdict.FAIL
@@ -148,7 +148,7 @@ class CheckResult(FrozenModel):
         return BenchReport(findings=self.findings)
 
     def age_h(self, now: datetime) -> float:
-        """Return the age of the check [h]."""
+        """Return the time since the check [h]."""
         return (now - self.checked) / _HOUR
 
 

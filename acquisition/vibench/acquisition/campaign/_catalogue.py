@@ -49,11 +49,11 @@ class CatalogueEntry:
     """Catalogue entry of one recording. Unknown values are empty or None."""
 
     path: str
-    """Path relative to the folder, with ``/``."""
+    """Path of the recording relative to the folder, with ``/``."""
     name: str
     """Name of the measurement."""
     state: str
-    """Value of `recording.RecordingState`, or ``damaged`` or ``unreadable``."""
+    """State of the recording: value of `recording.RecordingState`, or ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
     """``samples not checked``, or problems found: ended early, near full scale, samples lost."""
@@ -76,7 +76,7 @@ class CatalogueEntry:
     samples_id: str = ""
     """Identifier of the samples, the same in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
-    """Value of `recording.SealState` after a quick check; empty if unknown."""
+    """State of the seal: value of `recording.SealState` after a quick check; empty if unknown."""
 
     @property
     def is_bad(self) -> bool:
@@ -306,7 +306,7 @@ class VerifiedRecording:
     path: str
     """Path relative to the folder, with ``/``; for a single file, its name."""
     verdict: str
-    """Value of `recording.SealState`, or ``unreadable`` or ``missing``, for the file."""
+    """State of the seal: value of `recording.SealState`, or ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]

@@ -106,7 +106,7 @@ class ChangedBench(StrEnum):
 
     REFUSE = "refuse"
     ACCEPT = "accept"
-    """Continue, and record both benches in the journal."""
+    """Continue the campaign, and record both benches in the journal."""
 
 
 class PointOutcome(StrEnum):
@@ -335,7 +335,7 @@ def _own_name(file: str) -> str:
 
 
 def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
-    """Return all points, in the order of measurement."""
+    """Return all points of the campaign, in the order of measurement."""
     return tuple(
         JournalPoint(
             name=row["name"],
@@ -421,7 +421,7 @@ class Journal(ClosedOnLeaving):
             return BenchIdentity.model_validate_json(identity)
 
     def points(self) -> tuple[JournalPoint, ...]:
-        """Return all points, in the order of measurement."""
+        """Return all points of the campaign, in the order of measurement."""
         with sentences(self.path):
             return points_of(self._connection)
 
@@ -431,7 +431,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("INSERT INTO benches VALUES (?, ?)", (_now(), bench.model_dump_json()))
 
     def start(self, name: str, file: str) -> None:
-        """Record the start of an attempt, before anything plays."""
+        """Record the start of an attempt at a point, before anything plays."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))

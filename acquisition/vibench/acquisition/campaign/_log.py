@@ -49,7 +49,7 @@ class CampaignEventKind(StrEnum):
     """The result of a point requested further measurements."""
     ENDED = "ended"
     NOTICE = "notice"
-    """A notice was sent, or could not be sent."""
+    """A notice to a person was sent, or could not be sent."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class Security(StrEnum):
     STARTTLS = "starttls"
     TLS = "tls"
     NONE = "none"
-    """No encryption; only for a server on this computer."""
+    """The connection is not encrypted; allowed only for a server on this computer."""
 
 
 class MailSettings(FrozenModel):
@@ -201,7 +201,7 @@ class MailSettings(FrozenModel):
     sender: str = Field(pattern=r"^[^@\s]+@[^@\s]+$")
     recipients: tuple[str, ...] = Field(min_length=1)
     user: str = ""
-    """Login name; empty for a server without login."""
+    """Login name for the mail server; empty for a server without login."""
     password: SecretStr = SecretStr("")
     timeout_s: PositiveFloat = Field(default=20.0, le=300)
 
@@ -244,7 +244,7 @@ class MailMessenger:
 
 TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.DAMAGED, CampaignEventKind.ENDED})
 COMMAND_LONGEST_S = 30.0
-"""Time after which a command is ended [s]."""
+"""Time after which a command that sends a notice is terminated [s]."""
 
 
 class Messenger(Protocol):

@@ -349,7 +349,7 @@ class ReconnectingBench:
         return self._bench
 
     def close(self) -> None:
-        """Silence and close everything. May be called at any time."""
+        """Silence and close all instruments. May be called at any time."""
         bench, self._bench = self._bench, None
         try:
             if bench is not None:
@@ -396,7 +396,7 @@ class CampaignEstimate:
     """Duration and disk space of those recordings of a campaign that do not exist yet."""
 
     recordings: int
-    """Number of recordings still to be made."""
+    """Number of recordings that the campaign must still make."""
     kept: int
     """Number of recordings that exist and are complete."""
     duration_s: float
@@ -410,7 +410,7 @@ class CampaignEstimate:
     total_bytes: int
     """Total size of all finished recordings [bytes]."""
     free_bytes: int
-    """Free space on the disk of the folder [bytes]."""
+    """Free space on the disk that contains the folder [bytes]."""
     searching: int = 0
     """Number of recordings that may end early, because of feedback or because results are accurate enough."""
 
@@ -421,7 +421,7 @@ class CampaignEstimate:
 
     @property
     def fits(self) -> bool:
-        """Whether the disk has enough free space."""
+        """Whether the disk has enough free space for the campaign."""
         return self.needed_bytes <= self.free_bytes
 
 

@@ -27,7 +27,7 @@ from .loop import DRIVE_LEFT, LASTING, Lasting
 
 
 class CheckRule(StrEnum):
-    """Bench check that is required before measurements."""
+    """Rule on the bench check that is required before measurements."""
 
     FRESH = "fresh"
     """A check of the same configuration must have passed within the last ``check_valid_h`` hours."""

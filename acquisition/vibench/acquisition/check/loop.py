@@ -23,14 +23,14 @@ class SineFit:
 
     amplitude: float
     uncertainty: float
-    """Standard uncertainty of the amplitude, from the residual."""
+    """Standard uncertainty of the amplitude, from the residual of the fit."""
     phase_rad: float
     """Phase at the first sample, with the sine written as a cosine."""
 
 
 @dataclass(frozen=True)
 class ClockRatio:
-    """Deviation of the ratio of two clocks from 1."""
+    """Relative deviation of the ratio of two clocks from 1."""
 
     ppm: float
     uncertainty_ppm: float
@@ -138,7 +138,7 @@ class LoopCheck:
         self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
-        """Return the findings on the recorded channels."""
+        """Return the findings on all recorded channels from the sine."""
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]

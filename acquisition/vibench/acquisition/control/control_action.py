@@ -57,7 +57,7 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 _DEAD_SHARE = 0.3
 """Dead band as a fraction of the tolerance. Smaller errors stay, as every correction disturbs the motion."""
 _SURE = 2.0
-"""Number of standard uncertainties above which an error is significant."""
+"""Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
 """Fraction of the base's level error [dB] that one correction removes; the specimen responds slowly."""
 _BATCHES = 8

@@ -21,7 +21,7 @@ class FeedbackChannels:
     """Rows of drive, base and m0 in the samples, and their scales and corrections."""
 
     drive: int
-    """Row of the drive voltage in the samples."""
+    """Index of the drive voltage's row in the samples."""
     base: int
     response: int
     drive_units_per_volt: float
@@ -144,7 +144,7 @@ class BridgedRows:
         return first, handed_on
 
     def skip(self) -> None:
-        """Discard the delayed samples, which belong to an earlier phase."""
+        """Discard the delayed samples, because they belong to an earlier phase."""
         self._next = self._first + self._rows.shape[1]
 
 

@@ -88,7 +88,7 @@ class _JumpSearch:
 
 
 class JumpLocator:
-    """Search for one jump in one pass through the frequencies."""
+    """Search for one jump during one pass through the frequencies."""
 
     def __init__(
         self, controller: SettlingController, plan: SettledSine, direction: str, number: int

@@ -194,7 +194,7 @@ class PhaseSearch:
     low_hz: float
     high_hz: float
     widest_step_hz: float
-    """Largest step while the resonance is not bracketed [Hz]."""
+    """Largest frequency step while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
     is_mode: bool = True
     """Whether the phase follows a linear mode. If not, only the nearest measurements determine the slope."""

@@ -116,7 +116,7 @@ class SettledState:
     frequency_hz: float
     """Commanded drive frequency, by the generator's clock [Hz]."""
     drive_hz: float
-    """Drive frequency by the converter's clock [Hz]."""
+    """Drive frequency, measured by the converter's clock [Hz]."""
     setting_vpp: float
     waited_s: float
     judgement: Judgement
@@ -135,7 +135,7 @@ class SettledState:
 
     @property
     def response(self) -> float:
-        """Response II: the magnitude of the transmissibility."""
+        """Response II: the magnitude of the transmissibility from base to m0."""
         return abs(self.transmissibility)
 
     @property
@@ -202,7 +202,7 @@ class SettlingController:
         return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
     def held(self, measured: MeasuredLevel) -> Held:
-        """Return whether a measured level is within its tolerance."""
+        """Return whether a measured base level is within its tolerance."""
         if self.level is None:
             return Held.OPEN
         return measured.held(self._target, self.level.tolerance)

@@ -188,7 +188,7 @@ class SineLoop:
         yield from self.say()
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
-        """Continue the drive for ``duration_s`` and evaluate the motion."""
+        """Continue the drive unchanged for ``duration_s`` and evaluate the motion."""
         samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
         first_sample, rows = samples.first_sample, np.stack(self.channels.rows(samples))

@@ -131,7 +131,7 @@ class Stroboscope:
         self._keep_from(starts_s[-1])
 
     def periods(self) -> Periods:
-        """Return all periods since the last discard."""
+        """Return all periods that were added since the last discard."""
         if not self._base:
             return Periods(np.empty(0, np.complex128), np.empty((0, ORDERS), np.complex128))
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
@@ -206,7 +206,7 @@ _BLOCKS = 12
 _SIGNIFICANCE = 0.01 / 8
 """Significance level of each of eight tests, so that a stationary motion fails in 1 % of cases."""
 _NOISE_MARGIN = 1.5
-"""Factor on the noise measured in silence."""
+"""Factor by which the noise measured in silence is increased."""
 _SLOWEST = 0.9
 """Largest ratio of two successive changes in an extrapolation; the remaining change is then nine times the
 last change.

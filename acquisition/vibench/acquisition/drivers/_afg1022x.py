@@ -54,7 +54,7 @@ class AFG1022X(ScpiInstrument):
     burst = Word("SOUR{c}:BURS:STAT", SWITCH)
 
     identity: Identity
-    """Reply to ``*IDN?``; stored completely, because its last field varies."""
+    """Reply to ``*IDN?``, stored completely because its last field varies."""
     codes: ArbitraryCodes | None = None
     """Waveform in the memory that the output plays; None if the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
@@ -104,7 +104,7 @@ class AFG1022X(ScpiInstrument):
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output keeps its state."""
+        """Set up a sine. The output stays on or off as it was."""
         self.model.check_frequency(Shape.SINE, frequency_hz)
         self.model.check_amplitude(self._config, amplitude_vpp)
         with self._changing():

@@ -61,7 +61,7 @@ class DaqmxSession:
     """Connection to a DAQmx driver; close it after all devices that were opened through it."""
 
     server: str | None
-    """``"host:port"``; None for the driver on this computer."""
+    """Address of the driver, ``"host:port"``; None for the driver on this computer."""
     options: GrpcSessionOptions | None
     _channel: grpc.Channel | None
 

@@ -61,7 +61,7 @@ class ScpiInstrument:
         self.name = name
         self.channel = channel
         self.held: dict[str, Any] = {}
-        """Values read back since the last failure, by header."""
+        """Values of settings read back since the last failure, by SCPI header."""
         self._connect = connect
         self._settle_s = settle_s
         self._pause = pause
@@ -200,7 +200,7 @@ class ScpiInstrument:
 
     @contextmanager
     def _dialogue(self, message: str) -> Iterator[None]:
-        """Exchange messages; first discard the reply to an interrupted query."""
+        """Exchange messages with the instrument; first discard the reply to an interrupted query."""
         with self._lock:
             if self._reply_due:
                 self._reply_due = False

@@ -202,7 +202,7 @@ class SoundCardDigitizer:
 
     @property
     def waiting_samples(self) -> int:
-        """Number of samples that are not read yet."""
+        """Number of samples per channel that are not read yet."""
         return self.card.waiting
 
     def stop(self) -> None:

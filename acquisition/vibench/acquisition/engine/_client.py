@@ -287,7 +287,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
     def arm(
         self, campaign: Campaign, folder: Path, existing: ExistingRecordings | str = ExistingRecordings.REFUSE
     ) -> ArmedPlan:
-        """Prepare a campaign; `arm_request` takes all options."""
+        """Prepare a campaign; `arm_request` accepts all options."""
         return self.arm_request(
             CampaignRequest(campaign=campaign, folder=folder, existing=chosen(ExistingRecordings, existing))
         )

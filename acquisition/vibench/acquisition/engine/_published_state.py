@@ -44,7 +44,7 @@ class SampleSlice:
     first_sample: int
     sample_rate_hz: float
     volts: NDArray[np.float32]
-    """Shape (channels, samples) [V] at the converter's input."""
+    """Voltages at the converter's input, shape (channels, samples) [V]."""
 
 
 class SampleBuffer:
@@ -58,9 +58,9 @@ class SampleBuffer:
         self._channels = 0
         self._rate_hz = 1.0
         self.samples = 0
-        """Samples per channel of the run so far."""
+        """Number of samples per channel in the run so far."""
         self.gaps = 0
-        """Number of places at which samples are missing."""
+        """Number of places in the run at which samples are missing."""
 
     def begin(self, channels: int, sample_rate_hz: float) -> None:
         """Start a new run, and discard the samples of the last run."""

@@ -106,7 +106,7 @@ class ArmedPlan(FrozenModel):
     campaign: str
     folder: str
     lines: tuple[str, ...]
-    """Lines of text on signal, level, limits, duration and folder."""
+    """Lines of text on signal, level, limits, duration and folder of the campaign."""
     expires_in_s: float
     """The engine disarms itself after this time."""
     attendance: Supervision
@@ -133,7 +133,7 @@ class RunStatus(FrozenModel):
     amplitude_vpp: float
     frequency_hz: float | None
     plan: str = ""
-    """Text on the signal: kind and highest level."""
+    """Text on the excitation: kind and highest level."""
     until: UntilNote | None = None
     """Error bounds of the results so far, for a measurement with `until`."""
 
@@ -198,7 +198,7 @@ class TwinStatus(FrozenModel):
     forecast_error_m: tuple[float, ...] = ()
     """Error bound that 68 % of earlier forecasts did not exceed, for each time ahead [m]."""
     stops_m: tuple[float, float] = (0.0, 0.0)
-    """Positions of the lower and the upper stop [m]."""
+    """Positions of the lower and the upper stop of m1 [m]."""
     numbers: tuple[tuple[str, str], ...] = ()
     """Parameters estimated from this run's collisions: name, and value with 95 % bounds."""
     level: float | None = None
@@ -230,10 +230,10 @@ class EngineStatus(FrozenModel):
     overloads: int = 0
     """Number of sample ranges beyond a channel's full scale in this run."""
     lost_blocks: int = 0
-    """Number of gaps in this run's samples."""
+    """Number of gaps in the samples of this run."""
     disk_free_bytes: int = 0
     samples: int = 0
-    """Samples per channel of this run so far."""
+    """Number of samples per channel in this run so far."""
     run_id: int = 0
     """Number of the recording in this engine; data with another number are out of date."""
     twin: TwinStatus | None = None

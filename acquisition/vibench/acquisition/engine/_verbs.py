@@ -49,7 +49,7 @@ from ._wire import Message
 
 
 class CampaignRequest(FrozenModel):
-    """A campaign, and the options of its execution."""
+    """A campaign, and the options with which it is run."""
 
     campaign: Campaign
     folder: Path
@@ -90,7 +90,7 @@ class Verb(Generic[A]):
     word: str
     """Value of the key ``ask`` in the message."""
     method: str
-    """Name of the method of request handler and client."""
+    """Name of the method of request handler and client that belongs to the verb."""
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]

@@ -40,7 +40,7 @@ class WireError(ConnectionError):
 
 @dataclass(frozen=True)
 class Message:
-    """A JSON text and the bytes after it."""
+    """A received message: a JSON text and the bytes after it."""
 
     text: bytes
     payload: bytes = b""
@@ -121,7 +121,7 @@ class EngineError(AcquisitionError):
 
 
 class EngineGone(EngineError, ConnectionError):
-    """The engine's process has ended, or cannot be reached."""
+    """The process of the engine has ended, or cannot be reached."""
 
 
 class EngineSilent(EngineGone):

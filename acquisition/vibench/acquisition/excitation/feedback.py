@@ -70,7 +70,7 @@ class BaseLevel(FrozenModel):
 
     @property
     def quantity(self) -> str:
-        """The quantity that is held: ``"acceleration"`` or ``"displacement"``."""
+        """The quantity of the base that is held: ``"acceleration"`` or ``"displacement"``."""
         return "acceleration" if self.displacement_m is None else "displacement"
 
     @property
@@ -81,7 +81,7 @@ class BaseLevel(FrozenModel):
         return f"{self.acceleration_m_per_s2:g} m/s²"
 
     def acceleration_at(self, frequency_hz: float) -> float:
-        """Return the peak acceleration to be held at ``frequency_hz`` [m/s2]."""
+        """Return the peak base acceleration to be held at ``frequency_hz`` [m/s2]."""
         if self.displacement_m is not None:
             return self.displacement_m * (2 * pi * frequency_hz) ** 2
         assert self.acceleration_m_per_s2 is not None, "the validator requires one of the two"

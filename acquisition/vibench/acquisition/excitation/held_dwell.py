@@ -18,9 +18,9 @@ class HeldDwell(FixedSine, AbstractFeedback):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
     kind: Literal["held_dwell"] = "held_dwell"
     base_level: BaseLevel
-    """Level of the base to be held."""
+    """Level of the base that feedback holds."""
     settling: Settling = Settling()
-    """Criteria for settled motion before the recording."""
+    """Criteria by which the motion counts as settled before the recording."""
     duration_s: PositiveFloat
     """Time for which the settled motion is recorded [s]."""
     update_s: PositiveFloat = 1.0
@@ -28,12 +28,12 @@ class HeldDwell(FixedSine, AbstractFeedback):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry: the level of the base to be held."""
+        """One entry: the base level that feedback holds."""
         return (self.base_level,)
 
     @property
     def playing_s(self) -> float:
-        """Duration of the longest wait and of the recording [s]."""
+        """Duration of the longest wait for settling and of the recording [s]."""
         return self.settling.longest_wait_s + self.duration_s
 
     @property

@@ -21,7 +21,7 @@ class SpectrumPoint(FrozenModel):
 
     frequency_hz: FrequencyHz
     density: Annotated[float, Field(ge=1e-30, le=1e10)]
-    """Power spectral density, one-sided [unit squared per Hz]."""
+    """Power spectral density at this corner, one-sided [unit squared per Hz]."""
 
 
 Spectrum = Annotated[tuple[SpectrumPoint, ...], Field(min_length=1, max_length=100)]
@@ -47,7 +47,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     spectrum: Spectrum
     """Power spectral density of the base acceleration at its corners [(m/s2)2/Hz]."""
     tolerance_db: Decibels = 3.0
-    """Allowed deviation of the measured density from ``spectrum`` [dB]."""
+    """Allowed deviation of the measured power spectral density from ``spectrum`` [dB]."""
     abort_db: Decibels = 6.0
     """Excess of the measured density over ``spectrum`` that ends the run [dB]."""
     response_limits: tuple[SpectrumPoint, ...] = ()
@@ -99,7 +99,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def stretches(self) -> int:
-        """Number of realisations, including those for equalisation."""
+        """Number of noise realisations, including those for equalisation."""
         return self.equalisations + self.realisations
 
     @property

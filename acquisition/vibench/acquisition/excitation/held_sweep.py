@@ -20,11 +20,11 @@ class HeldSweep(MovingSine, AbstractFeedback):
 
     kind: Literal["held_sweep"] = "held_sweep"
     base_level: BaseLevel
-    """Level of the base to be held."""
+    """Level of the base that feedback holds."""
     average_s: PositiveFloat = 0.5
     """Averaging time of the level against random errors [s]; steady changes are followed faster."""
     settling: Settling = Settling()
-    """Criteria for settled motion before the sweep."""
+    """Criteria by which the motion counts as settled before the sweep."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:

@@ -112,7 +112,7 @@ class ExcitationKind:
 
     @property
     def group(self) -> str:
-        """Heading under which a list shows this kind."""
+        """Heading under which a list of kinds shows this kind."""
         return "feedback" if self.is_feedback else _GROUPS.get(self.plan.family, self.plan.family.value)
 
     @property

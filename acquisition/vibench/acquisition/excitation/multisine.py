@@ -9,7 +9,7 @@ from ..errors import ConfigurationError
 from .steps import Samples
 
 USUAL_POINTS = 8192
-"""Default number of points in one period."""
+"""Default number of points in one period of a waveform."""
 FEWEST_POINTS, MOST_POINTS = 64, 65_536
 """Bounds on the number of points in a plan; the generator's memory may set narrower bounds."""
 CANDIDATES = 20

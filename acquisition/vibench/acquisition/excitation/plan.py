@@ -106,7 +106,7 @@ class Family(StrEnum):
     """Families of kinds of excitation; all kinds of a family share their analysis and figures."""
 
     NOISE = "noise"
-    """The whole band is excited at once."""
+    """Noise or a multisine, which excites the whole band at once."""
     SWEEP = "sweep"
     """A sine whose frequency moves through a band."""
     DWELL = "dwell"
@@ -134,7 +134,7 @@ class AbstractExcitation(FrozenModel, ABC):
     result_labels: ClassVar[tuple[SegmentLabel, ...]]
     """Labels of the segments of the recording from which results are computed."""
     wishes: ClassVar[tuple[str, ...]] = ()
-    """Results whose uncertainty can end the recording, see `vibench.acquisition.plan.Until`."""
+    """Names of results whose uncertainty can end the recording, see `vibench.acquisition.plan.Until`."""
 
     amplitude_vpp: AmplitudeVpp
     """Amplitude setting as shown on the generator's panel [Vpp]."""
@@ -161,7 +161,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """Lowest amplitude setting, not counting ramps, peak to peak [V]."""
+        """Lowest amplitude setting outside ramps, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property

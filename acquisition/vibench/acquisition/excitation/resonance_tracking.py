@@ -57,7 +57,7 @@ class ResonanceTracking(AbstractFeedback):
     """Number n of drive periods in one period of m0. For n > 1, n times the phase of the absolute motion is
     used, and the motion must exist at ``start_hz``."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
-    """Allowed deviation of the phase from ``phase_deg`` [degrees]."""
+    """Allowed deviation of the phase of m0 from ``phase_deg`` [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
     sensor_gain: Share = 0.01
@@ -122,7 +122,7 @@ class ResonanceTracking(AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of all levels, with the longest searches [s]."""
+        """Duration of all levels if each search takes its longest time [s]."""
         tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
         return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 

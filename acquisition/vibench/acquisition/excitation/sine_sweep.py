@@ -23,7 +23,7 @@ class Hold(StrEnum):
     ACCELERATION = "acceleration"
     """The amplitude setting is constant."""
     VELOCITY = "velocity"
-    """The setting grows in proportion to frequency."""
+    """The amplitude setting grows in proportion to frequency."""
     DISPLACEMENT = "displacement"
     """The setting grows with the square of the frequency, as for the model in the paper."""
 
@@ -169,7 +169,7 @@ class SineSweep(MovingSine):
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """Amplitude setting at the lowest frequency [Vpp]."""
+        """Amplitude setting at the lowest frequency of the sweep [Vpp]."""
         return self.amplitude_vpp * self.level(self.band_hz[0])
 
     def level(self, frequency_hz: float) -> float:

@@ -55,7 +55,7 @@ class SteppedLevel(FixedSine):
 
     @property
     def rising_vpp(self) -> tuple[float, ...]:
-        """All levels in ascending order, up to ``amplitude_vpp`` [Vpp]."""
+        """All amplitude settings in ascending order, up to ``amplitude_vpp`` [Vpp]."""
         return tuple(
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )

@@ -93,7 +93,7 @@ class FrequencySteps(AbstractExcitation):
 
     @property
     def approach(self) -> Approach:
-        """Direction of the first pass through the list."""
+        """Direction of the first pass through the list of frequencies."""
         first, _ = next(self.passes())
         return Approach.UP if first == Direction.UP.value else Approach.DOWN
 

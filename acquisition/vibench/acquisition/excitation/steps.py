@@ -39,15 +39,15 @@ class Waveform:
 
 
 class SampleSource(Protocol):
-    """A Gaussian signal that never repeats, computed on demand."""
+    """A Gaussian noise signal that never repeats, computed on demand."""
 
     @property
     def band_start_hz(self) -> float:
-        """Lower edge of the flat spectrum [Hz]."""
+        """Lower edge of the noise's flat spectrum [Hz]."""
 
     @property
     def band_stop_hz(self) -> float:
-        """Upper edge of the flat spectrum [Hz]."""
+        """Upper edge of the noise's flat spectrum [Hz]."""
 
     @property
     def crest_factor(self) -> float:

@@ -25,7 +25,7 @@ HAMMING_WIDTH = 3.3
 Schafer, Discrete-Time Signal Processing, 3rd ed., table 7.2).
 """
 PREVIEW_S = 10.0
-"""Length of a preview of long noise [s]."""
+"""Duration of the preview if the noise is longer [s]."""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class Found(Enum):
 
 @dataclass(frozen=True)
 class Question:
-    """Question about a value of the configuration."""
+    """Question whose answer is a value of the configuration."""
 
     key: str
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""

@@ -32,7 +32,7 @@ class Beside:
             self._changed.notify_all()
 
     def wait(self, longest_s: float) -> None:
-        """Wait until every job is done, or for ``longest_s``."""
+        """Wait until every job is done, but at most ``longest_s``."""
         with self._changed:
             self._changed.wait_for(lambda: not self.is_busy, longest_s)
 
@@ -66,7 +66,7 @@ class ClosedOnLeaving(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release all resources. May be called at any time."""
+        """Release all resources of the object. May be called at any time."""
 
     def __enter__(self) -> Self:
         return self

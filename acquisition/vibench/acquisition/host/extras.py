@@ -12,7 +12,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "sound": ("sounddevice",),
     "gui": ("PySide6", "pyqtgraph"),
 }
-"""Modules that each extra of `pyproject.toml` installs."""
+"""Names of the modules that each extra of `pyproject.toml` installs."""
 
 
 def need_extra(extra: str) -> None:

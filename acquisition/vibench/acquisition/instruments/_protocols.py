@@ -59,7 +59,7 @@ class Overload:
     """Range of samples in which an input reaches 95 % of its full scale or more."""
 
     channel: str
-    """Role of the channel, ``"m0_velocity"`` for example."""
+    """Role of the channel, for example ``"m0_velocity"``."""
     first_sample: int
     last_sample: int
     """Number of the last sample in the range; the first sample of the run is 0."""
@@ -72,7 +72,7 @@ class Block:
     first_sample: int
     """Number of the block's first sample in the run."""
     volts: Samples
-    """Shape (channels, samples) [V] at the converter's input."""
+    """Voltages at the converter's input, shape (channels, samples) [V]."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
     """Integers of the converter, recorded unchanged; `Digitizer.volts_per_count` times these gives the volts.
@@ -87,7 +87,7 @@ def _not_zero(units: float) -> float:
 
 @dataclass(frozen=True)
 class SensorFacts:
-    """Conversion of a sensor from its quantity to volts."""
+    """Conversion by a sensor of a quantity to volts."""
 
     quantity: str
     """Quantity of the channel's role: ``"voltage"``, ``"acceleration"`` or ``"velocity"``."""
@@ -95,7 +95,7 @@ class SensorFacts:
     """Unit of the quantity in UDUNITS notation: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: Annotated[float, AfterValidator(_not_zero)]
     full_scale_v: Annotated[float, Field(gt=0, allow_inf_nan=True)]
-    """Largest output voltage, peak [V]; infinite for a wire."""
+    """Largest output voltage of the sensor, peak [V]; infinite for a wire."""
     name: str
     serial: str = ""
     delay_s: Annotated[float, Field(ge=0)] = 0.0
@@ -150,7 +150,7 @@ class GeneratorDescription:
     usb_ids: tuple[tuple[int, int], ...] = ()
     """USB numbers of vendor and product, one pair for each variant."""
     longest_sweep_s: float = 0.0
-    """Longest internal sweep [s]; 0 without one."""
+    """Longest internal sweep of the generator [s]; 0 without internal sweeps."""
 
 
 class FunctionGenerator(Protocol):
@@ -209,7 +209,7 @@ class FunctionGenerator(Protocol):
         """Turn the output off. May be called at any time, in any state; never fails silently."""
 
     def close(self) -> None:
-        """Switch the output off and close the connection."""
+        """Switch the output off and close the connection to the generator."""
 
 
 class Digitizer(Protocol):

@@ -83,7 +83,7 @@ class LimitSide(StrEnum):
 
 
 class Consequence(StrEnum):
-    """What happens when a limit would be exceeded."""
+    """What the program does if a plan would exceed a limit."""
 
     REFUSED = "refused"
     """The plan is not played."""
@@ -123,7 +123,7 @@ class LimitCheck:
 
     @property
     def forbids(self) -> bool:
-        """Whether the plan must not be played."""
+        """Whether the plan must not be played because of this check."""
         return not self.is_kept and self.consequence is Consequence.REFUSED
 
     @property

@@ -48,7 +48,7 @@ class Load:
     """Largest value of a quantity while a plan plays."""
 
     peak: float
-    """Peak value, in the SI unit of the quantity."""
+    """Peak value of the quantity, in its SI unit."""
     rms: float
     """Largest rms value of a steady part, in the SI unit of the quantity."""
     cause: str
@@ -56,7 +56,7 @@ class Load:
 
 
 Loads: TypeAlias = Mapping[BaseQuantity, Load]
-"""Load of every quantity of rig and specimen."""
+"""Peak and rms load of every quantity of rig and specimen."""
 
 
 def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:

@@ -64,7 +64,7 @@ class InRunLimits(FrozenModel):
     """Limits during a measurement, as fractions of the limits of the rig."""
 
     base_acceleration: Fraction = 1.0
-    """Fraction of the shaker's acceleration limit, measured at the base."""
+    """Fraction of the shaker's acceleration limit; the acceleration is measured at the base."""
     base_velocity: Fraction = 1.0
     """Fraction of the shaker's velocity limit; the velocity is integrated from the base acceleration."""
     stroke: Fraction = 1.0
@@ -99,7 +99,7 @@ class ScanPoint(FrozenModel):
     z_m: float
     """Coordinate of the point along z [m]."""
     direction: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
-    """Direction in which the velocity counts as positive."""
+    """Direction of motion in which the velocity counts as positive."""
 
     @property
     def role(self) -> Role:
@@ -230,7 +230,7 @@ class Phase:
 
     state: RunState
     play: Play | None
-    """Signal that is played; None for silence."""
+    """Signal that is played in this phase; None for silence."""
     duration_s: float
     segment: Segment | None = None
     """Segment of the recording to which this phase belongs."""

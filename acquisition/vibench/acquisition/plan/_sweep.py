@@ -21,7 +21,7 @@ MOST_VALUES = 10_000
 
 
 class RangeSpacing(StrEnum):
-    """Spacing of the values of a range."""
+    """Spacing of the values of a range: linear or logarithmic."""
 
     LINEAR = "linear"
     """Equal differences between neighbouring values."""
@@ -88,7 +88,7 @@ LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """Axes of a sweep, as named in ``order``."""
+    """Axes of a sweep, by the names used in ``order``."""
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
@@ -142,7 +142,7 @@ class Sweep(FrozenModel):
     direction: tuple[Direction, ...] = ()
     frequency_hz: Values | None = None
     order: tuple[SweepAxis, ...] = Field(default=USUAL_ORDER, min_length=1)
-    """Axes from the outermost (slowest) to the innermost."""
+    """Axes of the sweep, from the outermost (slowest) to the innermost."""
     continue_from_previous: SweepAxis | None = None
     """Axis along which the specimen stays on its branch: ``frequency_hz`` or ``amplitude_vpp``. It must be
     the innermost axis."""

@@ -47,7 +47,7 @@ class Until(FrozenModel):
 
     @property
     def wishes(self) -> dict[str, float]:
-        """Required bounds by name of the result."""
+        """Required relative bounds by name of the result."""
         return {name: wish for name in WISHES if (wish := getattr(self, name)) is not None}
 
 

@@ -85,7 +85,7 @@ class SealCheck:
     state: SealState
     sentence: str
     seal: str
-    """SHA-256 of the manifest; empty without a seal."""
+    """SHA-256 of the manifest; empty if the file has no seal."""
 
 
 class SealKey:
@@ -96,7 +96,7 @@ class SealKey:
 
     @property
     def name(self) -> str:
-        """Public name of the key, derived from the secret."""
+        """Public name of the key, derived from the secret key."""
         return self.signature(b"name of this key")[:16]
 
     def signature(self, text: bytes) -> str:

@@ -56,7 +56,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples that were lost; they read as NaN."""
+    """Range of samples that were lost; they read as NaN."""
 
     first_sample: int
     last_sample: int
@@ -77,12 +77,12 @@ class Segment:
 
     @property
     def start(self) -> int:
-        """Number of the first sample, for ``recording.read(role, segment.start, segment.stop)``."""
+        """Number of the segment's first sample, for ``recording.read(role, segment.start, segment.stop)``."""
         return self.first_sample
 
     @property
     def stop(self) -> int:
-        """Number of the sample after the last one."""
+        """Number of the sample after the segment's last sample."""
         return self.last_sample + 1
 
 

@@ -151,7 +151,7 @@ class RecordingWriter:
         key: SealKey | None = None,
     ) -> None:
         self.path = path
-        """``NAME.h5``, which exists once the recording is finished."""
+        """Path ``NAME.h5`` of the recording, which exists once the recording is finished."""
         self._header = header
         self._places = places
         self._disk = disk
@@ -202,7 +202,7 @@ class RecordingWriter:
             self._committer.put(self._journal.overload(overload))
 
     def log(self, kind: str, text: str, sample: int | None = None) -> None:
-        """Add an event at a sample (by default the next)."""
+        """Add an event at a sample, by default at the next sample."""
         place = self.samples if sample is None else sample
         LOG.info("%s, sample %d: %s: %s", self.path.name, place, kind, text)
         self._committer.put(self._journal.event(kind, text, place))

@@ -63,7 +63,7 @@ class VirtualConfig(FrozenModel):
 
     seed: int = Field(ge=0)
     pace: Literal["free", "wall"] = "free"
-    """``"free"``: as fast as possible. ``"wall"``: ``speed`` times real time."""
+    """Pace of rig time. ``"free"``: as fast as possible; ``"wall"``: ``speed`` times real time."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
     """Number of computed steps per second: 12,800 to 102,400, and at least twice the sample rate. A coarser
@@ -142,7 +142,7 @@ class OutputConfig(FrozenModel):
     """Device name of the output's module, if it differs from the converter's. Both must be able to share a
     start trigger, as modules in one chassis can."""
     limit_v: PositiveFloat = Field(le=10.0)
-    """Largest allowed magnitude of the voltage [V]."""
+    """Largest allowed magnitude of the output voltage [V]."""
     sample_rate_hz: PositiveFloat
     """Sample rate of the output, which the hardware must support exactly [samples/s]."""
     # At least three blocks of a run: one is being played, one is ready, and one is being written.
@@ -168,22 +168,22 @@ class GeneratorConfig(FrozenModel):
     """The function generator and the load on its output."""
 
     driver: str = "afg1022x"
-    """Name of an entry point of ``vibench.generators``."""
+    """Name of the driver: an entry point of ``vibench.generators``."""
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
     """Further settings of the driver; none of this package's drivers has any."""
     visa_library: str = "@py"
-    """``"@py"`` for pyvisa-py, empty for the system's VISA."""
+    """VISA library: ``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
     load_ohm: Literal["high-z"] | PositiveFloat = HIGH_Z
     """Load setting of the generator [ohm]; its display shows the voltage for this load."""
     connected_ohm: PositiveFloat
     """Impedance connected to the output: the input impedance of the amplifier [ohm]."""
     amplitude_limit_vpp: PositiveFloat
-    """Largest allowed setting, peak to peak [V]."""
+    """Largest allowed amplitude setting, peak to peak [V]."""
     settle_s: NonNegativeFloat = 0.0
-    """Pause that the instrument needs after each command [s]."""
+    """Pause that the generator needs after each command [s]."""
     dead_man_s: float | None = Field(default=None, ge=0.2, le=60.0)
     """Length of a burst [s]. A sine is played in bursts that the run must trigger; if this computer hangs,
     the drive ends with the burst. docs/safety.md describes the effect on the signal."""
@@ -213,15 +213,15 @@ class AmplifierConfig(FrozenModel):
     model: str
     serial: str = ""
     gain_db: float = Field(ge=-60, le=60)
-    """Voltage gain at the present position of the knob [dB]."""
+    """Voltage gain of the amplifier at the present position of the knob [dB]."""
     clip_v: PositiveFloat
     """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: Sourced
-    """Setting of the current limiter, rms [A]."""
+    """Setting of the amplifier's current limiter, rms [A]."""
     low_cut_hz: NonNegativeFloat = 0.0
     """Lower -3 dB frequency, first order [Hz]; 0 for a direct-coupled amplifier."""
     high_cut_hz: PositiveFloat
-    """Upper -3 dB frequency, first order [Hz]."""
+    """Upper -3 dB frequency of the amplifier, first order [Hz]."""
 
     @model_validator(mode="after")
     def _has_a_band(self) -> Self:
@@ -355,11 +355,11 @@ class ControllerConfig(FrozenModel):
     """
 
     driver: str = "lines"
-    """Name of an entry point of ``vibench.controllers``."""
+    """Name of the driver: an entry point of ``vibench.controllers``."""
     resource: str = Field(default="", pattern=r"^$|^TCPIP.*::SOCKET$")
     """VISA resource name of the controller's socket; empty on a virtual rig."""
     visa_library: str = "@py"
-    """``"@py"`` for pyvisa-py, empty for the system's VISA."""
+    """VISA library: ``"@py"`` for pyvisa-py, empty for the system's VISA."""
     options: Options = Field(default_factory=dict)
     """Further settings of the controller's driver."""
     rate_hz: float = Field(ge=1_000, le=25_600)
@@ -373,11 +373,11 @@ class ControllerConfig(FrozenModel):
     pd_of: LoopInput | None = None
     """Only input on which the controller accepts a proportional-derivative law; absent for any linear law."""
     source: str = Field(min_length=1)
-    """Source of sample rate, latency and limit."""
+    """Source of the values for sample rate, latency and limit."""
 
     @property
     def loop_time_s(self) -> float:
-        """Delay from a motion to the resulting drive [s]."""
+        """Total delay from a motion to the resulting drive voltage [s]."""
         # Averaging over a sample adds a delay of half a sample; holding the voltage adds one sample.
         return self.latency_s + 1.5 / self.rate_hz
 

@@ -92,7 +92,7 @@ class Channel:
     quantity: str
     """Physical quantity: ``"voltage"``, ``"acceleration"``, ``"force"``."""
     unit: str
-    """Unit as UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    """Unit of the quantity as UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
     units_per_volt: float
     """Physical units per volt at the converter's input."""
     full_scale_v: float
@@ -283,7 +283,7 @@ class Calibration:
 
     @property
     def advice(self) -> str:
-        """What to do about an invalid calibration."""
+        """Advice on what to do about an invalid calibration."""
         if self.is_to_come:
             return "the date is in the future: enter the date on the certificate in the configuration"
         return "have it calibrated, and enter the date in the configuration"

@@ -235,7 +235,7 @@ class Role(StrEnum):
 
     @property
     def unit(self) -> str:
-        """SI unit as UDUNITS text: ``"m s-2"``."""
+        """SI unit of the quantity as UDUNITS text: ``"m s-2"``."""
         return UNIT_OF_QUANTITY[self.quantity]
 
 

@@ -53,7 +53,7 @@ class AcquisitionLoop:
 
     @property
     def waiting_s(self) -> float:
-        """Age of the last sample read [s]."""
+        """Time since the conversion of the last sample read [s]."""
         return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
 
     def catch_up(self) -> Iterator[Block]:
@@ -84,7 +84,7 @@ class AcquisitionLoop:
 
     @property
     def _sampled(self) -> int:
-        """Number of samples converted so far, read or not."""
+        """Number of samples per channel converted so far, read or not."""
         return self.samples + self._digitizer.waiting_samples
 
     def linger(self, duration_s: float) -> Block:

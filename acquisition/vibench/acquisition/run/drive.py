@@ -54,7 +54,7 @@ class Drive(Protocol):
 
     @property
     def can_hold(self) -> bool:
-        """Whether the signal continues without further commands."""
+        """Whether the signal continues if no further command is sent."""
 
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.

@@ -101,7 +101,7 @@ _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 @dataclass(frozen=True)
 class _MonitoredQuantity:
-    """Values of one quantity over a block, with its limit."""
+    """Values of one quantity over a block of samples, with the limit of the quantity."""
 
     role: Role
     """Channel from which the quantity is computed."""

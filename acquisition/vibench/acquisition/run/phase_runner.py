@@ -121,7 +121,7 @@ class SweepWatch:
         self._time_s = 0.0
 
     def append(self, block: Block) -> None:
-        """Add the next block of the sweep."""
+        """Add the next block of samples of the sweep."""
         began_s, duration_s = self._time_s, block.volts.shape[1] / self._glide.sample_rate_hz
         began = self._sweep.cycles(began_s)
         self._time_s += duration_s

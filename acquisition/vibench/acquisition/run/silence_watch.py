@@ -43,7 +43,7 @@ class LowLevelCheck(StrEnum):
 
 @dataclass(frozen=True)
 class CheckFigures:
-    """Results of the check, as peak amplitudes of the sine."""
+    """Results of the check before a run; amplitudes are peak values of the sine."""
 
     drive_v: float
     expected_drive_v: float
@@ -51,7 +51,7 @@ class CheckFigures:
     expected_base_m_per_s2: float
 
     def text(self) -> str:
-        """Return the results as one line for the log."""
+        """Return the results of the check as one line for the log."""
         return (
             f"drive {self.drive_v:.4g} V ({self.expected_drive_v:.4g} V expected), "
             f"base {self.base_m_per_s2:.4g} m/s2 ({self.expected_base_m_per_s2:.4g} m/s2 expected) "

@@ -50,7 +50,7 @@ class OutputSynthesizer:
         self._sample = 0
         self._due_s = 0.0
         self.level = 0.0
-        """Level of the next sample, from 0 to 1."""
+        """Level of the signal at the next sample, from 0 to 1."""
         self._cycles = 0.0
         self._streamed = 0
 
@@ -162,7 +162,7 @@ class StreamDrive:
         """Number of the sample after the last one that is not zero."""
         self._is_playing = False
         self.setting_vpp = 0.0
-        """Present amplitude as the equivalent setting of a generator [Vpp]."""
+        """Present amplitude, as the equivalent amplitude setting of a generator [Vpp]."""
 
     @property
     def is_playing(self) -> bool:
@@ -170,7 +170,7 @@ class StreamDrive:
         return self._is_playing and self._sounds_until > self._played
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Write the first samples; they start with the digitizer."""
+        """Write the first samples, which start to play with the digitizer."""
         self._synthesizer.append(coming)
         self._write_ahead()
         self._output.arm()
@@ -213,7 +213,7 @@ class StreamDrive:
 
     @property
     def _played(self) -> int:
-        """Number of samples played so far, from the time read."""
+        """Number of samples played so far, from the reading time."""
         return round(self._read_s * self._output.sample_rate_hz)
 
     def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:

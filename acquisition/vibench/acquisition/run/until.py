@@ -67,7 +67,7 @@ class UntilWatch(ClosedOnLeaving):
         self._stretch = 0
         self._recorded_s = self._due_s = 0.0
         self._begun: UntilNote | None = None
-        """Note of the current stretch before its first analysis."""
+        """Note of the current stretch (step or dwell) before its first analysis."""
         self._found: UntilNote | None = None
         """Note of the last analysis, possibly of the previous stretch; the thread replaces it atomically."""
         self.ended: list[UntilNote] = []
@@ -75,7 +75,7 @@ class UntilWatch(ClosedOnLeaving):
 
     @property
     def progress(self) -> UntilNote | None:
-        """Newest note of the current stretch; None between stretches."""
+        """Newest note of the current stretch (step or dwell); None between stretches."""
         begun, found = self._begun, self._found
         is_newer = begun is not None and found is not None and found.stretch == begun.stretch
         return found if is_newer else begun

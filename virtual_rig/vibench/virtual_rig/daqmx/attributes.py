@@ -51,7 +51,7 @@ class Group:
     """The properties of one type of object, such as tasks or channels."""
 
     name: str
-    """Prefix of the property names in the protocol."""
+    """Prefix of these properties' names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], list[Any]]
     """Function that returns the objects of a request. A query reads the first; a setting applies to all."""
     attributes: Callable[[Any], Attributes]

@@ -34,7 +34,7 @@ from .rig import QUESTION_S, Rig
 from .tasks import Task, TdmsLog
 
 Fields = Mapping[str, object]
-"""The fields of a response; status 0 is omitted."""
+"""The fields of a response; a status of 0 is omitted."""
 
 
 class DaqmxSystem:

@@ -12,7 +12,7 @@ from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
 
 _SLACK = 1 + 1e-9
-"""Relative tolerance of limits, which may have rounding errors."""
+"""Relative tolerance for limits of a channel, which may have rounding errors."""
 
 
 @dataclass
@@ -90,7 +90,7 @@ class InputChannel(_VoltageChannel):
             raise unsupported_value("AI_Coupling", self.actual_coupling, "AC while IEPE excitation is on")
 
     def wiring(self) -> Input:
-        """Return the configuration for the analogue world."""
+        """Return the configuration of the input for the simulated analogue world."""
         return Input(self.physical, self.range_v, self.actual_coupling, self.iepe_current_a)
 
 

@@ -71,7 +71,7 @@ class AnalogOutputs:
     range_v: float
     rates: Rates
     idle: AOIdleOutputBehavior
-    """State of an output after its generation."""
+    """State of an output after its generation has ended."""
     untimed: SampleTimingType
     memory: int
     """Samples per channel in the device's memory, between the program's buffer and the converter."""

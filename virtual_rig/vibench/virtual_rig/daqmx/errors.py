@@ -71,7 +71,7 @@ class Unavailable(Exception):
 
 
 class Faults:
-    """The active rules; they can be changed at any time."""
+    """The active rules on failing calls; they can be changed at any time."""
 
     def __init__(self) -> None:
         self._rules: tuple[Fault | ServerGone, ...] = ()

@@ -129,7 +129,7 @@ class Rig:
             raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
 
     def arm(self, terminal: str, begin: Callable[[], None]) -> None:
-        """Call ``begin`` at the next edge on a terminal."""
+        """Call the function ``begin`` at the next edge on a terminal."""
         self._armed.setdefault(terminal.lower(), []).append(begin)
 
     def disarm(self, begin: Callable[[], None]) -> None:

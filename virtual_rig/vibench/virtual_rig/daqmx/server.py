@@ -33,13 +33,13 @@ def token_for(address: str) -> str | None:
 
 
 class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Interceptor that rejects calls without the token."""
+    """Interceptor that rejects calls without the server's token."""
 
     def __init__(self, token: str) -> None:
         self._token = token
 
     def intercept_service(self, continuation: Callable[[Any], Any], details: Any) -> Any:
-        """Pass a call on, or reject it."""
+        """Pass a call on if it has the token, or reject it."""
         given = dict(details.invocation_metadata).get(TOKEN_KEY, "")
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)

@@ -97,12 +97,12 @@ class Task:
 
     @property
     def channels(self) -> list[Channel]:
-        """All channels in the order of their creation."""
+        """All channels of the task, in the order of their creation."""
         return [*self.inputs, *self.outputs]
 
     @property
     def devices(self) -> tuple[Device, ...]:
-        """The devices of the channels, without repetition."""
+        """The devices of the task's channels, each listed once."""
         return tuple({channel.device.name: channel.device for channel in self.channels}.values())
 
     @property

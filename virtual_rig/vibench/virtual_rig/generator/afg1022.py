@@ -137,7 +137,7 @@ class AFG1022(ScpiInstrument):
         self._output.trigger(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def align_phases(self) -> None:
-        """Set both channels to their start phase now."""
+        """Set both channels to their start phase at once."""
         self._output.align(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def _replace(self, channel: int, settings: ChannelSettings) -> None:
@@ -274,7 +274,7 @@ def _write_duty(generator: AFG1022, channel: int, parameter: bytes) -> None:
 
 
 def burst_cycles(most: int, channels: int) -> Command:
-    """Return the command of the number of burst periods."""
+    """Return the command that sets the number of periods in a burst."""
     return number(
         "[SOURce#:]BURSt:NCYCles", "IVI, drivers", "burst_cycles", scpi.NO_UNITS, lambda _: (1, most),
         default=5, decimals=0, channels=channels, largest=math.inf,

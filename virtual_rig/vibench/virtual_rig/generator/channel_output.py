@@ -120,7 +120,7 @@ class ChannelSettings:
 
     @property
     def frequency_range_hz(self) -> tuple[float, float]:
-        """Frequency limits of the current shape and mode."""
+        """Frequency limits of the current shape and run mode [Hz]."""
         lowest = LOWEST_BURST_FREQUENCY_HZ if self.mode is RunMode.BURST else LOWEST_FREQUENCY_HZ
         return lowest, highest_frequency_hz(self.shape)
 
@@ -205,7 +205,7 @@ class ChannelOutput(Timeline):
             self.change(replace(latest, course=course, burst=burst), at_s)
 
     def align(self, settings: ChannelSettings, now_s: float) -> None:
-        """Set the phase to the start phase now."""
+        """Set the phase of the signal to the start phase at once."""
         at_s, own_s = self.effective(now_s)
         course = self._course(settings, settings.phase_deg / _DEGREES % 1.0, own_s)
         self.change(replace(self.latest, course=course), at_s)

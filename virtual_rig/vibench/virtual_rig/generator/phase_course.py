@@ -37,7 +37,7 @@ class SteadyPhase:
         return cls(frequency_uhz, (phase - since_zero) % 1.0)
 
     def phase(self, time_s: float) -> float:
-        """Return the phase at one instant [cycles, 0..1)."""
+        """Return the phase at one instant, from 0 to below 1 [cycles]."""
         return float(self._fractions(np.asarray([time_s]))[0])
 
     def _fractions(self, time_s: Samples) -> Samples:
@@ -78,7 +78,7 @@ class SweptPhase:
     """Phase at the time ``anchor_s`` [cycles]."""
 
     def phase(self, time_s: float) -> float:
-        """Return the phase at one instant [cycles, 0..1)."""
+        """Return the phase at one instant, from 0 to below 1 [cycles]."""
         return float(_fraction(self._cycles(np.asarray([time_s])))[0])
 
     def _cycles(self, time_s: Samples) -> Samples:

@@ -16,7 +16,7 @@ _RANGE_ROUNDING = 1e-9
 """Relative tolerance at range limits, for numbers in other units."""
 
 Setter = Callable[..., None]
-"""Function of instrument, channel and the parameters of a command."""
+"""Function that executes a command, given instrument, channel and parameters."""
 Query = Callable[..., bytes]
 """Function of instrument, channel and the parameters of a query, which returns the reply."""
 
@@ -26,7 +26,7 @@ class Command:
     """One command; without ``write`` it is query-only, without ``ask`` write-only."""
 
     header: str
-    """Header in the notation of manuals, see `header_pattern`."""
+    """Header of the command in the notation of manuals, see `header_pattern`."""
     source: str
     write: Setter | None = None
     ask: Query | None = None
@@ -147,7 +147,7 @@ class Quirks:
 
 @dataclass(frozen=True)
 class Reply:
-    """Reply to one message; empty without a query."""
+    """Reply to one message; empty if the message contains no query."""
 
     data: bytes
     delay_s: float = 0.0
@@ -258,7 +258,7 @@ class ScpiInstrument:
         return answers
 
     def _obey(self, header: str, unit: scpi.Unit) -> bytes | None:
-        """Execute one unit; return the reply of a query."""
+        """Execute one unit of a message; return the reply if the unit is a query."""
         command, suffix = self._find(header)
         act = None if command is None else command.ask if unit.asks else command.write
         if command is None or act is None:

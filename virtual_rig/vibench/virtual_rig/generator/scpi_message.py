@@ -40,7 +40,7 @@ class ErrorCode(IntEnum):
 
     @property
     def text(self) -> str:
-        """Text that SYST:ERR? returns with the number."""
+        """Text that SYST:ERR? returns with the error number."""
         words = self.name.replace("_", " ").capitalize()
         kind, _, problem = words.partition(" ")
         return f"{kind} {problem.upper()}" if kind == "Query" else words

@@ -190,7 +190,7 @@ class Terminal:
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.load_ohm)
 
     def own_time(self, time_s: Samples) -> Samples:
-        """Return the generator's time at a rig time."""
+        """Return the time by the generator's clock at a rig time [s]."""
         return time_s + time_s * (self.clock_error_ppm * 1e-6) + self.clock_offset_s
 
 
@@ -204,7 +204,7 @@ class Timeline:
         self._origin_s = 0.0
         self._interval_s = 0.0
         self._rendered = 0
-        """Samples since ``_origin_s``, all with the same interval."""
+        """Samples since ``_origin_s``, all over intervals of the same length."""
         self._noise_index = 0
         self._noise_block = NO_BLOCK, np.empty(0)
         self._end_s = -np.inf

@@ -81,7 +81,7 @@ class VirtualRig:
         self._address = address
         self._scpi_port = scpi_port
         self.token = token_for(address)
-        """Token required from other computers; None on loopback."""
+        """Token that calls from other computers need; None on loopback."""
         self._pace: Pace = WallPace(virtual.speed) if virtual.pace == "wall" else OnDemandPace()
         # Generator and world refer to each other, so the clock looks up ``world`` at each call.
         usb_ids, serial = _address(rig.generator.resource)

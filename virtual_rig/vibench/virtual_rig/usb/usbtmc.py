@@ -63,14 +63,14 @@ NEVER_MS = 2**32 - 1
 
 
 class MessageId(IntEnum):
-    """Type of a bulk transfer (table 2)."""
+    """Type of a bulk transfer (USBTMC table 2)."""
 
     OUT = 1
     REQUEST_IN = 2
 
 
 END_OF_MESSAGE = 1
-"""Attribute of a bulk header (tables 3 and 9)."""
+"""Attribute of a bulk header (USBTMC tables 3 and 9)."""
 SUCCESS = 1
 TRANSFER_NOT_IN_PROGRESS = 0x81
 """Values of the first byte of the response to a class request (table 16)."""
@@ -89,7 +89,7 @@ class _Flight:
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
     request: tuple[int, int] | None = None
-    """Tag and length of the request for a reply."""
+    """Tag and length of the host's request for a reply."""
     rest: bytes = b""
     """Remainder of a transfer that did not fit into the host's buffer."""
     aborting: bool = False

@@ -68,7 +68,7 @@ class Decimator:
         return (sample + 1) * self.ratio - group_delay - self.delay_steps - 0.5
 
     def first_step(self, sample: int) -> int:
-        """Return the oldest step that a sample needs."""
+        """Return the number of the oldest step that a sample needs."""
         return self.start_step + floor(self.centre(sample)) + self._newest_offset - self.reach + 1
 
     @property
@@ -262,7 +262,7 @@ class ConverterInput:
 
 
 class SampleQueue:
-    """Queue of samples in order of time."""
+    """Queue of converted samples in order of time."""
 
     def __init__(self, channels: int) -> None:
         self._empty = np.empty((channels, 0))

@@ -118,7 +118,7 @@ class LowPass:
     """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
 
     def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the complex gain, with the shape of ``frequency_hz``."""
+        """Return the complex gain of the low-pass, with the shape of ``frequency_hz``."""
         s = 2j * np.pi * np.asarray(frequency_hz)
         return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
 
@@ -180,11 +180,11 @@ class SensorParts:
 
     filter: RecursiveFilter
     noise: FloatArray
-    """Noise in units of the motion, shape (steps,)."""
+    """Noise of the sensor in units of the motion, shape (steps,)."""
     instead: FloatArray
     """Values that replace the motion where they are not NaN, in its units; empty if nothing is replaced."""
     full_scale: float
-    """Full scale in units of the motion."""
+    """Full scale of the sensor in units of the motion."""
     full_scale_v: float
 
     def showing(self, motion: FloatArray, volts: FloatArray) -> Structure:

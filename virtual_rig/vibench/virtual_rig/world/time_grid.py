@@ -43,7 +43,7 @@ class TimeGrid:
         return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
 
     def step_at(self, time_s: float) -> int:
-        """Return the grid point nearest to a rig time."""
+        """Return the number of the grid point nearest to a rig time."""
         return round(time_s * self.rate_hz)
 
 
@@ -74,7 +74,7 @@ class RecursiveFilter:
         )
 
     def run(self, values: FloatArray) -> FloatArray:
-        """Return the next output values, one for each input value."""
+        """Return the filter's next output values, one for each input value."""
         engine, result = native_engine(), np.empty(len(values))
         engine.call(
             "filter_signal", engine.new("FilteredSignal", filter=self.parts, values=values, result=result)

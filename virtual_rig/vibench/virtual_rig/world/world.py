@@ -72,7 +72,7 @@ class AnalogueOutput:
         return max(len(self._queue) - ended, 0)
 
     def drop(self) -> None:
-        """Clear the queue; the output returns to zero."""
+        """Clear the queue of samples; the output returns to zero."""
         self._queue = np.empty(0)
 
     def render(self, first_step: int, steps: int) -> FloatArray:
@@ -239,7 +239,7 @@ class World:
             self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
 
     def silence(self, physical_channel: str) -> None:
-        """Clear the queue and hold the output at zero."""
+        """Clear the output's queue of samples and hold the output at zero."""
         with self._turn:
             self._output(physical_channel).drop()
 
@@ -270,7 +270,7 @@ class World:
                     self._sensors[role].disturb(Disturbance(self._step, stop, level))
 
     def connect(self, physical_channel: str) -> None:
-        """Connect an input as described by the rig."""
+        """Connect an input of the converter as the rig's configuration describes."""
         with self._turn:
             self._cables[physical_channel] = self._plan.get(physical_channel, OPEN_INPUT)
 
