@@ -286,7 +286,7 @@ class Journal:
         return batch
 
     def end_segment(self, last_sample: int) -> Batch:
-        """End the segment that has begun."""
+        """End the segment that has started."""
         if self._open is None:
             raise RecordingError("No segment is open. Begin a segment before ending it.")
         batch = self._segments.replace(self._open.row, self._open.cells(last_sample, is_complete=1))
