@@ -144,7 +144,7 @@ class LoopController(RealTimeController, Protocol):
         """Identity and capabilities of the controller."""
 
     def play(self, program: LoopProgram) -> LoopReport:
-        """Change to a program over its glide time; return the controller's report."""
+        """Change to a program over the program's glide time; return the controller's report."""
 
     def report(self) -> LoopReport:
         """Return the state and the blocks measured since the last report, and restart the watchdog.
@@ -160,4 +160,4 @@ class ControllerDriver(Protocol):
     """Type of an entry point in ``vibench.controllers``."""
 
     def open(self, config: ControllerConfig) -> LoopController:
-        """Connect to a controller and silence it; raises InstrumentError if it does not answer as one."""
+        """Connect to a controller and silence it; raises InstrumentError if no controller answers."""

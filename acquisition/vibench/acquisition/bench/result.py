@@ -66,7 +66,7 @@ def finding_of(
     advice: str,
     uncertainty: float | None = None,
 ) -> Finding:
-    """Return the finding for a number; it contains the advice only if the verdict is not ok."""
+    """Return the finding for a number; the finding contains the advice only if the verdict is not ok."""
     spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
     return Finding(
         name=name,

@@ -88,7 +88,7 @@ class ExistingRecordings(StrEnum):
     """What to do with recordings that are already in the folder."""
 
     REFUSE = "refuse"
-    """Refuse to start a campaign in a folder that has recordings of it."""
+    """Refuse to start a campaign in a folder that already has recordings of this campaign."""
     RESUME = "resume"
     """Keep complete recordings; measure the other points again, in new files beside the old ones."""
 
@@ -102,7 +102,7 @@ class AfterFailure(StrEnum):
 
 
 class ChangedBench(StrEnum):
-    """What to do when a campaign is resumed on a bench that differs from the one at its start."""
+    """What to do when a campaign is resumed on another bench than the bench at its start."""
 
     REFUSE = "refuse"
     ACCEPT = "accept"
@@ -298,7 +298,7 @@ class JournalPoint:
     measurement: Measurement
     chain: str
     added_after: str
-    """Name of the point whose result requested this one; empty for points of the plan."""
+    """Name of the point whose result requested this point; empty for points of the plan."""
     state: JournalPointState
     reason_code: ReasonCode
     reason: str

@@ -151,7 +151,7 @@ class StatusLine(ClosedOnLeaving):
         self._write(event.text)
 
     def progress(self, stand: CampaignProgress) -> None:
-        """Update the progress after a block; write a line if the last one is older than `LINE_EVERY_S`."""
+        """Update the progress after a block; write a line if the last line is older than `LINE_EVERY_S`."""
         run = stand.run
         self._point_s = run.elapsed_s
         self._where = f"{stand.number}/{stand.count} {stand.name}"

@@ -220,7 +220,7 @@ class JumpLocator:
         return found.point
 
     def _is_late(self) -> bool:
-        """Return whether too little time is left for one more step and the move to the end of the bracket."""
+        """Return whether too little time is left for another step and the move to the end of the bracket."""
         step_s = self._plan.settling.longest_wait_s
         return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 

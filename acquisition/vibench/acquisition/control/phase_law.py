@@ -75,7 +75,7 @@ class PhaseLaw:
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """Base level for which the present amplitude of the motion is the settled one [m/s2]."""
+        """Base level to which the present amplitude of the motion belongs when settled [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []

@@ -1,4 +1,4 @@
-"""Track a phase resonance from level to level: search it once, then follow it by a phase-locked loop."""
+"""Track a phase resonance from level to level: a search at first, then a phase-locked loop follows it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -121,7 +121,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
 def _go_on(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
 ) -> Controller[TrackedPlace | None]:
-    """Follow the resonance to the next level and record there; None if the loop lost it."""
+    """Follow the resonance to the next level and record there; None if the loop lost the resonance."""
     level, law = plan.held_levels[number], PhaseLaw(plan, last, mode)
     change = _first_change(loop, level, last)
     begin_hz = law.next_hz(last.frequency_hz, last.base_m_per_s2 * change)

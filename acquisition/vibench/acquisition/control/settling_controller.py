@@ -84,7 +84,7 @@ def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> Jump
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:
-    """Return the larger over the smaller response; 1 if they are equal, infinite if one of them is zero."""
+    """Return the larger over the smaller response; 1 for equal responses, infinite if only one is zero."""
     if min(one.response, other.response) <= 0.0:
         return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
@@ -130,7 +130,7 @@ class SettledState:
 
     @property
     def transmissibility(self) -> complex:
-        """Displacement of m0 over that of the base, at the drive frequency."""
+        """Displacement of m0 over displacement of the base, at the drive frequency."""
         return self.harmonics[self.drives - 1]
 
     @property
@@ -308,7 +308,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
 def record_settled(
     controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
-    """Record a settled motion as a segment, and write a note on it."""
+    """Record a settled motion as a segment, and write a note on the motion."""
     yield from _record_held(controller, segment, duration_s)
     _note(controller, found, segment)
 

@@ -94,7 +94,7 @@ class GainEstimator:
 
 @dataclass(frozen=True)
 class DriveSetting:
-    """Frequency of the generator, and its amplitude setting (peak to peak)."""
+    """Drive frequency of the generator, and amplitude setting (peak to peak)."""
 
     frequency_hz: float
     setting_vpp: float

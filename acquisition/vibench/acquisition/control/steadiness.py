@@ -112,7 +112,7 @@ class Stroboscope:
         self._response: list[Phasors] = []
 
     def add(self, first_sample: int, drive: Samples, base: Samples, response: Samples) -> None:
-        """Add a block that follows the last one without a gap; each channel has the shape (samples,)."""
+        """Add a block that follows the last block without a gap; each channel has the shape (samples,)."""
         block = np.stack([drive, base, response])
         if self._left.size == 0:
             self._first = first_sample
@@ -198,7 +198,7 @@ _THIRDS = 3
 _FEWEST_TURNS = 2
 """Smallest number of repetitions of a period in each third of the window."""
 _SURE = 2.0
-"""Number of standard uncertainties that a value must be away from its limit."""
+"""Number of standard uncertainties by which a value must differ from its limit."""
 _CERTAIN = 5.0
 """Number of standard errors above which a mean is not explained by noise."""
 _BLOCKS = 12

@@ -228,7 +228,7 @@ class DaqmxDigitizer:
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
         self.session = session
-        """Connection to the driver; an output of the same driver uses it too."""
+        """Connection to the driver, which an output of the same driver uses, too."""
         self._config = config
         self._channels = channels
         self.roles = tuple(channel.role.value for channel in channels)

@@ -185,7 +185,7 @@ class NoGenerator:
 
     name: str
     silently: str = ""
-    """Reason why it accepts commands although it plays nothing; empty if it refuses commands."""
+    """Reason why the placeholder accepts commands but plays nothing; empty if it refuses commands."""
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:

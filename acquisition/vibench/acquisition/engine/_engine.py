@@ -78,7 +78,7 @@ class Engine:
 
     @property
     def bench(self) -> Bench:
-        """The open bench; other threads may read its rig if the state says that it is open."""
+        """The open bench; other threads may read its rig while the state says that the bench is open."""
         assert self._reconnecting is not None, f"no bench is open while {self.published.state}"
         return self._reconnecting.bench
 
@@ -139,7 +139,7 @@ class Engine:
         messengers: tuple[Messenger, ...] = (),
         move_beam: CommandMessenger | None = None,
     ) -> tuple[PointResult, ...]:
-        """Run a campaign and return its results; `run_campaign` calls the functions given here."""
+        """Run a campaign and return its results; `run_campaign` calls the functions that are given."""
         assert self._reconnecting is not None
         facts_at = cache(partial(bench_facts, self.bench))
         roles = {name: each.point and each.point.role for name, each in request.campaign.recordings()}

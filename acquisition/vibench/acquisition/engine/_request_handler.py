@@ -115,7 +115,7 @@ LATE_FACTOR = 4.0
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995
-"""Factor by which the remembered largest delay shrinks at each check; it halves in seven seconds."""
+"""Factor by which the remembered largest delay shrinks at each check; the delay halves in 7 s."""
 
 
 class RequestHandler:

@@ -188,7 +188,7 @@ class TwinStatus(FrozenModel):
     sentence: str = ""
     run_id: int = 0
     end_sample: int = 0
-    """Number of the sample after the newest one that the twin used."""
+    """Number of the sample after the newest sample that the twin has used."""
     step_s: float = 0.0
     """Time step of ``p_m`` [s]; the last value of ``p_m`` is at the newest sample."""
     p_m: tuple[float | None, ...] = ()
@@ -208,7 +208,7 @@ class TwinStatus(FrozenModel):
     busy_share: float = 0.0
     """Processor time of the twin's process relative to the time since the run began."""
     missed_s: float = 0.0
-    """Duration of motion that the twin skipped because it was too slow [s]; the recording contains it."""
+    """Duration of motion that the twin skipped because it was too slow [s]; recorded nevertheless."""
     behind_s: float = 0.0
     """Delay of the twin behind the newest sample, at its last report [s]."""
 
@@ -294,7 +294,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return why the twin ended by itself, only once; None while it runs or is off."""
+        """Return why the twin ended by itself, only once; None while the twin runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

@@ -207,7 +207,7 @@ class EngineVerbs:
 
     @verb("arm", PLAN, EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
     def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:
-        """Prepare a campaign and return its plan, or refuse it with the reasons."""
+        """Prepare a campaign and return its plan, or refuse the campaign with the reasons."""
         raise NotImplementedError
 
     @verb("disarm", DONE)

@@ -10,7 +10,7 @@ from ..host.toml_file import FrozenModel
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
-"""Displacement to be held [m]. The bounds only catch wrong units: no sensor or shaker reaches them."""
+"""Displacement to be held [m]. The bounds, which no sensor or shaker reaches, only catch wrong units."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
 """Acceleration to be held [m/s2]. The bounds only catch wrong units, as no shaker reaches 10 000 g."""
 
@@ -24,7 +24,7 @@ class Settling(FrozenModel):
     """
 
     tolerance: Share = 0.01
-    """Largest deviation between repetitions of the motion, relative to its rms value."""
+    """Largest deviation between repetitions of the motion, relative to the motion's rms value."""
     periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
     """Number of drive periods over which the motion must repeat."""
     longest_period: int = Field(default=8, ge=1, le=32)
@@ -89,7 +89,7 @@ class BaseLevel(FrozenModel):
 
 
 class JumpSearch(FrozenModel):
-    """Criteria by which a change between two steps counts as a jump, and the accuracy of its location."""
+    """Criteria by which a change between two steps counts as a jump, and how exactly a jump is located."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
     """Change of Response II (fundamental of m0 over base) above this factor counts as a jump."""

@@ -45,7 +45,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     family: ClassVar[Family] = Family.NOISE
     kind: Literal["held_noise"] = "held_noise"
     spectrum: Spectrum
-    """Power spectral density of the base acceleration at its corners [(m/s2)2/Hz]."""
+    """Power spectral density of the base acceleration at the spectrum's corners [(m/s2)2/Hz]."""
     tolerance_db: Decibels = 3.0
     """Allowed deviation of the measured power spectral density from ``spectrum`` [dB]."""
     abort_db: Decibels = 6.0

@@ -13,7 +13,7 @@ from .periodic_noise import MOST_REALISATIONS, PeriodicNoise
 GROUP = 4
 """Number of adjacent odd lines of which one, chosen at random, is a detection line."""
 DETECTION_KEY = 0x0DD
-"""Key of the random numbers for detection lines; it keeps them independent of the random phases."""
+"""Key of the random numbers for detection lines; they are independent of the random phases."""
 
 
 class OddMultisine(PeriodicNoise):

@@ -41,7 +41,7 @@ class ResonanceTracking(AbstractFeedback):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.RESONANCE,)
     kind: Literal["resonance_tracking"] = "resonance_tracking"
     start_hz: FrequencyHz
-    """Frequency at which the search starts; nearer to this mode than to any other [Hz]."""
+    """Frequency at which the search starts; nearer to the tracked mode than to any other mode [Hz]."""
     low_hz: FrequencyHz
     """Lowest frequency of the search [Hz]."""
     high_hz: FrequencyHz

@@ -19,7 +19,7 @@ exceed 4.5 standard deviations; they are clipped, with no visible effect on the 
 CHUNK = 4096
 """Number of random values per seed: few values make any sample quick to reach, many draw faster."""
 TRANSITION_WIDTH = 0.5
-"""Transition width of the filter divided by the band's lower edge; the edges are its -6 dB points."""
+"""Transition width of the filter divided by the band's lower edge; the band edges are the -6 dB points."""
 HAMMING_WIDTH = 3.3
 """Number of taps times transition width divided by sample rate, for a Hamming-windowed filter (Oppenheim and
 Schafer, Discrete-Time Signal Processing, 3rd ed., table 7.2).

@@ -91,7 +91,7 @@ QUESTIONS = (
 
 
 def questions_for(text: str) -> tuple[Question, ...]:
-    """Return the questions for a template; it includes questions on each further sensor."""
+    """Return the questions for a template, including questions on each further sensor."""
     roles = tomllib.loads(text).get("sensors", {})
     others = [
         Question(key, words.format(role.replace("_", " ")))

@@ -68,7 +68,7 @@ def named(given: Path | str, folder: str) -> Path:
 
 
 def built_site() -> Path:
-    """Return the folder of the site that ``vibench docs`` builds for this version; it may not exist yet."""
+    """Return the folder of the site that ``vibench docs`` builds for this version; maybe not built yet."""
     return state_folder() / "documentation" / version("vibench")
 
 

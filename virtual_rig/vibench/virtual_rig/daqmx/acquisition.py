@@ -67,7 +67,7 @@ class Stream:
 
     @property
     def is_done(self) -> bool:
-        """Whether all samples of the task are transferred, or the rest will never be."""
+        """Whether all samples of the task are transferred, or no more will be."""
         return self.transferred >= self.total or self.failure is not None
 
     def reaches(self, count: int) -> bool:
@@ -143,7 +143,7 @@ class Acquisition(Stream):
     def trigger(self) -> bool:
         """Apply the reference trigger now; return whether it is accepted.
 
-        It is rejected until enough samples before it are stored.
+        The trigger is rejected until enough samples are stored.
         """
         if not self.awaits_trigger or self.transferred < self._pretrigger:
             return False

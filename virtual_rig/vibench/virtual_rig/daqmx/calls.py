@@ -192,7 +192,7 @@ TASK_CALLS: Mapping[str, TaskCall] = {
     # The client has already closed the event stream; nothing else needs to be undone.
     "UnregisterEveryNSamplesEvent": lambda *_: None,
 }
-"""Calls on a task, keyed by their names in the protocol; `DATA_CALLS` has those that transfer samples."""
+"""Calls on a task, keyed by their names in the protocol; `DATA_CALLS` has the calls that transfer samples."""
 # fmt: on
 
 

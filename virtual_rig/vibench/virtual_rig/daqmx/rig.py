@@ -1,4 +1,4 @@
-"""The rig behind the simulated driver, and the passing of its time: on demand or in real time."""
+"""The rig behind the simulated driver, and the passing of rig time: on demand or in real time."""
 
 import math
 import threading

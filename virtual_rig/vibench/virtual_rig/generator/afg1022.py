@@ -180,7 +180,7 @@ def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Channel
 
 
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings without a mode that is not simulated: it can be switched off, but not on (-241)."""
+    """Return settings without a mode that is not simulated: a mode can be switched off, but not on (-241)."""
     if wanted:
         raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)

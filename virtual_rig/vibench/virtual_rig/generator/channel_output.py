@@ -158,7 +158,7 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 
 
 class ChannelOutput(Timeline):
-    """Output that plays the settings; a change acts at its rig time."""
+    """Output that plays the settings; a change of settings acts at its rig time."""
 
     def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False

@@ -215,7 +215,7 @@ class ScpiInstrument:
             self._next_is_corrupted = True
 
     def identity(self) -> bytes:
-        """Return the identity; with the quirk, it is empty at the first query after ``*CLS``."""
+        """Return the identity; with the quirk, the reply is empty at the first query after ``*CLS``."""
         is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
         return b"" if is_empty else self._identity.encode("ascii")
 

@@ -131,7 +131,7 @@ NEWLINE = ord("\n")
 BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
 LONGEST_MESSAGE = 1 << 22
-"""Largest message in bytes (assumed); the longest useful one, a million-point waveform, has 2 MB."""
+"""Largest message [bytes] (assumed); the longest useful message, a million-point waveform, has 2 MB."""
 DIGITS = frozenset(b"0123456789")
 
 

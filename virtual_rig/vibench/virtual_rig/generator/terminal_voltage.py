@@ -120,7 +120,7 @@ NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Number of noise samples per block; each block has its own seed."""
 _CONTINUES = 1e-3
-"""Largest distance of a block's start from the end of the block that it continues, in intervals."""
+"""Largest gap between a block's start and the end of the block before it, in intervals."""
 
 
 class Relay(Enum):
@@ -132,7 +132,7 @@ class Relay(Enum):
 
 @dataclass(frozen=True)
 class Burst:
-    """Start and end of a burst; outside it, the output stays at the level of the start phase."""
+    """Start and end of a burst; outside the burst, the output stays at the level of the start phase."""
 
     begin_s: float
     end_s: float

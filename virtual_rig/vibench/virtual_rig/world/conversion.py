@@ -142,7 +142,7 @@ def _windowed_sinc(positions: FloatArray, ratio: float) -> FloatArray:
 
 
 AC_CUT_HZ = 0.5
-"""-3 dB frequency of the AC coupling, both for NI 9234 and USB-4431; first order here."""
+"""-3 dB frequency of the AC coupling, both for NI 9234 and USB-4431; modelled as first order."""
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
@@ -162,7 +162,7 @@ class InputStage:
     """One input from its connector to the converter, computed together with the world."""
 
     def __init__(self, configured: Input, cables: Mapping[str, Cable], grid: TimeGrid = USUAL_GRID) -> None:
-        """``cables`` are those of all inputs, by name; they may be replaced at any time."""
+        """``cables`` are the cables of all inputs, by name; they may be replaced at any time."""
         self.configured = configured
         self._cables = cables
         self._clip_v = clip_v(configured.range_v)

@@ -35,7 +35,7 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """Return the physical length of a step if the converter's clock is fast by this amount [s]."""
+        """Return the physical length of a step if the converter's clock is fast by this error [s]."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:

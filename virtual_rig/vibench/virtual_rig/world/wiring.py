@@ -36,7 +36,7 @@ class Input:
     """Full scale of the input, plus and minus [V]."""
     coupling: Coupling
     iepe_current_a: float = 0.0
-    """Excitation current of an IEPE sensor [A]; a sensor that needs it gives no signal without it."""
+    """Excitation current of an IEPE sensor [A]; IEPE sensors give no signal without this current."""
 
 
 class Behind(Enum):

@@ -275,12 +275,12 @@ class World:
             self._cables[physical_channel] = self._plan.get(physical_channel, OPEN_INPUT)
 
     def disconnect(self, physical_channel: str) -> None:
-        """Disconnect an input; it then measures zero, or the voltage of its own excitation."""
+        """Disconnect an input; the input then measures zero, or the voltage of its own excitation."""
         with self._turn:
             self._cables[physical_channel] = OPEN_INPUT
 
     def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input, which inverts its sign."""
+        """Swap the two wires of an input, which inverts the sign of the input."""
         cable = self._plan.get(physical_channel, OPEN_INPUT)
         with self._turn:
             self._cables[physical_channel] = replace(cable, attenuation=-cable.attenuation)
