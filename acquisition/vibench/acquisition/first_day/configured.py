@@ -69,22 +69,22 @@ QUESTIONS = (
     ),
     Question("daq.channels.m0_velocity.physical", "Which input reads the vibrometer?"),
     Question("amplifier.serial", "Serial number of the amplifier?"),
-    Question("amplifier.gain_db", "Gain at its knob [dB]?"),
-    Question("amplifier.current_limit_a", "Its current limit [A rms]?"),
+    Question("amplifier.gain_db", "Gain of the amplifier [dB]?"),
+    Question("amplifier.current_limit_a", "Current limit of the amplifier [A rms]?"),
     Question("shaker.serial", "Serial number of the shaker?"),
     Question("shaker.fixture_mass_kg", "Mass of the fixture with its screws, without the specimen [kg]?"),
     Question("accelerometer.model", "Model of the accelerometer?"),
-    Question("accelerometer.serial", "Its serial number?"),
+    Question("accelerometer.serial", "Serial number of the accelerometer?"),
     Question(
         "accelerometer.sensitivity_v_per_m_per_s2",
-        "Its sensitivity, from its certificate [V per m/s2, or with a unit: 100 mV/g]?",
+        "Accelerometer sensitivity, from its certificate [V per m/s2, or with a unit: 100 mV/g]?",
     ),
-    Question("accelerometer.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
+    Question("accelerometer.calibrated", "Date on the accelerometer's certificate (YYYY-MM-DD)?"),
     Question("vibrometer.serial", "Serial number of the vibrometer?"),
-    Question("vibrometer.decoder", "Its decoder?"),
-    Question("vibrometer.range_mm_per_s_per_v", "Its range, as displayed [mm/s per volt, or with a unit]?"),
-    Question("vibrometer.delay_s", "Delay of its output [s]? 0 if not measured"),
-    Question("vibrometer.calibrated", "The date of its calibration (YYYY-MM-DD)?"),
+    Question("vibrometer.decoder", "Decoder of the vibrometer?"),
+    Question("vibrometer.range_mm_per_s_per_v", "Range of the vibrometer [mm/s per volt, or with a unit]?"),
+    Question("vibrometer.delay_s", "Delay of the vibrometer's output [s]? 0 if not measured"),
+    Question("vibrometer.calibrated", "Date of the vibrometer's calibration (YYYY-MM-DD)?"),
     Question("specimen.gap_m", "Gap of the specimen [m], measured by feeler gauge?"),
 )
 """Questions in the order in which they are asked."""
@@ -99,12 +99,12 @@ def questions_for(text: str) -> tuple[Question, ...]:
         for key, words in (
             (f"daq.channels.{role}.physical", "Which input reads the sensor of {}?"),
             (f"sensors.{role}.model", "Model of the sensor of {}?"),
-            (f"sensors.{role}.serial", "Its serial number?"),
+            (f"sensors.{role}.serial", "Serial number of the sensor of {}?"),
             (
                 f"sensors.{role}.sensitivity",
-                "Its sensitivity, from its certificate [such as 100 mV/g]?",
+                "Sensitivity of the sensor of {}, from its certificate [such as 100 mV/g]?",
             ),
-            (f"sensors.{role}.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
+            (f"sensors.{role}.calibrated", "Date on the certificate of the sensor of {} (YYYY-MM-DD)?"),
         )
     ]
     questions = (*QUESTIONS[:-1], *others, QUESTIONS[-1])
