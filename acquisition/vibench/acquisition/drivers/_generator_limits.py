@@ -94,9 +94,9 @@ class GeneratorModel:
         self.check_frequency(Shape.SINE, sweep.start_hz)
         self.check_frequency(Shape.SINE, sweep.stop_hz)
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
-            most = f"for at most {self.longest_sweep_s:g} s" if self.longest_sweep_s else "not by itself"
+            most = f"sweeps up to {self.longest_sweep_s:g} s" if self.longest_sweep_s else "cannot sweep"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} sweeps "
+                f"a sweep of {sweep.duration_s:g} s was requested; the {self.name} "
                 f"{most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
