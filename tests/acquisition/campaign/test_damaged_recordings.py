@@ -113,6 +113,22 @@ def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, dama
     assert {outcome for outcome, _ in outcomes(again).values()} == {PointOutcome.KEPT}
 
 
+@pytest.mark.parametrize("existing", ExistingRecordings)
+def test_a_link_to_a_disk_that_is_not_connected_is_kept(bench, folder, existing):
+    link = folder / "one.h5"
+    link.unlink()
+    link.symlink_to("/archive/one.h5")
+    for each in ("two.h5", "three.h5", "c.campaign.sqlite"):
+        (folder / each).unlink()
+    if existing is ExistingRecordings.REFUSE:
+        with pytest.raises(RecordingError, match=r"one\.h5 exists already"):
+            run_campaign(bench, CAMPAIGN, folder, existing)
+    else:
+        made = run_campaign(bench, CAMPAIGN, folder, existing)
+        assert outcomes(made)["one"] == (PointOutcome.RECORDED, "one.2.h5")
+    assert link.is_symlink()
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", [truncate, change_one_sample, replace_by_a_folder])
 def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, folder, damage):

@@ -66,6 +66,13 @@ def test_a_recording_never_overwrites_an_existing_file(tmp_path, make_header, ta
     assert (tmp_path / taken).read_text() == "precious"
 
 
+def test_a_recording_never_replaces_a_link_that_leads_nowhere(tmp_path, make_header):
+    (tmp_path / "a.h5").symlink_to("/archive/a.h5")
+    with pytest.raises(RecordingError, match=r"a\.h5 exists"):
+        create_recording(tmp_path / "a.h5", make_header())
+    assert (tmp_path / "a.h5").is_symlink()
+
+
 @pytest.mark.parametrize("name", ["a.hdf5", "a", "a.h5.part"])
 def test_a_file_extension_other_than_h5_is_refused(tmp_path, make_header, name):
     with pytest.raises(RecordingError, match=r"NAME\.h5"):

@@ -117,4 +117,4 @@ def _attempt(folder: Path, name: str, number: int) -> Path:
 
 
 def _is_taken(path: Path) -> bool:
-    return any(each.exists() for each in (path, part_of(path), tmp_of(path)))
+    return any(each.exists() or each.is_symlink() for each in (path, part_of(path), tmp_of(path)))

@@ -157,7 +157,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
-    if final.exists():
+    if final.exists() or final.is_symlink():
         raise RecordingError(f"{final} exists, and nothing is ever overwritten; move that file away.")
     try:
         meet_trouble()

@@ -118,7 +118,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
         raise RecordingError(f"A recording is called NAME{layout.SUFFIX}; {path.name!r} was given.")
     part = layout.part_of(path)
     for taken in (path, part, layout.tmp_of(path)):
-        if taken.exists():
+        if taken.exists() or taken.is_symlink():
             raise RecordingError(
                 f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
                 " (an interrupted recording leaves a .part or .tmp file: recover it first)."
