@@ -83,3 +83,10 @@ def test_an_unchanged_parameter_box_is_not_sampled_again():
     assert found.fits
     bounds = np.quantile(found.draws, [0.025, 0.975], axis=0)
     assert np.all(np.diff(bounds, axis=0) > 0.8 * 2.0 * 0.95)
+
+
+def test_parameters_outside_their_range_do_not_fit():
+    """The bounds of c1 had zero width, at the end of the range."""
+    for seed in range(8):
+        runs = Linear(seed)
+        assert not posterior(runs, runs(np.array([[1.2, -0.2, 0.0]]))[0], BOX, seed, ROUNDS).fits

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.signal
@@ -41,6 +41,9 @@ A correct model exceeds the furthest of n runs at most once in n + 1 times. The 
 differences between rig and recording.
 """
 
+_CONFIDENCE = 0.95
+_BOUNDS = (0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE)
+
 Runs = Callable[[Reals], Reals]
 """Function from parameters, shape (draws, parameters), to run statistics, shape (draws, statistics)."""
 
@@ -52,7 +55,7 @@ class Posterior:
     draws: Reals
     """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics from the simulated ones, relative to the furthest run."""
+    """Distance of the observed statistics from the furthest run; infinite with bounds outside of a range."""
 
     @property
     def fits(self) -> bool:
@@ -91,10 +94,12 @@ def posterior(
         middle, errors = _regression(statistics, parameters, observed)
         reach = _MARGIN * np.abs(errors).max(axis=0)
         narrower = np.clip(np.stack([middle - reach, middle + reach], axis=1), box[:, :1], box[:, 1:])
+        low, high = np.quantile(middle + errors, _BOUNDS, axis=0)
+        is_inside = np.all((high > box[:, 0]) & (low < box[:, 1]))
         found = np.clip(middle + errors, box[:, 0], box[:, 1])
         guessed = np.vstack([parameters - errors, middle])
         box = narrower
-    return Posterior(found, _distance(guessed, statistics, observed))
+    return Posterior(found, _distance(guessed, statistics, observed) if is_inside else np.inf)
 
 
 def _regression(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
@@ -265,8 +270,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range as a factor up and down; gaps are expressed by geometric mean and sqrt(upper / lower)."""
-_CONFIDENCE = 0.95
+"""Search range as factors; the gaps are expressed by geometric mean and sqrt(upper / lower)."""
 _WIDEST = 0.5
 """Width of bounds relative to the search range; with wider bounds a parameter is undetermined."""
 _LIKELY = 2.0
@@ -333,20 +337,16 @@ def statistical_numbers(
     return tuple(_determined_parameters(found, specimen)), found.distance
 
 
+@dataclass(frozen=True, eq=False)
 class _Runs:
     """Simulated runs with given parameters and random starts."""
 
-    def __init__(
-        self,
-        draws: StretchDraws,
-        specimen: Specimen,
-        linear: SpecimenFit | None,
-        drive_hz: float | None,
-        heard: Flags,
-    ) -> None:
-        self.draws, self.specimen, self.linear = draws, specimen, linear
-        self.drive_hz, self.heard = drive_hz, heard
-        self.rng = np.random.default_rng(_SEED)
+    draws: StretchDraws
+    specimen: Specimen
+    linear: SpecimenFit | None
+    drive_hz: float | None
+    heard: Flags
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(_SEED))
 
     def __call__(self, parameters: Reals) -> Reals:
         """Return the statistics of one run for each row of ``parameters``."""
@@ -403,7 +403,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
     sides = lower * np.exp(parts[Hidden.LOWER_GAP]) + upper * np.exp(parts[Hidden.UPPER_GAP])
     parts = {Hidden.MEAN_GAP: np.log(sides / (lower + upper)), **parts}
     for what, each in parts.items():
-        low, high = np.quantile(each, [0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE])
+        low, high = np.quantile(each, _BOUNDS)
         flat = high - low > _WIDEST * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
