@@ -85,7 +85,9 @@ def print_estimate(
 
 
 def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
-    """Return the expected results of each measurement, each result with its uncertainty."""
+    """Return the expected results of each measurement; raise LimitExceeded for a plan beyond a limit."""
+    for point in played_alike(campaign.points()):
+        require_within_limits(point.measurement, rig)
     found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
     return {name: each for name, each in found.items() if each}
 
