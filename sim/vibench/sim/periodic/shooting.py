@@ -338,7 +338,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
 
 
 class PhaseReference(StrEnum):
-    """Motion of m0 (relative or absolute) whose phase against the base defines a phase resonance."""
+    """Which motion of m0 defines the phase at a phase resonance."""
 
     RELATIVE = "relative"
     """Motion relative to the base: for the lowest mode, or if contacts limit the relative motion."""

@@ -57,7 +57,7 @@ class SweepPlot(QWidget):
             curve.setData(history.frequency_hz, getattr(history, name))
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Draw a prediction, with frequency ranges of collisions, behind the points; None clears it."""
+        """Draw a prediction with its frequency ranges of collisions behind the points; None clears it."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         show_predicted(self.predicted, seen)
 
