@@ -88,7 +88,7 @@ AS_DESCRIBED = "as described"
 
 
 class Start(StrEnum):
-    """Initial state from which a point is computed."""
+    """Initial state of a point."""
 
     REST = "rest"
     UP = "up"
