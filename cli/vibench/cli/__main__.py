@@ -62,7 +62,7 @@ class Place:
     space_mb: int = 300
     """Address space that the libraries and threads of the command need [MB]."""
     advice: str = ""
-    """What the user should do if the command cannot run."""
+    """Advice to the user if the command cannot run."""
     help: str = ""
     """Help text of a group of commands; single commands use the docstring of their function."""
 
@@ -233,7 +233,7 @@ def print_version(*, is_requested: bool) -> None:
 
 
 class LogLevel(StrEnum):
-    """How much is logged on standard error."""
+    """Amount of log messages on standard error."""
 
     WARNING = "warning"
     INFO = "info"

@@ -51,7 +51,7 @@ class Answers:
 
     @classmethod
     def read(cls, path: Path) -> "Answers":
-        """Return the answers of a TOML file."""
+        """Return the operator's answers from a TOML file."""
         return cls({key: str(value) for key, value in _flat(toml_table(path))})
 
     @property

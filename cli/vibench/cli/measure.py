@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 class Form(StrEnum):
-    """Form of the output: text for people or JSON for programs."""
+    """Form of the command's output: text for people or JSON for programs."""
 
     TEXT = "text"
     JSON = "json"

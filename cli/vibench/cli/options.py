@@ -36,7 +36,7 @@ _OTHER_NAMES = {
     "gaps_m": "gap",
     "damping_times_s": "damping-time",
 }
-"""Names of options that differ from the name of the field."""
+"""Names of options that differ from the name of the model's field."""
 _ALLOWED = {
     "greater_than": "it must be above {gt:g}",
     "greater_than_equal": "it must be {ge:g} or more",
@@ -211,7 +211,7 @@ class SectionedCommand(TyperCommand):
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Write a section for arguments, for options, and for each other heading."""
+        """Write a section of the help for arguments, for options, and for each other heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
         models = getattr(self.callback, "fields", {})
         for each in self.get_params(ctx):

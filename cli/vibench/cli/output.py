@@ -58,7 +58,7 @@ errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=F
 
 
 def words(text_format: str) -> "TextColumn":
-    """Return a column of progress bars that shows names as they are."""
+    """Return a column of progress bars that shows names unchanged, even if they look like markup."""
     from rich.progress import TextColumn
 
     return TextColumn(text_format, markup=False)

@@ -105,7 +105,7 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar; yield the function that takes the number of further values."""
+    """Show a progress bar; yield the function that advances the bar by a number of values."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     with show_bars(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)

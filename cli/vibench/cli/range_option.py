@@ -24,7 +24,7 @@ _EXAMPLES = {
 
 @dataclass(frozen=True)
 class Range:
-    """One value, or two limits with or without a step."""
+    """Text of an option as numbers: one value, or two limits with or without a step."""
 
     start: float
     stop: float | None = None

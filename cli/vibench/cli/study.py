@@ -38,8 +38,7 @@ def study(
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Predict every combination of the values in a file, longest runs first."""
-    require_suffix(out, ".h5")
+    """Predict every combination of the values in a file, starting with the longest runs."""
     request = load_toml(named(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)

@@ -242,14 +242,14 @@ class Worker:
         self._thread.start()
 
     def begin(self, job: Job) -> None:
-        """Start a job; the worker must be idle."""
+        """Start a job in this worker, which must be idle."""
         self._send(job.work)
         self.job = job
         job.end_s = monotonic() + job.longest_s
         job.cancel = partial(self._send, None)
 
     def end(self) -> None:
-        """Kill the process and end the thread."""
+        """Kill the worker process and end the receiving thread."""
         self._is_ended = True
         self.process.kill()
         with suppress(Empty):

@@ -56,10 +56,10 @@ class FoundBranch:
     branch: Branch
     shape: OrbitShape
     periods: int
-    """Period of the motions in drive periods."""
+    """Period of the branch's motions, in drive periods."""
     origin: BranchOrigin
     has_twin: bool
-    """Whether the mirror images of the motions form another branch."""
+    """Whether the mirror images of the branch's motions form another branch."""
     elapsed_s: float = 0.0
     """Computing time for finding and following the branch [s]."""
 

@@ -45,7 +45,7 @@ class ChainRun:
         self._times, self._places = np.empty(most_impacts), np.empty(most_impacts)
         self._samples = np.empty((samples, cells, STATES_PER_CELL))
         self.peaks_m, self._lines = np.zeros((cells, 2)), np.zeros(cells, np.complex128)
-        """Largest observed abs(x) and abs(p) of every cell, shape (cells, 2)."""
+        """Largest observed abs(x) and abs(p) of every cell, shape (cells, 2) [m]."""
         self._motion = engine.new(
             "ChainMotion",
             kinds=tables.kinds.view(np.float64),
@@ -70,7 +70,7 @@ class ChainRun:
         fill_drive(self._motion["drive"], drive, chain.cells[0])
 
     def place(self, motion: Floats, time_s: float) -> None:
-        """Set x, y, z, vx, vy, vz of every cell, shape (cells, 6), and the time."""
+        """Set the state x, y, z, vx, vy, vz of every cell, shape (cells, 6), and the time [s]."""
         x, y, z, vx, vy, vz = motion.T
         for name, values in {"x": x, "p": y - z, "z": z, "vx": vx, "vp": vy - vz, "vz": vz}.items():
             self._states[name] = values
@@ -163,7 +163,7 @@ class ChainTrajectory:
     states: Floats
     """x, y, z, vx, vy, vz of every cell in the inertial frame, shape (n, cells, 6) [m, m/s]."""
     final_state: Floats
-    """State of every cell at ``end_time_s``, shape (cells, 6)."""
+    """x, y, z, vx, vy, vz of every cell at ``end_time_s``, shape (cells, 6) [m, m/s]."""
     end_time_s: float
     impacts: ChainImpacts
     outcome: Outcome

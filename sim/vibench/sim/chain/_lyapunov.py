@@ -28,7 +28,7 @@ NEARNESS = 1e-6
 SHORTEST_INTERVAL_S = 5e-3
 """Shortest time between two resets [s]; at a rate of 100 per second, distances grow less than twofold."""
 FEWEST_INTERVALS = 32
-"""Smallest number of intervals from which the error of the mean is estimated."""
+"""Smallest number of intervals from which the error of the mean growth rate is estimated."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -196,7 +196,7 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 NEAR_SIMPLER = 0.5
 """Distance from a simpler motion, over the gap, which a branch may cover in one step."""
 IS_SIMPLER = 1e-7
-"""Distance from a simpler motion, over the gap, below which both are the same motion but for rounding."""
+"""Distance from a simpler motion, over the gap, below which both motions differ only by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:

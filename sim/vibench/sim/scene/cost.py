@@ -28,7 +28,7 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Memory of the moving average, in runs; after so many further runs, a run keeps a third of its weight."""
+"""Memory of the moving average, in runs: a run that is this many runs old keeps a third of its weight."""
 SURPRISE = math.log(2.5)
 """Limit on one run's logarithmic deviation from its kind's mean, as its final motion may be unusual."""
 FEWEST = 3

@@ -62,7 +62,7 @@ class ClusterExecutor:
 
     @property
     def description(self) -> str:
-        """Description of the executor for the file."""
+        """Description of the executor, which the study's file stores."""
         return f"Dask cluster at {self._address}, {self.slots} worker thread(s) at first"
 
     @property

@@ -46,7 +46,7 @@ class Executor(Protocol):
 
     @property
     def description(self) -> str:
-        """Description of the executor, for the file."""
+        """Description of the executor, which the study's file stores."""
 
     @property
     def slots(self) -> int:
@@ -122,7 +122,7 @@ class ThreadExecutor:
 
     @property
     def description(self) -> str:
-        """Description of the executor, for the file."""
+        """Description of the executor, which the study's file stores."""
         return f"{self._workers} thread(s)"
 
     @property

@@ -179,7 +179,7 @@ def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h
 
 
 def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
-    """Set attributes; text is stored as UTF-8 of fixed length, as old readers require."""
+    """Set attributes of the file; text is stored as UTF-8 of fixed length, as old readers require."""
     for name, value in values.items():
         match value:
             case str():
@@ -220,7 +220,7 @@ class FileStore:
         return cls(path, plan)
 
     def begin(self, executor: str) -> None:
-        """Record a session: time, software and executor."""
+        """Record a new session in the file: time, software and executor."""
         self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):

@@ -36,13 +36,13 @@ class PointState(IntEnum):
     """State of a point; the file receives the state after the point's numbers."""
 
     MISSING = 0
-    """The point has not been computed."""
+    """The point has not been computed yet."""
     DONE = 1
     """The run of the point reached its end."""
     STOPPED = 2
     """The run of the point did not reach its end; ``outcome`` is the reason. Numbers may be NaN."""
     FAILED = 3
-    """The scene could not be computed; ``message`` contains the reason. Numbers are NaN."""
+    """The scene of the point could not be computed; ``message`` is the reason. Numbers are NaN."""
     FILLED = 4
     """The point of a map was interpolated, not computed, because its neighbours agree."""
 
@@ -62,7 +62,7 @@ COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
 MOST_FOUND = 8
-"""Largest number of stored motions of an ensemble, the most frequent first."""
+"""Largest number of motions that are stored of an ensemble, the most frequent first."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
 """Longest stored text [bytes]; longer text is cut off."""
@@ -242,7 +242,7 @@ MODEL = "model"
 
 @dataclass(frozen=True)
 class StudyAxis:
-    """One axis of the arrays of a study."""
+    """One axis of the result arrays of a study."""
 
     name: str
     values: tuple[float | str, ...]
@@ -273,7 +273,7 @@ class GridPlan(FrozenModel, ABC):
     @property
     @abstractmethod
     def columns(self) -> tuple[Column, ...]:
-        """Columns that are stored for each point."""
+        """Columns that the store keeps for each point."""
 
     @property
     def grid(self) -> Grid:

@@ -217,7 +217,7 @@ class Points(ABC):
     """Points of a plan: their scenes, which are created on demand, and which of them to compute."""
 
     bundle_s: float
-    """Largest computing time of a bundle [s]."""
+    """Largest planned computing time of a bundle [s]."""
 
     def __init__(self, grid: Grid, starts: Sequence[object], solver: Solver) -> None:
         self.grid, self._starts, self._solver = grid, starts, solver
@@ -343,7 +343,7 @@ class _Session:
         return self._scheduler.left > 0
 
     def feed(self) -> None:
-        """Send bundles to the executor until each worker has `QUEUED_PER_SLOT`."""
+        """Send bundles to the executor until each of its workers has `QUEUED_PER_SLOT` bundles."""
         self._look()
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:

@@ -152,7 +152,7 @@ Value = float | str
 SHOWN_VALUES = 8
 """Largest number of values of an axis that a message lists."""
 SAME = 1e-9
-"""Relative tolerance within which a given number is a value of an axis."""
+"""Relative tolerance within which a requested number counts as a value of an axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ class GridResults(Generic[Plan]):
 
     @property
     def state(self) -> NDArray[np.uint8]:
-        """`PointState` of each point, over all axes."""
+        """State of each point (`PointState`), over all axes."""
         return states(self.arrays).reshape(self.plan.grid.shape)
 
     @property
@@ -237,7 +237,7 @@ class StudyResults(GridResults[Study]):
 
     @property
     def study(self) -> Study:
-        """The study that was computed."""
+        """The study to which the results belong."""
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:

@@ -25,7 +25,7 @@ class PointAnswer:
     number: int
     state: layout.PointState
     cells: dict[str, layout.Cell]
-    """Values by column name; columns without a value stay missing."""
+    """Values of the point by column name; columns without a value stay missing."""
     taken_s: float = math.nan
     """Processor time of the point [s]; NaN if unknown."""
 

@@ -230,7 +230,7 @@ class Study(GridPlan):
 
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
-        """Axes of the results, in order."""
+        """Axes of the study's results, the slowest-varying first."""
         return (
             StudyAxis(MODEL, self.models, "", "contact law"),
             _axis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
@@ -242,7 +242,7 @@ class Study(GridPlan):
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """Columns that are stored for each point."""
+        """Columns that the study's file stores for each point."""
         return COLUMNS
 
     def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
