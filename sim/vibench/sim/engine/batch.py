@@ -120,7 +120,7 @@ def _fastest(specimen: Specimen) -> float:
 
 
 def _time_over_fifth_root(specimen: Specimen) -> float:
-    """Return u times the fifth root of the speed, from u = depth / speed and m v^2 / 2 = 2 k d^(5/2) / 5."""
+    """Return u times the fifth root of the approach speed: u = depth / speed, m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
     return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
@@ -198,19 +198,19 @@ def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
 
 
 LEAST_TOLERANCE = 1e-7
-"""Smallest tolerance for batches, limited by the error of the polynomials; as in native/collision.hpp."""
+"""Smallest integration tolerance for batches, limited by the polynomials' error (native/collision.hpp)."""
 FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
-"""Families of processors with wide registers and fused multiply-add."""
+"""Processor families with wide registers and fused multiply-add, on which batches are faster."""
 MODES = 3
 MOST_DAMPED = 0.05
 """Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
 LEAST_PART = 1e-9
-"""Smallest contribution of a mode to p, over the largest; a batch derives all modes from p."""
+"""Smallest contribution of a mode to p, over the largest one; a batch derives all modes from p."""
 
 
 @dataclass(frozen=True, eq=False)
 class BatchedMotion:
-    """Result of one motion of a batch."""
+    """Result of one motion that was integrated in a batch."""
 
     states: Floats
     """States once per drive period, shape (periods, 6). If a period, except the last, ends during a short

@@ -78,7 +78,7 @@ FUNCTIONS = (
     *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
     *("describe_collisions", "follow_batch"),
 )
-"""Functions of the library that have a single structure as argument."""
+"""Functions of the native library that have a single structure as argument."""
 Tables = NDArray[np.float64]
 """Tables of a scene, prepared by the engine in its own memory layout."""
 _Pointer = ctypes.c_void_p
@@ -253,7 +253,7 @@ class Engine:
 
 
 def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
-    """Return (address, size) of an array of numbers; return a structure unchanged."""
+    """Return an array of numbers as (address, size) for the engine; return a structure unchanged."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:

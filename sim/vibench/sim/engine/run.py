@@ -23,7 +23,7 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most steps between contacts in one run: seconds of computing, or two days of the paper's specimen."""
+"""Most time steps between contacts in one run: seconds of computing, or two days of the paper's motion."""
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
 SPARE_IMPACTS = 100
@@ -57,7 +57,7 @@ class Watch(IntEnum):
 
 
 class RunRecord:
-    """Record of a run: impacts, samples and observations. Recording does not affect the time steps."""
+    """Record of a run with impacts, samples and observations; recording does not affect the time steps."""
 
     def __init__(
         self,
@@ -81,17 +81,17 @@ class RunRecord:
         record["steps_left"] = MOST_STEPS if steps is None else steps
 
     def watch(self, what: Watch) -> None:
-        """Set the quantities to observe from now on."""
+        """Set the quantities of the motion to observe from now on."""
         self.structure["watch"] = what
 
     @property
     def impacts(self) -> int:
-        """Number of contacts that began so far."""
+        """Number of contacts that have begun so far in the run."""
         return int(self.structure["impacts"])
 
     @property
     def impact_times_s(self) -> Floats:
-        """Start times of contacts, shape (impacts,) [s]."""
+        """Times at which contacts begin, shape (impacts,) [s]."""
         return self._times[: self.impacts]
 
     @property
@@ -106,7 +106,7 @@ class RunRecord:
 
     @property
     def steps_left(self) -> int:
-        """Number of steps that the run may still take."""
+        """Number of time steps that the run may still take."""
         return max(0, int(self.structure["steps_left"]))
 
     @property
@@ -135,7 +135,7 @@ class _Run:
 
     @property
     def motion(self) -> Floats:
-        """Current x, y, z, vx, vy, vz, shape (6,)."""
+        """Current state x, y, z, vx, vy, vz, shape (6,) [m, m/s]."""
         return np.array(self._state["motion"])
 
     @property
@@ -179,7 +179,7 @@ class NativeRun(_Run):
         start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return an independent copy; with another tolerance the copy has no tangent vectors."""
+        """Return an independent copy of the run; with another tolerance it has no tangent vectors."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
@@ -273,7 +273,7 @@ class GrowthReadings:
 
     @property
     def impacts(self) -> NDArray[np.int64]:
-        """Number of impacts in each interval, shape (n,)."""
+        """Number of impacts in each completed interval, shape (n,)."""
         return self._impacts[: self.made]
 
     @property

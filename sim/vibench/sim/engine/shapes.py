@@ -19,7 +19,7 @@ Table = NDArray[np.float64]
 POINTS = 16
 """Number of Gauss points in phi; the duration has an error of 1e-8, the speed only a rounding error."""
 TERMS = 8
-"""Number of terms of the series for forces that are slow compared with a collision."""
+"""Number of terms of the series for spring forces that are slow compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
 """First and last tabulated press, and number of tabulated values. The press is the acceleration due to all
 other springs, over speed^2 / depth."""
@@ -210,6 +210,6 @@ def _between(places: Vector) -> Table:
 
 POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
 INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
-"""Barycentric weights (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
+"""Barycentric weights of the interpolation times (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
 INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
 """Derivative of each Lagrange polynomial at its own node, shape of ``INSTANTS``."""

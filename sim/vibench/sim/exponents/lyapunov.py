@@ -51,7 +51,7 @@ class ExponentVerdict(StrEnum):
 
 
 class Source(StrEnum):
-    """Method that determined an exponent."""
+    """Method by which a Lyapunov exponent was determined."""
 
     AVERAGE = "mean growth over the run"
     MULTIPLIERS = "multipliers of the periodic motion at the end"
@@ -60,7 +60,7 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class ChaoticTransient:
-    """Chaos that ended before the final motion of a run."""
+    """Transient chaos, which ended before the final motion of a run."""
 
     exponent_per_s: float
     """Largest Lyapunov exponent during the transient [1/s]."""
@@ -111,14 +111,14 @@ class LyapunovEstimate:
     interval_s: float
     """Length of the interval in which each growth rate is measured [s]."""
     local_time_s: Floats
-    """End times of the intervals, shape (n,) [s]."""
+    """End times of the intervals in which growth is measured, shape (n,) [s]."""
     local_exponents_per_s: Floats
     """Growth rate in each interval, with the first one at time zero, shape (n,) [1/s]."""
     transient: ChaoticTransient | None
     impacts: int
     """Number of impacts in the whole run."""
     impact_rate_hz: float
-    """Mean impact rate in the final motion [1/s]."""
+    """Mean impact rate of m1 in the final motion [1/s]."""
     final_state: Floats
     """x, y, z, vx, vy, vz at the end of the run, shape (6,) [m, m/s]."""
     end_time_s: float

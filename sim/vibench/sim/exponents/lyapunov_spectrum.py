@@ -54,7 +54,7 @@ class LyapunovSpectrum:
     impacts: int
     """Number of impacts of m1 since time zero."""
     impact_rate_hz: float
-    """Mean impact rate in the final motion [1/s]."""
+    """Mean impact rate of m1 in the final motion [1/s]."""
     dimension_standard_error: float
     """Standard error of `dimension`, from the correlated errors of the exponents; 0 if it is an integer."""
     final_state: Floats

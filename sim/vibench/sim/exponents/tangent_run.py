@@ -36,7 +36,7 @@ from ..specimen.stops import require_positive
 FEWEST_BLOCKS = 16
 """Fewest uncorrelated blocks; with fewer, a standard error is itself uncertain by more than 20 per cent."""
 CONFIDENCE = 0.99
-"""Confidence level of the test for correlation between blocks."""
+"""Confidence level of the test for correlation between neighbouring blocks."""
 
 
 @dataclass(frozen=True)
@@ -246,13 +246,13 @@ CHANGED = 5.0
 """Smallest significant difference of mean growth before and after a change, in standard errors. It is larger
 than SURE, because the time of the change is chosen to make the difference largest."""
 FEWEST_INTERVALS = 32
-"""Fewest intervals before and after a change of the exponent's sign."""
+"""Fewest intervals before and after a change of sign of the exponent."""
 ALIGNING = 8
 """Number of intervals in which an initial tangent vector turns to the direction of fastest growth."""
 
 
 class FinalMotion(StrEnum):
-    """Final kind of motion of a run."""
+    """Final kind of motion of a run, compared with the motion before."""
 
     QUIET = "no impact will follow: the linear motion"
     PERIODIC = "a periodic motion"

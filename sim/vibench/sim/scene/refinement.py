@@ -52,7 +52,7 @@ LONGEST_S = 60.0
 FIRST_S, GRACE_S = 0.1, 0.05
 """Time after which a first result is due [s], and nominal cost it may use even after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
-"""Nominal cost, and largest processor time, between two checks of the time limit [s]."""
+"""Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 FIRST_CYCLES = 1e4
 """Largest number of cycles of the fastest mode before the first check of the time limit."""
 CLOSE = 3e-3
@@ -114,11 +114,11 @@ class _Orbit:
     run: FollowedRun
     """Run whose current state is on the periodic motion."""
     section: Floats
-    """States once per drive period, shape (period, 6)."""
+    """States of the motion once per drive period, shape (period, 6)."""
     responses_m: Floats
     """Responses I and II of x, then of p, shape (4,) [m]."""
     errors: Floats
-    """Relative errors of the responses, shape (4,)."""
+    """Relative errors of the four responses, shape (4,)."""
     impacts: int
 
 
@@ -128,7 +128,7 @@ class _Path:
 
     run: FollowedRun
     recent: Floats
-    """Recent states once per drive period, shape (n, 6)."""
+    """Recent states of the run, once per drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
     distance: float = math.inf
     """Relative distance of the run from the periodic motion it may approach, at the last check."""
@@ -197,7 +197,7 @@ class _Refinement:
         """Number of latest states once per drive period that are stored."""
 
     def answers(self) -> Iterator[ScenePrediction]:
-        """Yield the results; raise ValueError if the time was too short for any result."""
+        """Yield ever better results; raise ValueError if the time was too short for any result."""
         for found in self._all():
             self._has_answered = True
             yield found
@@ -243,7 +243,7 @@ class _Refinement:
 
     @property
     def _settle_s(self) -> float:
-        """Time after which a motion that does not repeat is observed [s]."""
+        """Simulated time after which a motion that does not repeat is observed [s]."""
         longest_s = self._scene.duration.longest_s
         if self._motion.slowest_rate >= 0.0:
             longest_s = min(longest_s, PAPER_DURATION_S)
@@ -280,7 +280,7 @@ class _Refinement:
         return None if parts is None else window_of(begins, parts)
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
-        """Return whether the motions from two starts have separated."""
+        """Return whether the runs from two starts have separated."""
         mine, theirs = states_of(ours)[:, :3], states_of(other)[:, :3]
         self._size_m = max(self._size_m, float(np.abs(mine).max(initial=0.0)))
         gap_m = min(self._scene.specimen.gaps_m)
@@ -378,7 +378,7 @@ class _Refinement:
         return states if Observable.POINCARE in self._scene.observe else None
 
     def _interim(self) -> Iterator[ScenePrediction]:
-        """Yield an early result, for a window that begins at the last check of both motions."""
+        """Yield an early result, for a window that begins at the last check of both runs."""
         self._spent_s = 0.0
         run, twin = (each.apart() for each in self._pair)
         periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))

@@ -19,7 +19,7 @@ from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 
 MOST_PERIODS = 32
-"""Longest period that is detected, in drive periods."""
+"""Longest period of a motion that is detected, in drive periods."""
 FEWEST_BETWEEN = 8
 """Fewest drive periods between two states that are compared to detect repetition."""
 SLOWEST_RATIO = 0.99
@@ -53,7 +53,7 @@ class Repetition:
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """Growth of a small perturbation over consecutive stretches of a motion."""
+    """Growth of a small perturbation of a motion over consecutive stretches of the run."""
 
     logarithms: Floats
     """Natural logarithm of the growth over each stretch, shape (stretches,)."""
@@ -82,7 +82,7 @@ class Sharpness:
     """Tolerances of the test for repetition, relative to the size of the motion."""
 
     tolerance: float
-    """Largest distance from the periodic motion for a settled motion."""
+    """Largest distance from the periodic motion at which a motion counts as settled."""
     noise: float
     """Change of state from one period to the next that the integration's time steps may cause."""
 
@@ -217,7 +217,7 @@ STEPPING = 100.0
 
 @dataclass(frozen=True)
 class Pace:
-    """Time scales and tolerances for a specimen under one drive."""
+    """Time scales and tolerances of the test for repetition, for a specimen under one drive."""
 
     frequency_hz: float
     forgetting_s: float
@@ -240,7 +240,7 @@ class Pace:
 
     @property
     def section_s(self) -> float:
-        """Simulated time whose states suffice to detect every period [s]."""
+        """Simulated time whose states suffice to detect a motion of any period up to `MOST_PERIODS` [s]."""
         return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
@@ -249,7 +249,7 @@ class Pace:
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
-        """Return the repetition at the end of consecutive stretches; None if there is none."""
+        """Return the repetition at the end of consecutive stretches; None if the motion does not repeat."""
         return self.repeats_in(states_of(stretches))
 
     def drifts(self, stretches: Sequence[Stretch]) -> bool:
@@ -271,7 +271,7 @@ class Pace:
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
 
     def repeats_in(self, section: Floats) -> Repetition | None:
-        """Return the repetition at the end of states, shape (n, 6); None if there is none."""
+        """Return the repetition at the end of a series of states, shape (n, 6); None without repetition."""
         omega = 2.0 * np.pi * self.frequency_hz
         return repetition(section, omega, self.forgetting_periods, self.sharpness)
 

@@ -60,7 +60,7 @@ class ReachedMotion:
     wandered_until_s: float
     """Last time at which successive periods of the motion still differed [s]."""
     growth: Growth
-    """Growth of a small perturbation; empty if the motion repeats."""
+    """Growth of a small perturbation of the motion; empty if the motion repeats."""
 
 
 def pushes(specimen: Specimen, drive: Harmonic, count: int, seed: int) -> Floats:
@@ -279,7 +279,7 @@ APART = 2.0
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""Kinds of motion that may represent a group of starts, in order of preference."""
+"""Kinds of motion that may represent a group of starts, the preferred kind first."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:

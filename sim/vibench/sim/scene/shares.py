@@ -101,7 +101,7 @@ class Count:
     trials: float
     """Number of trials; fractional if trials that depend on each other count less."""
     is_final: bool
-    """Whether the trials have ended; otherwise they may still have any outcome."""
+    """Whether all trials have ended; otherwise unfinished trials may still have any outcome."""
 
 
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
@@ -128,11 +128,11 @@ class EscapeRate:
     """Rate at which chaos ends, estimated from several starts; its inverse is the mean lifetime."""
 
     rate_per_s: float
-    """Number of escapes over the total time in chaos [1/s]."""
+    """Number of escapes from chaos over the total time in chaos [1/s]."""
     low_per_s: float
-    """One-sided lower 97.5 % confidence limit of the rate; zero without escapes."""
+    """One-sided lower 97.5 % confidence limit of the escape rate [1/s]; zero without escapes."""
     high_per_s: float
-    """One-sided upper 97.5 % confidence limit of the rate; the 95 % limit without escapes."""
+    """One-sided upper 97.5 % confidence limit of the escape rate; the 95 % limit without escapes."""
     escapes: int
     """Number of starts whose chaos ended."""
     chaotic_s: float

@@ -336,7 +336,7 @@ class _Begun:
         return self._found(seen, errors, memory, ensemble)
 
     def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
-        """Return the errors of the responses; the run must have reached its end."""
+        """Return the errors of the scene's responses; the run must have reached its end."""
         rate = self._motion.slowest_rate
         return stated_errors(self._scene, self._begin, self.run, seen, self._pace, rate, follow)
 
@@ -377,7 +377,7 @@ class _Begun:
     def _found(
         self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
     ) -> ScenePrediction:
-        """Return the prediction for the observed motion."""
+        """Return the prediction from the motion observed in the window."""
         scene, run, window, amplitude = self._scene, self.run, seen.window, self._scene.drive.amplitude_m
         is_whole = run.outcome is Outcome.REACHED_END
         exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None

@@ -29,7 +29,7 @@ STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE:
 """Tolerance of the stricter run. For *quick*, a hundredth of its own tolerance would not suffice, because
 collisions in closed form are more accurate than that."""
 FORGETTING = 4.0
-"""Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
+"""Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
 """Ratio of a window's length to that of the shorter windows with which it is compared; also of leakage."""
 LOOKS = 8
@@ -46,7 +46,7 @@ SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 SLOWEST_RATIO = 0.9
 """Largest assumed ratio of successive changes of state, which means the slowest settling."""
 FIRST_LOOK = 16
-"""Number of drive periods before two runs are first compared; later, whenever the time has doubled."""
+"""Number of drive periods before two runs are first compared; then the time doubles each time."""
 PARTED = 0.05
 """Difference over the gap, or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
@@ -60,7 +60,7 @@ class StatedErrors:
     """Relative errors of Response I and II of x, then of p; NaN where unknown."""
 
     stated: Floats
-    """Relative error of each response, shape (4,)."""
+    """Relative error of each of the four responses, shape (4,)."""
     integration: float
     """Largest measured integration error, which a stricter accuracy would reduce."""
 
@@ -144,7 +144,7 @@ class _StrictRun:
     run: FollowedRun
     """Stricter run, at the time at which it separated from the original run, else at the window's end."""
     responses_m: Floats | None
-    """Responses in the window [m], shape (4,); None if the runs separated before."""
+    """Responses in the window [m], shape (4,); None if the two runs have separated before it."""
     is_together: bool
     """Whether the stricter run stayed together with the original run."""
 

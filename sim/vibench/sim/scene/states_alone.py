@@ -66,11 +66,11 @@ class StatesAlone:
         self.until_s = self.cost_s = math.inf
         self.by_itself_s = by_itself_s
         self.path: list[Stretch] = []
-        """Stretches integrated so far, with every n-th state."""
+        """Stretches of the run so far, with every n-th state."""
         self.repeats: Repetition | None = None
         """Repetition of the motion; the run ends once a repetition is found."""
         self.recent = np.empty((0, 6)) if recent is None else recent
-        """Latest states, once per drive period, shape (n, 6)."""
+        """Latest states of the run, once per drive period, shape (n, 6)."""
         self._settled_s: float | None = None
         self._pace = pace
         self._every = every
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Drive periods of the next round in a batch; 0 within a period, in contact, or at the end."""
+        """Drive periods that a batch may integrate next; 0 within a period, in contact, or at the end."""
         run = self.run
         if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
             return 0
@@ -144,7 +144,7 @@ class StatesAlone:
 
 
 Follow = Callable[[Sequence[StatesAlone]], None]
-"""Function that integrates motions to the end of their runs: `one_by_one` or `in_batches`."""
+"""Function that integrates runs to their ends: `one_by_one` or `in_batches`."""
 
 
 def one_by_one(several: Sequence[StatesAlone]) -> None:
