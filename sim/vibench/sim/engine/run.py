@@ -86,7 +86,7 @@ class RunRecord:
 
     @property
     def impacts(self) -> int:
-        """Number of contacts that have begun so far in the run."""
+        """Number of contacts that began in the run so far."""
         return int(self.structure["impacts"])
 
     @property
