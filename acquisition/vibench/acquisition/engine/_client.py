@@ -101,8 +101,8 @@ def the_engine(pid: int | None) -> Announcement:
     if others:
         raise EngineError(f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'")
     raise EngineError(
-        f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: stop "
-        "an engine of another user, or with another VIBENCH_STATE_DIR, from there"
+        f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: "
+        "watch or stop an engine of another user, or with another VIBENCH_STATE_DIR, from there"
         + "".join(f". {each}" for each in [out_of_reach()] if each)
     )
 

@@ -27,7 +27,7 @@ def toml_table(path: Path) -> dict[str, Any]:
         what = "is an HDF5 file" if error.object.startswith(b"\x89HDF") else "is not UTF-8 text"
         raise UnreadableTomlError(f"{path}: {what}; give a TOML file, saved as UTF-8") from error
     except tomllib.TOMLDecodeError as error:
-        raise UnreadableTomlError(f"{path}: is not valid TOML: {error}; correct that line") from error
+        raise UnreadableTomlError(f"{path} is not valid TOML: {error}; correct that line") from error
     except RecursionError as error:
         raise UnreadableTomlError(f"{path}: lists or tables are nested too deeply; flatten them") from error
 
