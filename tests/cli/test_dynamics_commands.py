@@ -133,6 +133,7 @@ def test_an_invalid_zero_is_quoted_as_typed(command):
             "--resonance was given as '92': 1 numbers are",
         ),
         (("branches", "--resonance", "102:107", "--amplitude", "1e-8:1e-7"), "a band around one mode"),
+        (("spectrum", "--amplitude", 5e-6, "--frequency", 260, "--confidence", 95), "for 95 % give 0.95"),
         (("branches", "--amplitude", "5e-6", "--frequency", "60"), "give one of them as a range"),
         (("branches", "--amplitude", "1e-6:5e-6", "--frequency", "60:70"), "give one of them as a range"),
         (("branches", "--amplitude", "5e-6", "--frequency", "70:60"), "70 is not below 60"),

@@ -44,8 +44,8 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""Description of the allowed values, by pydantic's type of error."""
-_EXAMPLES = {"error": "; for 1 % give 1%"}
+"""Text about the allowed values, by type of pydantic's error."""
+_EXAMPLES = {"error": "; for 1 % give 1%", "confidence": "; for 95 % give 0.95"}
 """Example of an allowed value, by field."""
 
 
