@@ -44,10 +44,12 @@ def answer_path(stop: str, answer: str) -> str:
 def write_stop_file(stop: str, reason: str) -> None:
     """Write a stop file, completely or not at all; raises OSError if the folder cannot be written."""
     coming = f"{stop}-{os.getpid()}-{time.monotonic_ns()}"
-    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         os.write(descriptor, reason.encode(errors="replace")[:LONGEST_REASON])
-    except OSError:  # if the disk is full, the file name is sufficient
+        if hasattr(os, "fchown"):  # root may stop the program of a user, who must read and update the file
+            os.fchown(descriptor, os.stat(os.path.dirname(stop)).st_uid, -1)  # noqa: PTH116, PTH120
+    except OSError:  # such as a full disk: the file name is sufficient
         pass
     finally:
         os.close(descriptor)

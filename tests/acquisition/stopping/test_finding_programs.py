@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from subprocess import PIPE
 from tempfile import TemporaryDirectory
-from threading import Event
+from threading import Event, Thread
 from time import monotonic
 
 import pytest
@@ -22,12 +22,15 @@ from vibench.acquisition import (
 from vibench.acquisition.engine import EngineGone, StopDelivery, programs_to_stop, stop_engine
 from vibench.acquisition.engine._client import EngineAddress, announce
 from vibench.acquisition.stopping.program import (
+    KeptStops,
     Program,
     announced_programs,
     engines_folder,
     note_open_bench,
 )
+from vibench.acquisition.stopping.stop import DRIVES_ON
 from vibench.command import stop_programs
+from vibench.stop_files import Fate, fate_of, stop_path, write_stop_file
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")
 
@@ -195,7 +198,35 @@ def test_a_user_can_stop_a_program_of_root_in_their_folder(state_of_other_user):
     assert switch.request.reason == "smoke"
 
 
-def test_an_unreadable_folder_is_not_treated_as_empty(state_of_other_user):
+def test_a_stop_by_root_waits_while_the_program_of_a_user_ramps_down(of_nobody, monkeypatch):
+    """The program updates the stop's file as a sign of life, and may not do that to a file of root."""
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    stop = stop_path(str(engines_folder()), 7, "start", "ramp")
+    write_stop_file(stop, "smoke")
+    heard, clock = [], Event()
+    DRIVES_ON.begin("drive")
+    os.seteuid(NOBODY)
+    kept = KeptStops(7, "start", lambda level, reason: heard.append(reason), engines_folder())
+
+    def ramp_down():
+        for _ in range(15):
+            DRIVES_ON.note_advance()
+            kept.obey()
+            clock.wait(0.1)
+        DRIVES_ON.confirm_silence("drive")
+        kept.obey()
+
+    ramp = Thread(target=ramp_down)
+    ramp.start()
+    try:
+        assert fate_of(stop) is Fate.SILENT
+    finally:
+        ramp.join()
+        kept.close()
+    assert heard == ["smoke"]
+
+
+def test_an_unreadable_folder_is_not_treated_as_empty(of_nobody):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
     with pytest.raises(AcquisitionError, match="the state folder cannot be searched"):

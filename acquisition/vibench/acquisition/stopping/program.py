@@ -242,10 +242,9 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 
 
 def unconfirmed_programs() -> tuple[Program, ...]:
-    """Return the programs of this computer that ended without confirming that their output is off.
+    """Return the programs that ended here, also before the last boot, without confirming silence.
 
-    They may have ended with an earlier boot. `note_open_bench` forgets them. Raises AcquisitionError in the
-    same cases as `announced_programs`.
+    `note_open_bench` forgets them. Raises AcquisitionError in the same cases as `announced_programs`.
     """
     dead = (each for _, each in _announcements(Program) if not each.is_alive)
     return tuple(each for each in dead if each.computer == platform.node() or not each.computer)
@@ -454,13 +453,12 @@ def _sweep() -> None:
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
         start, _, rest = rest.rpartition(".")
-        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps announced by another computer
-        is_here = place_of(start) is Place.HERE
+        is_kept = (folder / f"{pid}.{start}.json").exists() or place_of(start) is not Place.HERE
         if rest.startswith("silent-"):
             with suppress(OSError):
                 if path.stat().st_mtime < fresh_s:
                     path.unlink()
-        elif is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
+        elif not is_kept and pid.isdecimal() and not is_process(int(pid), start):
             with suppress(OSError):
                 path.unlink()
 
