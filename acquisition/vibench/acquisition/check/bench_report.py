@@ -115,7 +115,7 @@ class _BlockReader:
         measuring = Phase(RunState.CHECKING, tone, _READ_S)
         with DriveGuard(drive, self._switch) as guard:
             self._advance = guard.advance
-            guard.begin()
+            guard.begin(self._bench.rig.generator.resource or self._bench.rig.daq.device)
             try:
                 drive.arm((settling, measuring))
                 self._begin()
