@@ -90,7 +90,7 @@ def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_numbe
     page = reproduction_document(
         Reproduction({"Synthetic": (found,)}, score_rows(((), ("chance",))), (), "Defaults: these.", "")
     )
-    except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
+    except_it = "; with c = 3e-05 s · k it holds for 3 of 4 starts"
     assert f"It fails under all options tested (1){except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
     assert "Values with c = 3e-05 s · k: exponent: 130 1/s (50 to 130); from 4 starts." in page

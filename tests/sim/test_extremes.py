@@ -308,7 +308,7 @@ REFUSED = [
     (lambda: lyapunov_exponent(gong2025(), DRIVE, max_impact_rate_hz=-1.0), "Impact rate -1.0 Hz"),
     (lambda: wilson_share(0, 0), "0 of 0 trials.* are not allowed"),
     (lambda: wilson_share(11, 10), "11 of 10 trials.* are not allowed"),
-    (lambda: wilson_share(1, 10, 2.0), "with probability 2.0 are not allowed"),
+    (lambda: wilson_share(1, 10, 2.0), "with an error probability of 2.0 are not allowed"),
     (lambda: band_frequencies_hz(chain_of(gong2025(), 2), [math.nan]), "A wave number that is not finite"),
     (lambda: integrate(gong2025(), DRIVE, 1.0, initial_state=[math.nan] * 6), "give six finite numbers"),
 ]

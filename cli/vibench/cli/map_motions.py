@@ -82,12 +82,12 @@ def map_motions(
         raise InvalidRequest(
             "--like needs a map over frequency_hz and amplitude_m; give ranges for these two"
         )
+    diagram = None if branches is None else read_diagram(branches)
     if only_estimate:
         estimate = estimate_map(request, workers)
         print_json(estimate.to_dict()) if as_json else console.print(estimate.sentence)
         return
     room_for_folder(out)
-    diagram = None if branches is None else read_diagram(branches)
     levels = [recorded_response(path) for path in like or ()]
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE

@@ -39,6 +39,7 @@ def study(
     as_json: AsJson = False,
 ) -> None:
     """Predict every combination of the values in a file, starting with the longest runs."""
+    require_suffix(out, ".h5")
     request = load_toml(named(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
