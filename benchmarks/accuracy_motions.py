@@ -100,7 +100,7 @@ class LotteryFigures:
     """Results for one scene."""
 
     lottery: Lottery
-    answered: ScenePrediction
+    prediction: ScenePrediction
     shares: tuple[StatedShare, ...]
     starts: int
     """Number of initial states for the comparison."""

@@ -70,11 +70,11 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
     )
     for each in benchmark.motions:
         yield from _motion(each)
-    yield from _lotteries(benchmark.lotteries)
+    yield from _share_section(benchmark.lotteries)
     yield from _transients(benchmark.transients)
 
 
-def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
+def _share_section(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
     """Yield the section that compares stated shares with the shares of many initial states."""
     if not lotteries:
         return
@@ -99,7 +99,7 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
 
 def _share(found: LotteryFigures, stated: StatedShare) -> str:
     motion, share = stated.motion, stated.motion.share
-    escape = None if found.answered.ensemble is None else found.answered.ensemble.escape
+    escape = None if found.prediction.ensemble is None else found.prediction.ensemble.escape
     cells = (
         f"{found.lottery.name}: {found.lottery.about}",
         f"{motion.motion}" + ("" if motion.period is None else f", {motion.period}"),

@@ -26,7 +26,7 @@ LONGEST = 70
 """Largest number of bytes shown of a message, because a waveform has thousands."""
 
 
-class Noted(Status):
+class CountingQueue(Status):
     """Error queue that also counts the errors of each message."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Overheard(AFG1022):
 
     def __init__(self, serial: str) -> None:
         super().__init__(lambda: 0.0, serial=serial)
-        self.status: Noted = Noted()
+        self.status: CountingQueue = CountingQueue()
         self.messages = 0
 
     def execute(self, message: bytes) -> Reply:

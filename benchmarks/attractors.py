@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from random_scenes import described, edge_scene, random_scene
+from random_scenes import edge_scene, random_scene, scene_line
 
 from vibench.sim import Ensemble, FoundMotion, MotionKind, ScenePrediction, solve_ensemble, solve_scene
 
@@ -37,8 +37,8 @@ def main() -> None:
         drawn += 1
         is_covered = _is_covered(answered, truth)
         covered += is_covered
-        print(f"{'covered' if is_covered else 'MISSED '} {described(scene)}")
-        _tell(answered.ensemble, truth)
+        print(f"{'covered' if is_covered else 'MISSED '} {scene_line(scene)}")
+        _print_row(answered.ensemble, truth)
     print(f"\nseed {asked.seed}: shares of {asked.starts} starts are covered in {covered} of {drawn} scenes")
 
 
@@ -74,7 +74,7 @@ def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
     return one.period == other.period and is_near
 
 
-def _tell(stated: Ensemble | None, truth: Ensemble | None) -> None:
+def _print_row(stated: Ensemble | None, truth: Ensemble | None) -> None:
     for name, ensemble in (("stated", stated), ("many", truth)):
         for motion in () if ensemble is None else ensemble.motions:
             print(

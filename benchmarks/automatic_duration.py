@@ -14,7 +14,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
-from random_scenes import described, edge_scene, quasi_periodic_scene, random_scene
+from random_scenes import edge_scene, quasi_periodic_scene, random_scene, scene_line
 
 from vibench.sim import FixedDuration, MotionKind, Outcome, Scene, ScenePrediction, solve_scene
 
@@ -26,7 +26,7 @@ RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
 @dataclass(frozen=True)
-class Compared:
+class Comparison:
     """Result of the comparison for one scene."""
 
     verdict: str
@@ -45,9 +45,9 @@ def main() -> None:
     )
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
-    compared = [_compared(random_scene(random)) for _ in range(asked.random)]
-    compared += [_compared(edge_scene(random)) for _ in range(asked.edge)]
-    covered = [_covered(quasi_periodic_scene(random)) for _ in range(asked.quasi_periodic)]
+    compared = [_compare(random_scene(random)) for _ in range(asked.random)]
+    compared += [_compare(edge_scene(random)) for _ in range(asked.edge)]
+    covered = [_covered_count(quasi_periodic_scene(random)) for _ in range(asked.quasi_periodic)]
     counts = Counter(each.verdict for each in compared)
     decided = counts["agrees"] + counts["is named"] + counts["DIFFERS"]
     print(f"\nseed {asked.seed}: {dict(counts)} of {len(compared)}; long runs that were lost are not counted")
@@ -58,32 +58,32 @@ def main() -> None:
     print(f"cost over that without a budget, median: {np.median([each.cost for each in compared]):.2f}")
 
 
-def _compared(scene: Scene) -> Compared:
-    answered, taken_s = _timed(scene)
-    _, alone_s = _timed(replace(scene, budget_s=0.0))
+def _compare(scene: Scene) -> Comparison:
+    answered, taken_s = _time_solve(scene)
+    _, alone_s = _time_solve(replace(scene, budget_s=0.0))
     truth = solve_scene(replace(scene, duration=LONG, budget_s=0.0))
     verdict = _verdict(answered, truth)
     print(
-        f"{verdict:10} {described(scene)}: {answered.motion} {answered.period or ''} "
+        f"{verdict:10} {scene_line(scene)}: {answered.motion} {answered.period or ''} "
         f"I {answered.response_i:.4g}, "
         f"in the long run {truth.motion} {truth.period or ''} {truth.response_i or 0.0:.4g}; "
         f"start {answered.memory}, {1e3 * taken_s:.0f} ms over {1e3 * alone_s:.0f} ms"
     )
     sys.stdout.flush()
-    return Compared(verdict, taken_s / alone_s)
+    return Comparison(verdict, taken_s / alone_s)
 
 
-def _covered(scene: Scene) -> int:
+def _covered_count(scene: Scene) -> int:
     """Return how many responses differ from those of a long run by at most their stated error."""
     found, truth = solve_scene(scene), solve_scene(replace(scene, duration=LONG, budget_s=0.0))
     off = [abs(getattr(found, name) / getattr(truth, name) - 1.0) for name in RESPONSES]
     stated = [getattr(found, f"{name}_error") for name in RESPONSES]
-    print(f"{described(scene)}: {found.ended}; off {max(off):.1e}, stated {max(stated):.1e}")
+    print(f"{scene_line(scene)}: {found.ended}; off {max(off):.1e}, stated {max(stated):.1e}")
     sys.stdout.flush()
     return sum(one <= error for one, error in zip(off, stated, strict=True))
 
 
-def _timed(scene: Scene) -> tuple[ScenePrediction, float]:
+def _time_solve(scene: Scene) -> tuple[ScenePrediction, float]:
     solve_scene(replace(scene, duration=FixedDuration(0.5, 0.4), budget_s=0.0))
     began = time.process_time()
     found = solve_scene(scene)

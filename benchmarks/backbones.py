@@ -40,7 +40,7 @@ K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracker:
     """Settings for tracking one mode: frequency range, phase reference and levels of the base."""
 
     start_hz: float
@@ -59,19 +59,19 @@ class Tracked:
 
 
 MODES = {
-    1: Tracked(94.5, 90, 170, 0.8, PhaseReference.RELATIVE, 0.02, 0.1, (92, 97)),
-    2: Tracked(264, 250, 330, 3, PhaseReference.RELATIVE, 0.04, 1.0, (255, 275)),
-    3: Tracked(496, 470, 530, 5, PhaseReference.ABSOLUTE, 0.05, 1.5, (490, 510)),
+    1: Tracker(94.5, 90, 170, 0.8, PhaseReference.RELATIVE, 0.02, 0.1, (92, 97)),
+    2: Tracker(264, 250, 330, 3, PhaseReference.RELATIVE, 0.04, 1.0, (255, 275)),
+    3: Tracker(496, 470, 530, 5, PhaseReference.ABSOLUTE, 0.05, 1.5, (490, 510)),
 }
 
 
 OTHERS = {
     "superharmonic": {
-        2: (Tracked(47.5, 44, 53, 0.4, PhaseReference.RELATIVE, 10.0, 0.0, (44, 53), harmonic=2), 25.0),
-        3: (Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), harmonic=3), 20.0),
+        2: (Tracker(47.5, 44, 53, 0.4, PhaseReference.RELATIVE, 10.0, 0.0, (44, 53), harmonic=2), 25.0),
+        3: (Tracker(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), harmonic=3), 20.0),
     },
     "subharmonic": {
-        2: (Tracked(192, 187, 199, 0.5, PhaseReference.RELATIVE, 22.0, 0.0, (187, 199), subharmonic=2), 34.0)
+        2: (Tracker(192, 187, 199, 0.5, PhaseReference.RELATIVE, 22.0, 0.0, (187, 199), subharmonic=2), 34.0)
     },
 }
 """Settings for super- and subharmonic resonances by order, each with the highest level [m/s2]."""
@@ -97,8 +97,8 @@ def rig_of(spring: str, seed: int) -> Rig:
     return rig.model_copy(update=changed)
 
 
-def tracked(
-    rig: Rig, mode: Tracked, levels: np.ndarray, most_periods: int, folder: Path
+def track_mode(
+    rig: Rig, mode: Tracker, levels: np.ndarray, most_periods: int, folder: Path
 ) -> list[ResonanceNote]:
     """Track the mode over all levels, with a higher amplifier gain at the stronger levels."""
     notes = []
@@ -135,7 +135,7 @@ def tracked(
     return notes
 
 
-def backbone(specimen: Specimen, mode: Tracked, levels: np.ndarray) -> Branch:
+def backbone(specimen: Specimen, mode: Tracker, levels: np.ndarray) -> Branch:
     """Follow the model's phase resonance over the levels."""
     amplitudes = levels[[0, -1]] / (2 * np.pi * mode.start_hz) ** 2
     return phase_resonance_branch(
@@ -154,7 +154,7 @@ def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
     return found
 
 
-def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float]:
+def balance_peak(rig: Rig, mode: Tracker, note: ResonanceNote) -> tuple[float, float]:
     """Return frequency [Hz] and resonant amplitude [m] of the phase resonance, by harmonic balance."""
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), LoopTiming(1e4, 0.0))
     (rates, volt), spring = plant.equations, spring_of(specimen_of(rig))
@@ -210,13 +210,13 @@ def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float
     return (float(found.x[-1]), moved["m"]) if found.success else (np.nan, np.nan)
 
 
-def compare_others(rig: Rig, spring: str, mode: Tracked, levels: np.ndarray, periods: int) -> None:
+def compare_others(rig: Rig, spring: str, mode: Tracker, levels: np.ndarray, periods: int) -> None:
     """Track a super- or subharmonic resonance, and print it beside the model."""
     with tempfile.TemporaryDirectory() as folder:
-        notes = tracked(rig, mode, levels, periods, Path(folder))
+        notes = track_mode(rig, mode, levels, periods, Path(folder))
     away = []
     for each in notes:
-        hertz, moved_m = (np.nan, np.nan) if spring == "stops" else balanced(rig, mode, each)
+        hertz, moved_m = (np.nan, np.nan) if spring == "stops" else balance_peak(rig, mode, each)
         if each.frequency_hz is not None:
             away.append(abs(each.frequency_hz - hertz))
         found = each.frequency_hz or np.nan
@@ -283,7 +283,7 @@ def main() -> None:
         levels = mode.lowest * np.geomspace(1, 1e3, given.levels)
         model = backbone(specimen, mode, levels)
         with tempfile.TemporaryDirectory() as folder:
-            notes = tracked(rig, mode, levels, given.periods, Path(folder))
+            notes = track_mode(rig, mode, levels, given.periods, Path(folder))
         for each in notes:
             print(row(each, model))
         print(f"mode {number}, {given.spring}: {summary(notes, model)}", flush=True)

@@ -45,7 +45,7 @@ def best(job, repeats=REPEATS):
     return min(times), result
 
 
-def lively(cells):
+def moving_state(cells):
     """Return a random state in which every cell moves."""
     return np.random.default_rng(3).normal(size=(cells, 6)) * np.repeat([2e-5, 0.1], 3)
 
@@ -61,7 +61,7 @@ def report_lengths(accuracy):
     print("cells  impacts  set up (ms)  us/impact  ms per simulated s  responses  windows (us)")
     per_impact, per_second = [], []
     for cells in LENGTHS:
-        chain, start = chain_of(gong2025(), cells), lively(cells)
+        chain, start = chain_of(gong2025(), cells), moving_state(cells)
         set_up, tables = best(lambda c=chain: chain_tables(c, DRIVE, accuracy))
         taken, run = best(lambda c=chain, s=start: integrate_chain(c, DRIVE, DURATION_S, accuracy, s))
         watched, response = best(
@@ -117,7 +117,7 @@ def report_watching():
     for contact in LAWS:
         row = []
         for cells in WATCHED:
-            chain, start = chain_of(gong2025(contact=contact), cells), lively(cells)
+            chain, start = chain_of(gong2025(contact=contact), cells), moving_state(cells)
             motion, _ = best(lambda c=chain, s=start: integrate_chain(c, DRIVE, 1.0, "standard", s))
             watched, _ = best(lambda c=chain, s=start: chain_response(c, DRIVE, "standard", 1.0, 1.0, s))
             row.append(f"{cells} cells {watched / motion:.2f}x")

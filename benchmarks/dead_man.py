@@ -28,7 +28,7 @@ FELT = 0.05
 SILENT_V = 5e-3
 
 
-def recorded(dead_man_s: float | None, frequency_hz: float, amplitude_vpp: float) -> tuple[float, NDArray]:
+def measure(dead_man_s: float | None, frequency_hz: float, amplitude_vpp: float) -> tuple[float, NDArray]:
     """Return the share of silence of one dwell, and response over drive in each window."""
     rig = load_rig(RIG)
     guarded = rig.model_copy(
@@ -62,12 +62,12 @@ def main() -> None:
     print("| dwell | bursts of | silent | disturbed | felt after a gap |")
     print("|---|---|---|---|---|")
     for name, (frequency_hz, amplitude_vpp) in CASES.items():
-        _, steady = recorded(None, frequency_hz, amplitude_vpp)
+        _, steady = measure(None, frequency_hz, amplitude_vpp)
         middle = np.median(steady.real) + 1j * np.median(steady.imag)
         usual = float(np.percentile(np.abs(steady - middle), 99))
         bound = max(FELT * abs(middle), usual)
         for length_s in LENGTHS_S:
-            silent, ratios = recorded(length_s, frequency_hz, amplitude_vpp)
+            silent, ratios = measure(length_s, frequency_hz, amplitude_vpp)
             disturbed = float(np.mean(~(np.abs(ratios - middle) <= bound)))
             felt_s = disturbed * length_s
             print(

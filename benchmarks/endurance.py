@@ -180,17 +180,17 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
         QTimer.singleShot(round(1000 * seconds), loop.quit)
         loop.exec()
 
-    def until(state: EngineState) -> None:
+    def wait_until(state: EngineState) -> None:
         while bridge.state is not state:
             wait(0.1)
 
     bridge.open(rig, None)
-    until(EngineState.READY)
+    wait_until(EngineState.READY)
     bridge.order(lambda client: client.check(folder))
     wait(1.0)
-    until(EngineState.READY)
+    wait_until(EngineState.READY)
     bridge.arm(CampaignRequest(campaign=plan, folder=folder))
-    until(EngineState.ARMED)
+    wait_until(EngineState.ARMED)
     bridge.order(EngineClient.start)
     try:
         yield wait

@@ -66,7 +66,7 @@ def log_uniform(rng, low, high):
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def drawn_scene(seed, index):
+def random_scene(seed, index):
     """Return random scene ``index``, which is the same in every shard."""
     rng = np.random.default_rng([seed, index])
     model = str(rng.choice(MODELS))
@@ -166,7 +166,7 @@ def times_off(truth, answer, stated):
     return np.maximum(np.abs(truth.answers / answer - 1.0) - truth.own, 0.0) / np.maximum(stated, 1e-300)
 
 
-def described(scene, index):
+def parameters_of(scene, index):
     """Return the parameters of a scene, so that it can be repeated."""
     specimen, drive, duration = scene.specimen, scene.drive, scene.duration
     return {
@@ -234,14 +234,14 @@ def main():
     indices = range(shard - 1, arguments.scenes, shards) if arguments.only is None else [arguments.only]
     rows, given_up = [], 0
     for index in indices:
-        scene = drawn_scene(arguments.seed, index)
+        scene = random_scene(arguments.seed, index)
         truth = truth_of(scene)
         if truth is None:
             given_up += 1
             print(f"scene {index}: the independent code gave up", file=sys.stderr)
             continue
         for level in arguments.levels.split(","):
-            said = described(scene, index) | solve_and_measure(scene, truth, Accuracy(level), solve)
+            said = parameters_of(scene, index) | solve_and_measure(scene, truth, Accuracy(level), solve)
             rows.append(said | {"kind": truth.kind, "true_period": truth.period, "own": truth.own.tolist()})
             if arguments.out is not None:
                 with arguments.out.open("a") as file:

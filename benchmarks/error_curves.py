@@ -22,9 +22,9 @@ from vibench.analysis.report import (
     DrawnFigure,
     ImageKind,
     curve_figure,
+    figure_style,
     legend_above,
     new_figure,
-    styled,
     table,
 )
 from vibench.sim import Accuracy, Harmonic, Scene, Target, gong2025, solve_scene
@@ -56,7 +56,7 @@ def paper_cases():
     return found
 
 
-def kept(path):
+def stored_rows(path):
     """Return the rows of a stored table, with numbers converted; None if there is no file."""
     if not path.exists():
         return None
@@ -73,7 +73,7 @@ def _number(cell):
         return cell
 
 
-def kept_curves(rows):
+def stored_curves(rows):
     """Return curves from the rows of their table."""
     found = {}
     for scene, method, time_s, error, is_stated, is_chosen in rows:
@@ -109,7 +109,7 @@ def models_of_stops():
 
 def models_figure(rows):
     """Draw the similarity of Response I over the time per point, with one marker style per level."""
-    with styled():
+    with figure_style():
         figure = new_figure(4.2)
         axes = figure.subplots()
         for amplitude_m, colour in zip(AMPLITUDES_M, LEVELS, strict=False):
@@ -184,7 +184,7 @@ def chaos_rows():
 
 def chaos_figure(rows):
     """Draw the error of the mean over computing time, with one line per window."""
-    with styled():
+    with figure_style():
         figure = new_figure(3.8)
         axes = figure.subplots()
         for window_s, colour, line in zip(WINDOWS_S, cycle(LEVELS), cycle(LEVEL_STYLES), strict=False):
@@ -303,8 +303,8 @@ def main():
     parser.add_argument("--markdown", type=Path, default=Path("docs/accuracy.md"))
     given = parser.parse_args()
     images = given.markdown.parent / "images"
-    curves, models, chaos = (kept(images / f"{name}.csv") for name in PICTURES)
-    curves = paper_cases() if curves is None else kept_curves(curves)
+    curves, models, chaos = (stored_rows(images / f"{name}.csv") for name in PICTURES)
+    curves = paper_cases() if curves is None else stored_curves(curves)
     models, chaos = models or models_of_stops(), chaos or chaos_rows()
     drawn = curve_figure(curves)
     for figure in (drawn, models_figure(models), chaos_figure(chaos)):

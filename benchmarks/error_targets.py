@@ -66,7 +66,7 @@ ON_THE_PAGE = ("1 %", "0.01 %", "all")
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
-def drawn_scene(seed, index):
+def random_scene(seed, index):
     """Return random scene ``index``, which is the same in every shard."""
     rng = np.random.default_rng([seed, index])
     law = str(rng.choice(LAWS))
@@ -82,7 +82,7 @@ def responses(found):
     return np.array([getattr(found, name) for name in NAMES], dtype=np.float64)
 
 
-def stated(found):
+def stated_errors(found):
     """Return the stated errors of the four responses, shape (4,)."""
     errors = [getattr(found, f"{name}_error") for name in NAMES]
     return np.array([math.inf if each is None else each for each in errors])
@@ -98,7 +98,7 @@ def truth_of(scene, found):
             scene.specimen, scene.drive, accuracy=Accuracy.REFERENCE, duration=named, budget_s=0.0
         )
         true = solve_scene(reference)
-        return responses(true), stated(true), true
+        return responses(true), stated_errors(true), true
     drawn = []
     began = time.process_time()
     frequency_hz = scene.drive.frequency_hz
@@ -158,15 +158,15 @@ def solve_and_measure(scene, time_s):
             {
                 "error": error,
                 "kind": kind,
-                "stated": float(stated(found).max()),
+                "stated": float(stated_errors(found).max()),
                 "is_met": found.target.is_met,
                 "taken_s": taken_s,
                 "time_s": found.target.time_s,
                 "starts": found.target.starts,
                 "windows": found.target.windows,
                 "needed_s": found.target.needed_s,
-                "covered": [bool(each) for each in off <= stated(found) + own],
-                "times": float(np.max(off / (stated(found) + own))),
+                "covered": [bool(each) for each in off <= stated_errors(found) + own],
+                "times": float(np.max(off / (stated_errors(found) + own))),
                 "own": float(np.max(own)),
                 "true_motion": None if reference is None else str(reference.motion),
                 "ended": found.ended,
@@ -175,14 +175,14 @@ def solve_and_measure(scene, time_s):
     return row
 
 
-def answered_of(rows):
+def scene_pairs(rows):
     """Return pairs of a scene and one of its predictions."""
     return [(row, each) for row in rows for each in row["targets"] if "kind" in each]
 
 
 def groups_of(rows):
     """Yield the results for each kind of motion and requested error: labels, then numbers."""
-    answered = answered_of(rows)
+    answered = scene_pairs(rows)
     for kind in KINDS:
         for error in (*ERRORS, None):
             group = [each for _, each in answered if each["kind"] == kind and error in (each["error"], None)]
@@ -200,7 +200,7 @@ def groups_of(rows):
 
 def costs_of(rows):
     """Yield cost comparisons: 1 % with the 30 s default, and 1e-6 with 1e-2 on periodic motion."""
-    pairs = [(row, each) for row, each in answered_of(rows) if each["error"] == ERRORS[1]]
+    pairs = [(row, each) for row, each in scene_pairs(rows) if each["error"] == ERRORS[1]]
     taken_s, default_s = [each["taken_s"] for _, each in pairs], [row["default_s"] for row, _ in pairs]
     middle_s, usual_s = np.median(taken_s), np.median(default_s)
     yield (
@@ -231,8 +231,8 @@ def report(rows):
         numbers = f"{count:5} covered {covered:6.1%} met {met:6.1%} stated {stated_error:.1e} {cost_s:8.4f} s"
         print(f"{kind:13} {error:>7} {numbers}")
     print(*costs_of(rows), sep="\n")
-    print(f"longest answer {max(each['time_s'] for _, each in answered_of(rows)):.2f} s")
-    for row, each in answered_of(rows):
+    print(f"longest answer {max(each['time_s'] for _, each in scene_pairs(rows)):.2f} s")
+    for row, each in scene_pairs(rows):
         if each["times"] > 3.0:
             print(
                 f"off by {each['times']:.3g}: scene {row['scene']} {row['law']} {each['kind']}"
@@ -304,7 +304,7 @@ def main():
     for index in indices:
         if index in done or time.monotonic() > end_s:
             continue
-        law, scene = drawn_scene(given.seed, index)
+        law, scene = random_scene(given.seed, index)
         rows.append({"scene": index, "law": law, **solve_and_measure(scene, given.time)})
         if given.save is not None:
             with given.save.open("a") as file:

@@ -53,7 +53,7 @@ def targets(rng):
     return (*time, "--error", str(rng.choice(ERRORS))) if rng.random() < 0.8 else time
 
 
-def drawn(rng, folder, is_target):
+def draw_case(rng, folder, is_target):
     """Draw a case: write its specimen file, and return the arguments of its command."""
     masses = [mass * float(rng.choice(MASS_FACTORS)) for mass in MASSES_KG]
     stiffness, frequency_hz = float(rng.choice(STIFFNESSES)), float(rng.choice(FREQUENCIES_HZ))
@@ -77,7 +77,7 @@ def drawn(rng, folder, is_target):
     )
 
 
-def called(words):
+def run_command(words):
     """Call the command; return exit code, standard output and standard error."""
     out, err = StringIO(), StringIO()
     before = sys.argv
@@ -134,12 +134,12 @@ def main():
     answered, refused, wrong, longest_s = 0, Counter[str](), 0, 0.0
     for case in cases:
         with tempfile.TemporaryDirectory() as folder:
-            words = drawn(np.random.default_rng([arguments.seed, case]), Path(folder), arguments.targets)
+            words = draw_case(np.random.default_rng([arguments.seed, case]), Path(folder), arguments.targets)
             # Print the case first, so that a case that hangs can be identified.
             print(f"case {case}: {' '.join(words)}", file=sys.stderr, flush=True)
             faulthandler.dump_traceback_later(LIMIT_S, exit=True)
             began = time.process_time()
-            code, out, err = called(words)
+            code, out, err = run_command(words)
             longest_s = max(longest_s, time.process_time() - began)
             faulthandler.cancel_dump_traceback_later()
         answered += code == 0

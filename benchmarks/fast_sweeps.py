@@ -138,7 +138,7 @@ def outcome(sweep: FastSweep, found: SweepResponse, said: Collisions, impacts_s:
     )
 
 
-def recorded(sweep: FastSweep, contact: str, path: Path) -> Outcome:
+def record_sweep(sweep: FastSweep, contact: str, path: Path) -> Outcome:
     """Record a sweep on the virtual rig with a random fixture; without stops, no impact is possible."""
     rng = np.random.default_rng((sweep.seed, 99))
     document = load_rig("virtual_rig").model_dump(mode="json")
@@ -179,7 +179,7 @@ def main() -> None:
             sweep = fast_sweep(number, asked.seed)
             with TemporaryDirectory() as folder:
                 said = (
-                    recorded(sweep, contact, Path(folder) / "fast.h5")
+                    record_sweep(sweep, contact, Path(folder) / "fast.h5")
                     if asked.rig
                     else simulate_and_analyse(sweep, contact, None if asked.unknown else sweep.specimen)
                 )

@@ -99,17 +99,17 @@ def main() -> None:
             "COLUMNS": "110",
             "MPLBACKEND": "agg",
         }
-        typed(
+        shell(
             "python -m venv venv", [sys.executable, "-m", "venv", str(programs.parent)], folder, environment
         )
         pip = [str(programs / "python"), "-m", "pip", "install", "-q", f"{ROOT}[gui]"]
-        typed("pip install 'vibench[gui]'", pip, folder, environment)
+        shell("pip install 'vibench[gui]'", pip, folder, environment)
         for command in typed_here:
-            typed(command, [str(programs / command.split()[0]), *command.split()[1:]], folder, environment)
+            shell(command, [str(programs / command.split()[0]), *command.split()[1:]], folder, environment)
         print(f"From nothing to this: {(time.monotonic() - began_s) / 60:.1f} minutes.")
 
 
-def typed(shown: str, words: list[str], folder: Path, environment: dict[str, str]) -> None:
+def shell(shown: str, words: list[str], folder: Path, environment: dict[str, str]) -> None:
     """Run a command, and print it with its output and its time."""
     print(f"$ {shown}", flush=True)
     began_s, used_s = time.monotonic(), processors_s()

@@ -107,7 +107,7 @@ def random_rig(rng: np.random.Generator, noise: tuple[float, float] = USUAL_NOIS
     return Rig(true, described, level * np.sqrt(1 + 1 / size**2), int(rng.integers(4, 25)))
 
 
-def measured(value: Complexes, rig: Rig, rng: np.random.Generator) -> FrequencyResponse:
+def mean_response(value: Complexes, rig: Rig, rng: np.random.Generator) -> FrequencyResponse:
     """Return the mean over the realisations, with the scatter estimated from these alone."""
     count, shape = rig.realisations, (rig.realisations, value.size)
     parts = math.sqrt(count) * rig.sd * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
@@ -145,7 +145,7 @@ def plain(specimen: Specimen) -> Complexes:
     return np.asarray(base_transmissibility(specimen, LINES_HZ)[:, 0])
 
 
-def clocked(rig: Rig, rng: np.random.Generator) -> Rig:
+def with_clock_error(rig: Rig, rng: np.random.Generator) -> Rig:
     """Return the rig as it appears with a clock error of up to 50 parts in a million."""
     faster = (1 + 50e-6 * rng.uniform(-1, 1)) ** 2
     k0, k1, k2 = (faster * each for each in rig.true.stiffnesses)
@@ -208,7 +208,7 @@ STEPS = 4
 """Number of integrator steps per sample."""
 
 
-def _rubbing(base: Reals, specimen: Specimen, force: float, soft: float) -> Reals:
+def _with_friction(base: Reals, specimen: Specimen, force: float, soft: float) -> Reals:
     """Return velocities of m0 relative to the base, with friction, by the fourth-order Runge-Kutta method.
 
     ``base`` holds base accelerations, shape (motions, samples); the result has the same shape.
@@ -241,7 +241,7 @@ def _rubbing(base: Reals, specimen: Specimen, force: float, soft: float) -> Real
     return shown
 
 
-def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool | None]:
+def with_friction(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool | None]:
     """Simulate multisines with friction between base and m0, and estimate the transmission."""
     count, whole = round(RATE_HZ * (SETTLE_S + 2 / REPETITION_HZ)), round(RATE_HZ * 2 / REPETITION_HZ)
     omega = 2 * np.pi * np.arange(round(50 / REPETITION_HZ), round(600 / REPETITION_HZ)) * REPETITION_HZ
@@ -252,11 +252,11 @@ def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool 
         motions.append((base, moved, rng.standard_normal(count if number > 0 else 0)))
     bases = np.array([base for base, _, _ in motions])
     # Simulate without friction first, to find the typical velocity.
-    soft = 1e-3 * float(np.std(_rubbing(bases[:1], rig.true, 0.0, 1.0)[0, -whole:]))
+    soft = 1e-3 * float(np.std(_with_friction(bases[:1], rig.true, 0.0, 1.0)[0, -whole:]))
     force = FRICTION_SHARE * rig.true.dampings[0] * 1e3 * soft
     sums = PeriodicSums(RATE_HZ, REPETITION_HZ)
     for relative, (base, moved, noise) in zip(
-        _rubbing(bases[1:], rig.true, force, soft), motions[1:], strict=True
+        _with_friction(bases[1:], rig.true, force, soft), motions[1:], strict=True
     ):
         seen = relative + moved
         seen = seen + float(np.median(rig.sd)) * np.std(seen) * noise
@@ -289,7 +289,7 @@ CASES: dict[str, tuple[Wrong, Assumption | None]] = {
 }
 
 
-def recorded(true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | WhiteNoise]) -> UpdatedSpecimen:
+def fit_rig(true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | WhiteNoise]) -> UpdatedSpecimen:
     """Measure a virtual rig with a wrong description, and fit the specimen."""
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{number}.h5" for number in range(len(plans))]
@@ -319,7 +319,7 @@ def heavier_table(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
     table_kg = true.shaker.moving_mass_kg + true.shaker.fixture_mass_kg
     lighter = {"fixture_mass_kg": true.shaker.fixture_mass_kg - (1 - 1 / 1.1) * table_kg}
     described = true.model_copy(update={"shaker": true.shaker.model_copy(update=lighter)})
-    found = recorded(true, described, [weak_noise(rng)])
+    found = fit_rig(true, described, [weak_noise(rng)])
     return found, found.table is not None and _is_told(0.1 * table_kg, found.table.sd_kg)
 
 
@@ -332,7 +332,7 @@ def uneven_gaps(rng: np.random.Generator) -> tuple[UpdatedSpecimen, bool]:
     )
     at_hz, level_vpp = float(np.round(rng.uniform(250, 272), 1)), float(rng.uniform(1.2, 3.0))
     dwell = Dwell(amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=1.0, duration_s=2.0)
-    found = recorded(true, described, [weak_noise(rng), dwell])
+    found = fit_rig(true, described, [weak_noise(rng), dwell])
     told = () if found.collisions is None else found.collisions.determined
     gaps = [each for each in told if each.what in {Hidden.LOWER_GAP, Hidden.UPPER_GAP} and each.is_determined]
     sds = [each.half_width / 1.96 for each in gaps]
@@ -350,7 +350,7 @@ RECORDED = {
 }
 
 
-def counted_recordings(case: str, draws: int, seed: int) -> Count:
+def count_recordings(case: str, draws: int, seed: int) -> Count:
     """Measure and fit ``draws`` virtual rigs of one case."""
     wrong, culprit = RECORDED[case]
     above, refused, named = 0, 0, 0
@@ -362,20 +362,20 @@ def counted_recordings(case: str, draws: int, seed: int) -> Count:
     return Count(case, draws, above, refused, named, 0, 0)
 
 
-def counted(case: str, draws: int, seed: int) -> Count:
+def count_rigs(case: str, draws: int, seed: int) -> Count:
     """Fit ``draws`` random rigs of one case."""
     if case in RECORDED:
-        return counted_recordings(case, draws, seed)
+        return count_recordings(case, draws, seed)
     wrong, culprit = CASES[case]
     above, refused, named, intervals, held = 0, 0, 0, 0, 0
     for number in range(draws):
         rng = np.random.default_rng((seed, list(CASES).index(case), number))
         rig = random_rig(rng, MUCH_NOISE if case == "right model, much noise" else USUAL_NOISE)
-        value, described, nonlinear = wrong(clocked(rig, rng))
-        found: FrequencyResponse = measured(value, rig, rng)
+        value, described, nonlinear = wrong(with_clock_error(rig, rng))
+        found: FrequencyResponse = mean_response(value, rig, rng)
         is_nonlinear: bool | None = nonlinear
         if culprit is Assumption.FRICTION:
-            found, is_nonlinear = rubbed(rig, rng)
+            found, is_nonlinear = with_friction(rig, rng)
         try:
             fit = fit_specimen(found, described, is_nonlinear=is_nonlinear)
         except NotEnoughData:
@@ -384,7 +384,7 @@ def counted(case: str, draws: int, seed: int) -> Count:
             refused += not fit.fits
             for each in fit.values:
                 intervals += 1
-                held += each.low <= _true(rig.true, each.parameter) <= each.high
+                held += each.low <= _true_value(rig.true, each.parameter) <= each.high
             continue
         if not _is_above(value, rig, described):
             continue
@@ -402,7 +402,7 @@ def _is_above(value: Complexes, rig: Rig, described: Specimen) -> bool:
     return bool(ncx2.sf(clean.limit * freedom, freedom, clean.reduced_chi_square * freedom) > _SURELY)
 
 
-def _true(specimen: Specimen, parameter: Parameter) -> float:
+def _true_value(specimen: Specimen, parameter: Parameter) -> float:
     (k0, k1, k2), (m0, m1, m2) = specimen.stiffnesses, specimen.masses
     return {
         Parameter.DAMPING_TIME: specimen.dampings[0] / k0,
@@ -434,7 +434,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     seed = 1000 * asked.seed + int(asked.shard.partition("/")[0])
-    counts = [counted(each, asked.draws, seed) for each in asked.case or (*CASES, *RECORDED)]
+    counts = [count_rigs(each, asked.draws, seed) for each in asked.case or (*CASES, *RECORDED)]
     if asked.json:
         json.dump([asdict(each) for each in counts], sys.stdout)
     else:

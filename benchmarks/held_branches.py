@@ -47,7 +47,7 @@ from vibench.acquisition.rig import (
     shaker_of,
     specimen_of,
 )
-from vibench.analysis.figures.style import MEASURED, SIMULATED, legend_above, new_figure, styled
+from vibench.analysis.figures.style import MEASURED, SIMULATED, figure_style, legend_above, new_figure
 from vibench.sim import Specimen
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch import Branch
@@ -74,7 +74,7 @@ FINE = 25
 """Number of latencies of the model's curve."""
 
 
-def changed(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
+def change_rig(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
     """Return the rig with changed noise, seed and latency."""
     virtual = rig.virtual
     louder = {name: noise * getattr(virtual, name) for name in NOISES}
@@ -84,7 +84,7 @@ def changed(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
     return rig.model_copy(update=told)
 
 
-def believed(rig: Rig, wrong: float, virtual: VirtualRig) -> Rig:
+def wrong_rig(rig: Rig, wrong: float, virtual: VirtualRig) -> Rig:
     """Return a wrong description of the rig, with the addresses of the true instruments."""
     stiffer = tuple(wrong**0.5 * each for each in rig.specimen.single_frequencies_hz)
     push = wrong * rig.shaker.force_constant_n_per_a
@@ -212,7 +212,7 @@ def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
     )
 
 
-def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
+def find_loss(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
     """Follow the branch at a latency; return the highest frequency held, and the reason for the end."""
     measurement = load_campaign("branch").measurements[0]
     plan = measurement.excitation.model_copy(update={"step_hz": 2.0, "most_points": 24, "perturbation": 0.0})
@@ -242,7 +242,7 @@ def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
     _continuation_controller.require_held = lambda *_: None
     rows = []
     for each in sorted(latencies_ms):
-        held_hz, ended = lost_at(rig, 1e-3 * each, folder)
+        held_hz, ended = find_loss(rig, 1e-3 * each, folder)
         model_hz, largest = model_loss(rig, branch, leg, each)
         rows.append((each, held_hz))
         print(
@@ -274,7 +274,7 @@ def model_loss(rig: Rig, branch: Branch, leg: np.ndarray, latency_ms: float) -> 
 
 def picture(rows: np.ndarray, model: np.ndarray, fold_hz: float, path: Path) -> None:
     """Draw over latency: frequency of the loss, measured and modelled, and the model's largest multiplier."""
-    with styled():
+    with figure_style():
         figure = new_figure(3.2)
         left, right = figure.subplots(1, 2)
         left.axhline(fold_hz, color="0.6", linewidth=0.8, label="fold of the branch")
@@ -309,7 +309,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as temporary:
             late(given.latencies, given.draw, Path(temporary))
         return
-    true = changed(load_rig(Path("virtual_rig_controller")), given.noise, given.seed, given.latency)
+    true = change_rig(load_rig(Path("virtual_rig_controller")), given.noise, given.seed, given.latency)
     measurement = load_campaign("branch").measurements[0]
     if given.stops:
         true = true.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
@@ -321,7 +321,7 @@ def main() -> None:
         folder.mkdir(parents=True, exist_ok=True)
         rig = true
         if given.wrong != 1.0:
-            rig = believed(true, given.wrong, stack.enter_context(VirtualRig(true)))
+            rig = wrong_rig(true, given.wrong, stack.enter_context(VirtualRig(true)))
         bench = stack.enter_context(open_bench(rig, confirm=confirm_simulated))
         begin_s = time.process_time()
         outcome = run_measurement(bench, measurement, folder / "branch.h5")

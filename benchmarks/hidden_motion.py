@@ -58,7 +58,7 @@ class Line:
     numbers: Numbers = Numbers.AS_DESCRIBED
 
 
-def _stiffer(which: int, factor: float) -> Callable[[Specimen], Specimen]:
+def _with_spring(which: int, factor: float) -> Callable[[Specimen], Specimen]:
     def change(specimen: Specimen) -> Specimen:
         stiffnesses = [k * (factor if n == which else 1.0) for n, k in enumerate(specimen.stiffnesses)]
         return replace(specimen, stiffnesses=tuple(stiffnesses))
@@ -66,11 +66,11 @@ def _stiffer(which: int, factor: float) -> Callable[[Specimen], Specimen]:
     return change
 
 
-def _damped(factor: float) -> Callable[[Specimen], Specimen]:
+def _with_damping(factor: float) -> Callable[[Specimen], Specimen]:
     return lambda specimen: replace(specimen, dampings=tuple(factor * c for c in specimen.dampings))
 
 
-def _heavier(factor: float) -> Callable[[Specimen], Specimen]:
+def _with_mass(factor: float) -> Callable[[Specimen], Specimen]:
     def change(specimen: Specimen) -> Specimen:
         m0, m1, m2 = specimen.masses
         return replace(specimen, masses=(m0, factor * m1, m2))
@@ -100,12 +100,12 @@ LINES = (
         for name, what in (("dwell", DWELL), ("noise 10 Vpp", NOISE))
         for wrong, change in (
             ("as described", _same),
-            ("m1 +3 %", _heavier(1.03)),
+            ("m1 +3 %", _with_mass(1.03)),
             ("gaps -3 %", _gaps(0.97)),
-            ("k2 +0.1 %", _stiffer(2, 1.001)),
-            ("k2 +0.5 %", _stiffer(2, 1.005)),
-            ("k0 +0.5 %", _stiffer(0, 1.005)),
-            ("damping x1.1", _damped(1.1)),
+            ("k2 +0.1 %", _with_spring(2, 1.001)),
+            ("k2 +0.5 %", _with_spring(2, 1.005)),
+            ("k0 +0.5 %", _with_spring(0, 1.005)),
+            ("damping x1.1", _with_damping(1.1)),
         )
     ),
     *(
@@ -116,9 +116,9 @@ LINES = (
 )
 
 
-def scored(line: Line, seed: int, world: ModuleType, folder: Path) -> str:
+def score_row(line: Line, seed: int, world: ModuleType, folder: Path) -> str:
     """Simulate a recording, estimate the hidden motion, and return the comparison as one row."""
-    shaken = world.shaken(
+    shaken = world.shake(
         folder,
         line.kind,
         line.level_vpp,
@@ -192,7 +192,7 @@ def main() -> None:
     for line in (each for each in LINES if asked.only in each.name):
         for _ in range(asked.seeds):
             with tempfile.TemporaryDirectory() as folder:
-                print(f"| {scored(line, seed, world, Path(folder))} |", flush=True)
+                print(f"| {score_row(line, seed, world, Path(folder))} |", flush=True)
             seed += 1
 
 

@@ -111,7 +111,7 @@ def room_of(name: str, modules: dict[str, Path]) -> str:
     return name if modules[name].name == "__init__.py" else name.rpartition(".")[0]
 
 
-def counted(checkout: Path) -> dict[str, int]:
+def static_counts(checkout: Path) -> dict[str, int]:
     """Return the counts that need no run."""
     folders = source_folders(checkout)
     modules = modules_of(folders)
@@ -155,7 +155,7 @@ class Way:
         )
 
 
-def followed(checkout: Path, arguments: list[str], folder: Path) -> Way:
+def call_path(checkout: Path, arguments: list[str], folder: Path) -> Way:
     """Run a command of a checkout and return its call path."""
     folders = source_folders(checkout)
     is_namespace = any(path.parent.name == "vibench" for path in folders.values())
@@ -204,7 +204,7 @@ def main() -> None:
     )
     parser.add_argument("--checkout", type=Path, default=Path(__file__).resolve().parent.parent)
     checkout = parser.parse_args().checkout.resolve()
-    for what, value in counted(checkout).items():
+    for what, value in static_counts(checkout).items():
         print(f"{what}: {value}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -213,7 +213,7 @@ def main() -> None:
         measure = ["measure", str(folder / "way.toml"), "--out", str(folder / "out")]
         analyse = ["analyse", str(folder / "out" / "dwell.h5"), "--out", str(folder / "report")]
         for arguments in (predict, measure, analyse):
-            print(f"way of {arguments[0]}: {followed(checkout, arguments, folder)}")
+            print(f"way of {arguments[0]}: {call_path(checkout, arguments, folder)}")
 
 
 if __name__ == "__main__":

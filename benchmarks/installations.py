@@ -70,7 +70,7 @@ def lowest(python_version: str, extra: str) -> list[str]:
     return found
 
 
-def timed(command: list[str], folder: Path, environment: dict[str, str]) -> float:
+def run_timed(command: list[str], folder: Path, environment: dict[str, str]) -> float:
     """Run a command, and return its processor time with that of its children [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True, text=True)
@@ -94,7 +94,7 @@ def examine(each: Installation, folder: Path) -> None:
     pinned = lowest(version, each.extra) if each.versions == "lowest" else []
     editable = ["--editable"] if each.form == "editable" else []
     pip = [python, "-m", "pip", "install", "--quiet", "--prefer-binary", *pinned, *editable, each.target]
-    each.processor_s["install"] = timed(pip, folder, environment)
+    each.processor_s["install"] = run_timed(pip, folder, environment)
     installed = [python, "-m", "pip", "list", "--format", "json"]
     listed = subprocess.run(installed, check=True, capture_output=True, text=True).stdout
     each.packages = len(json.loads(listed)) - 1  # without pip, which every environment has
@@ -110,7 +110,7 @@ def examine(each: Installation, folder: Path) -> None:
         steps["measure quick"] = ("measure", "quick", "--out", "out")
         steps["analyse"] = ("analyse", "out/noise.h5", "--out", "report")
     for name, arguments in steps.items():
-        each.processor_s[name] = timed([str(program / "vibench"), *arguments], empty, environment)
+        each.processor_s[name] = run_timed([str(program / "vibench"), *arguments], empty, environment)
 
 
 def size_mb(folder: Path) -> float:

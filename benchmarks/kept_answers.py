@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from report_coverage import drawn
+from report_coverage import random_plan
 from twin_agreement import random_rig
 
 import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
@@ -34,7 +34,7 @@ def make(folder: Path, count: int, seed: int, shard: tuple[int, int]) -> None:
         path = folder / f"r{number:04d}.h5"
         rng = np.random.default_rng((seed, number))
         rig, _ = random_rig(rng)
-        plan = drawn(rng, KINDS[number % len(KINDS)], is_weak=number // len(KINDS) % 4 == 0)
+        plan = random_plan(rng, KINDS[number % len(KINDS)], is_weak=number // len(KINDS) % 4 == 0)
         while not path.exists():
             try:
                 with open_bench(rig) as bench:

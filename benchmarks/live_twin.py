@@ -35,30 +35,30 @@ LOOK_S = 0.01
 
 
 @dataclass
-class Seen:
+class SeenEstimates:
     """Estimates that a viewer has received."""
 
-    begun_s: float = np.inf
+    start_s: float = np.inf
     """Latest possible time of the conversion of the first sample, on the monotonic clock [s]."""
-    told: list[tuple[float, int, str]] = field(default_factory=list)
+    reports: list[tuple[float, int, str]] = field(default_factory=list)
     last: EngineStatus | None = None
 
     def look(self, status: EngineStatus, rate_hz: float) -> None:
         """Record the time and a new estimate, if any."""
         now_s = time.monotonic()
         if status.samples:
-            self.begun_s = min(self.begun_s, now_s - status.samples / rate_hz)
+            self.start_s = min(self.start_s, now_s - status.samples / rate_hz)
         told = status.twin
         if told is None or not told.end_sample or status.state not in DRIVING:
             return
         self.last = status
-        if not self.told or self.told[-1][1] != told.end_sample:
-            self.told.append((now_s, told.end_sample, told.state))
+        if not self.reports or self.reports[-1][1] != told.end_sample:
+            self.reports.append((now_s, told.end_sample, told.state))
 
     def lags_s(self, rate_hz: float) -> np.ndarray:
         """Return the lags of all estimates that the twin tracked."""
         return np.array(
-            [now - self.begun_s - end / rate_hz for now, end, state in self.told if state == "tracked"]
+            [now - self.start_s - end / rate_hz for now, end, state in self.reports if state == "tracked"]
         )
 
 
@@ -76,10 +76,10 @@ def campaign(duration_s: float, level_vpp: float) -> Campaign:
     )
 
 
-def watched(client: EngineClient, rate_hz: float) -> Seen:
+def watch_run(client: EngineClient, rate_hz: float) -> SeenEstimates:
     """Poll the status until the run has ended."""
-    seen = Seen()
-    while (status := client.status()).state is not EngineState.READY or not seen.told:
+    seen = SeenEstimates()
+    while (status := client.status()).state is not EngineState.READY or not seen.reports:
         seen.look(status, rate_hz)
         time.sleep(LOOK_S)
     return seen
@@ -111,7 +111,7 @@ def main() -> None:
         )
         client.arm_request(request)
         client.start()
-        seen = watched(client, rate_hz)
+        seen = watch_run(client, rate_hz)
         with open_recording(Path(folder) / "dwell.h5") as recording:
             said = [each for each in recording.events if each.kind == "specimen"]
             lost = len(recording.gaps)

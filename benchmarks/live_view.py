@@ -56,7 +56,7 @@ def main() -> None:
     for name, total_s in spent.items():
         print(f"{name:<40} {1e3 * total_s / FRAMES:.2f}")
     print(f"{'together':<40} {1e3 * sum(spent.values()) / FRAMES:.2f}  (largest {1e3 * worst_s:.1f})")
-    _seen(rng)
+    _print_share(rng)
 
 
 def _block(first: int, rng: np.random.Generator) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
@@ -75,7 +75,7 @@ def _block(first: int, rng: np.random.Generator) -> "np.ndarray[tuple[int, int],
     return (rows + 1e-5 * rng.standard_normal(rows.shape)).astype(np.float32)
 
 
-def _seen(rng: np.random.Generator) -> None:
+def _print_share(rng: np.random.Generator) -> None:
     """Print the share of frames of a scrolling window in which an impact of three samples is drawn."""
     count = round(SPAN_S * RATE_HZ)
     samples = np.zeros(count, dtype=np.float32)

@@ -93,14 +93,14 @@ def write_recording(path, duration_s):
         writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 
 
-def ours(path):
+def run_vibench(path):
     """Analyse the recording as `vibench analyse` does: levels, checks, three estimates, resonances."""
     with open_recording(path) as recording:
         found = analyse(recording).response.h1
     return found.frequency_hz, found.magnitude
 
 
-def theirs(path):
+def run_scipy(path):
     """Compute with scipy only the six spectra that these estimates need, from whole channels."""
     with open_recording(path) as recording:
         drive, base, response = (recording.read(role) for role in (DRIVE, BASE, RESPONSE))
@@ -115,7 +115,7 @@ def theirs(path):
     return frequency_hz, np.abs(s_xy / s_xx) * 2 * np.pi * frequency_hz
 
 
-def measured(contestant, path, pipe):
+def run_analysis(contestant, path, pipe):
     """Run one analysis and send its time, peak memory and result."""
     idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
@@ -130,7 +130,7 @@ def run(contestant, path):
     """Run one analysis in a new process and return what it sends."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=measured, args=(contestant, path, sender))
+    process = context.Process(target=run_analysis, args=(contestant, path, sender))
     process.start()
     answer = receiver.recv()
     process.join()
@@ -139,7 +139,7 @@ def run(contestant, path):
 
 def compare(path):
     """Run both on one recording and print time, memory and agreement."""
-    answers = {"vibench": run(ours, path), "scipy": run(theirs, path)}
+    answers = {"vibench": run(run_vibench, path), "scipy": run(run_scipy, path)}
     for name, (wall_s, cpu_s, peak_mb, idle_mb, _) in answers.items():
         print(
             f"{name + ':':9} {wall_s:6.2f} s, {cpu_s:6.2f} s of processor time, peak {peak_mb:.0f} MB "

@@ -32,7 +32,7 @@ SAME = 2e-3
 FIELDS = ("x_m", "y_m", "z_m", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s")
 
 
-def drawn_scene(plan: Map, rng: np.random.Generator):
+def random_scene(plan: Map, rng: np.random.Generator):
     """Return the scene of a random initial state in the rectangle of the map."""
     state = []
     for name in FIELDS:
@@ -46,7 +46,7 @@ def basin(asked: argparse.Namespace) -> int:
     """Compare the shares of a map with independent initial states; return the number of differences."""
     results = open_map(asked.map)
     rng = np.random.default_rng(asked.seed)
-    scenes = [drawn_scene(results.plan, rng) for _ in range(asked.starts)]
+    scenes = [random_scene(results.plan, rng) for _ in range(asked.starts)]
     with ThreadPoolExecutor(asked.workers) as pool:
         found = list(pool.map(settle_scene, scenes))
     missed = 0
@@ -86,7 +86,7 @@ def cost(asked: argparse.Namespace) -> int:
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
     steps: list[str] = []
 
-    def tell(progress) -> None:
+    def print_share(progress) -> None:
         if progress.done >= (progress.of if steps else before.coarse_points):
             steps.append(
                 f"{progress.of} points after {time.perf_counter() - began_s:.1f} s, "
@@ -97,13 +97,13 @@ def cost(asked: argparse.Namespace) -> int:
         executor_of(asked.workers, None, solver) as executor,
         store_of(plan, None, ExistingStudy.REFUSE) as store,
     ):
-        compute_map(plan, executor, store, tell, None)
+        compute_map(plan, executor, store, print_share, None)
         results = MapResults(plan, store.arrays)
     print("\n".join((steps[0], *steps[-1:])))
     taken_s = float(np.nansum(results.arrays["taken"].astype(float)))
     audit = results.audit
     print(
-        f"{results.computed} of {plan.grid.size} points computed in {time.perf_counter() - began_s:.1f} s, "
+        f"{results.points} of {plan.grid.size} points computed in {time.perf_counter() - began_s:.1f} s, "
         f"{time.process_time() - began_cpu_s:.1f} s of processor time, {taken_s:.1f} s of them the points' "
         f"own; {audit.wrong} of {audit.audited} filled cells had come to another motion"
     )
@@ -138,12 +138,12 @@ def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
 
 def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[Stretch]:
     """Follow motions together in SIMD lanes."""
-    return follow_together([each.apart() for each in runs], periods)
+    return follow_together([each.copy() for each in runs], periods)
 
 
 def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | None = None) -> list[Stretch]:
     """Follow the same motions one after the other."""
-    twins = [each.apart(tolerance) for each in runs]
+    twins = [each.copy(tolerance) for each in runs]
     return [
         follow_with_section(each, (each.periods + count) / each.drive.frequency_hz)
         for each, count in zip(twins, periods, strict=True)

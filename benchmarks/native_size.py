@@ -38,7 +38,7 @@ def is_replaced(path: PurePosixPath, text: str) -> bool:
     return in_package or KERNEL.search(text) is not None
 
 
-def replaced_files(commit: str) -> Counter[PurePosixPath]:
+def replaced_lines(commit: str) -> Counter[PurePosixPath]:
     """Return the lines of every replaced file at a commit."""
     lines: Counter[PurePosixPath] = Counter()
     for name in git("ls-tree", "-r", "--name-only", commit, *PORTIONS).splitlines():
@@ -70,7 +70,7 @@ def main() -> None:
     """Print both counts and their ratio."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--before", default=BEFORE, metavar="COMMIT")
-    before = replaced_files(options.parse_args().before)
+    before = replaced_lines(options.parse_args().before)
     packages: Counter[str] = Counter()
     for path, count in before.items():
         packages["/".join((path.parts[0], *path.parts[2:4]))] += count

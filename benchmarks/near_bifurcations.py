@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from random_scenes import described, near_bifurcation
+from random_scenes import near_bifurcation, scene_line
 
 from vibench.sim import (
     Accuracy,
@@ -57,7 +57,7 @@ def main() -> None:
     found = json.loads(asked.save.read_text("utf-8")) if asked.save and asked.save.exists() else {}
     for number in range(part - 1, asked.count, of):
         if str(number) not in found:
-            found[str(number)] = _compared(asked.seed, number)
+            found[str(number)] = _compare(asked.seed, number)
             if asked.save is not None:
                 asked.save.write_text(json.dumps(found), encoding="utf-8")
     counts: Counter[str] = Counter()
@@ -68,7 +68,7 @@ def main() -> None:
     print(f"wrong: {wrong} of {sum(counts.values())} answers to {len(found)} scenes")
 
 
-def _compared(seed: int, number: int) -> list[dict[str, str]]:
+def _compare(seed: int, number: int) -> list[dict[str, str]]:
     random = np.random.default_rng((seed, number))
     event, scene = near_bifurcation(random)
     kinds = {
@@ -85,7 +85,7 @@ def _compared(seed: int, number: int) -> list[dict[str, str]]:
             judged = "open"
         start = "rest" if isinstance(scene.start, Rest) else "near"
         print(
-            f"{judged} {number} {event.kind} {described(scene)} from {start}, {name}: {answer.motion} "
+            f"{judged} {number} {event.kind} {scene_line(scene)} from {start}, {name}: {answer.motion} "
             f"{answer.period or ''} I {answer.response_i} +- {answer.error_estimate}; {fault or ''}"
         )
         sys.stdout.flush()
@@ -99,7 +99,7 @@ def _fault(request: Scene, answer: ScenePrediction) -> str | None:
         return None
     if isinstance(request.duration, FixedDuration) and answer.memory is StartMemory.KEPT:
         strict = solve_scene(replace(request, accuracy=Accuracy.REFERENCE, budget_s=0.0))
-        if strict.memory is not StartMemory.LOST and (off := _beyond(answer, strict, 0.0)):
+        if strict.memory is not StartMemory.LOST and (off := _deviation(answer, strict, 0.0)):
             return f"in the same window {off}"
     later = solve_scene(_later(request, answer))
     if later.outcome is not Outcome.REACHED_END or later.motion is MotionKind.UNDECIDED:
@@ -111,7 +111,7 @@ def _fault(request: Scene, answer: ScenePrediction) -> str | None:
     }
     if is_wrong.get(answer.motion):
         return f"later {later.motion} {later.period or ''}"
-    return _beyond(answer, later, LEAST) if answer.motion is MotionKind.PERIODIC else None
+    return _deviation(answer, later, LEAST) if answer.motion is MotionKind.PERIODIC else None
 
 
 def _later(request: Scene, answer: ScenePrediction) -> Scene:
@@ -128,7 +128,7 @@ def _later(request: Scene, answer: ScenePrediction) -> Scene:
     )
 
 
-def _beyond(answer: ScenePrediction, truth: ScenePrediction, granted: float) -> str | None:
+def _deviation(answer: ScenePrediction, truth: ScenePrediction, granted: float) -> str | None:
     """Return a text on the first response that differs by more than both errors and ``granted``; or None."""
     for name in RESPONSES:
         value, true = getattr(answer, name), getattr(truth, name)

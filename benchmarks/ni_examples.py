@@ -64,7 +64,7 @@ def connect(options: GrpcSessionOptions) -> None:
     nidaqmx.system.System.local = staticmethod(lambda: remote(options))
 
 
-def give(server, began_s: float) -> None:
+def send_edges(server, began_s: float) -> None:
     """Send edges on the lines that examples wait for, then send Ctrl-C."""
     for moment_s in EDGES_S:
         time.sleep(max(0.0, began_s + moment_s - time.monotonic()))
@@ -86,7 +86,7 @@ def run_one(example: Path, product: str) -> None:
     ):
         connect(GrpcSessionOptions(channel, ""))
         builtins.input = lambda *_: time.sleep(ENTER_S) or ""
-        threading.Thread(target=give, args=(server, time.monotonic()), daemon=True).start()
+        threading.Thread(target=send_edges, args=(server, time.monotonic()), daemon=True).start()
         try:
             runpy.run_path(str(example), run_name="__main__")
             told = RAN

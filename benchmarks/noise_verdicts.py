@@ -153,7 +153,7 @@ def regular_points(number: int, seed: int) -> tuple[str, Points]:
     return f"regular, {kind}", Points(value, np.full(2, noise))
 
 
-def found_in(number: int, seed: int) -> dict[str, str]:
+def draw_verdicts(number: int, seed: int) -> dict[str, str]:
     """Return the verdicts for one draw of each kind; wrong ones begin with WRONG."""
     name, points = noise_points(number, seed)
     kind = motion_verdict(points, DRIVE_HZ).kind
@@ -195,7 +195,7 @@ def main() -> None:
     for number in range(part - 1, asked.count, of):
         if any(key.startswith(f"{number}: ") for key in found):
             continue
-        found |= {f"{number}: {name}": said for name, said in found_in(number, asked.seed).items()}
+        found |= {f"{number}: {name}": said for name, said in draw_verdicts(number, asked.seed).items()}
         if asked.save is not None:
             asked.save.write_text(json.dumps(found), encoding="utf-8")
     count = Counter((key.split(": ")[1], kind) for key, kind in found.items())

@@ -33,7 +33,7 @@ OPEN = (1.1, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0)
 LEVEL_M, START_HZ, RANGE_HZ = 1e-6, 97.5, (95.0, 100.0)
 
 
-def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def transition_matrices(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return for each sample the transition matrix of a deviation, and the effect of its new voltage.
 
     Shapes (samples, n, n) and (samples, n); ``slopes`` of the stops' force, shape (samples, parts).
@@ -57,7 +57,7 @@ def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
     """Return the Kalman gain at each sample of a period, shape (samples, n, 2), scaled as ``moved`` is."""
     scale = plant.scales
     step, volt = plant.step[0] * scale / scale[:, None], plant.step[1] / scale
-    shown, pushed = plant.shown * scale, step @ (plant.spring[0] / scale) * plant.timing.step_s
+    shown, pushed = plant.sensing * scale, step @ (plant.spring[0] / scale) * plant.timing.step_s
     unknown = np.outer(pushed, pushed) * PUSH_N**2 + np.outer(volt, volt) * VOLT**2
     unknown += 1e-12 * np.eye(plant.size)
     noise = np.diag(np.square(NOISE))
@@ -73,9 +73,9 @@ def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
 def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -> list[float]:
     """Return the largest multiplier of a period with each of both observers that include the stops."""
     scale, law = plant.scales, design_law(plant)
-    shown, step = plant.shown * scale, plant.step[0] * scale / scale[:, None]
-    true, volts = struck(plant, slopes)
-    seen, seen_volts = struck(plant, believed)
+    shown, step = plant.sensing * scale, plant.step[0] * scale / scale[:, None]
+    true, volts = transition_matrices(plant, slopes)
+    seen, seen_volts = transition_matrices(plant, believed)
     true, seen = (each * scale / scale[:, None] for each in (true, seen))
     volts, seen_volts = volts / scale, seen_volts / scale
     count = len(true)

@@ -101,14 +101,14 @@ def reach(case):
 def textbook(case, method):
     """Return a row: energy kept in impacts, and exponent at 260 Hz and 5 um, of a method."""
     specimen, settle_s = case.specimen(), case.window_s
-    kept = ", ".join(f"{energy_kept(specimen, method, each):.3g}" for each in SPEEDS)
+    kept = ", ".join(f"{energy_ratio(specimen, method, each):.3g}" for each in SPEEDS)
     drives = [Harmonic(260.0, MODERATE_M, phase) for phase in 2.0 * np.pi * np.arange(MOTIONS) / MOTIONS]
     kept_s = (case.duration_s - settle_s) / MOTIONS
     found = textbook_exponents(specimen, drives, method, kept_s, DECAYED_S)
     return method.name, kept, f"{found.mean():.0f}"
 
 
-def energy_kept(specimen, method, speed):
+def energy_ratio(specimen, method, speed):
     """Return the energy of m1 and m2 after an isolated impact, over that before."""
     free = replace(specimen, stiffnesses=(1e-9,) * 3, dampings=(0.0,) * 3, lower_gap_m=np.inf, gap_m=SHORT_M)
     step_s = min(method.longest_s, SHORT_M / speed)

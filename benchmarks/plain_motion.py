@@ -191,7 +191,7 @@ def _closing(state, place, which):
 
 
 @njit(cache=True)
-def _shorter(state, tau, place, numbers, powers, forces, stages, length, other, end):
+def _shorten(state, tau, place, numbers, powers, forces, stages, length, other, end):
     """Repeat the step with another length; the first stage is reused."""
     other[0] = stages[0]
     _step(state, tau, length, place, numbers, powers, forces, other, end)
@@ -201,7 +201,7 @@ def _shorter(state, tau, place, numbers, powers, forces, stages, length, other, 
 def _turn(state, tau, place, numbers, powers, forces, stages, length, first, second, other, end):
     """Return the step length after which the velocity of one coordinate relative to another is zero."""
     low, high = 0.0, length
-    _shorter(state, tau, place, numbers, powers, forces, stages, length, other, end)
+    _shorten(state, tau, place, numbers, powers, forces, stages, length, other, end)
     at_low = state[first] - (state[second] if second >= 0 else 0.0)
     at_high = end[first] - (end[second] if second >= 0 else 0.0)
     at = high
@@ -209,7 +209,7 @@ def _turn(state, tau, place, numbers, powers, forces, stages, length, first, sec
         at = low - at_low * (high - low) / (at_high - at_low)
         if k % 3 == 2 or not low < at < high:
             at = 0.5 * (low + high)
-        _shorter(state, tau, place, numbers, powers, forces, stages, at, other, end)
+        _shorten(state, tau, place, numbers, powers, forces, stages, at, other, end)
         now = end[first] - (end[second] if second >= 0 else 0.0)
         if now == 0.0 or high - low < 1e-13 * length:
             break
@@ -230,7 +230,7 @@ def _end_of_phase(state, tau, place, which, numbers, powers, forces, stages, hig
     low = 0.0
     for _ in range(200):
         at = 0.5 * (low + high)
-        _shorter(state, tau, place, numbers, powers, forces, stages, at, other, end)
+        _shorten(state, tau, place, numbers, powers, forces, stages, at, other, end)
         left = _clearance(end, place, which, numbers)
         closing = -_closing(end, place, which)
         for _ in range(4):
@@ -238,7 +238,7 @@ def _end_of_phase(state, tau, place, which, numbers, powers, forces, stages, hig
             if closing == 0.0 or not low < at + left / closing < high:
                 break
             at += left / closing
-            _shorter(state, tau, place, numbers, powers, forces, stages, at, other, end)
+            _shorten(state, tau, place, numbers, powers, forces, stages, at, other, end)
             left = _clearance(end, place, which, numbers)
             closing = -_closing(end, place, which)
             if abs(left) < 1e-21:

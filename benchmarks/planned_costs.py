@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from error_targets import drawn_scene
+from error_targets import random_scene
 
 from vibench.sim import StartMemory, plan_scene, solve_scene
 from vibench.sim.scene.cost import CostLedger
@@ -23,9 +23,9 @@ LEARNING = 0.4
 """Share of scenes from which the ledger learns before plans are counted."""
 
 
-def measured(seed, index, budget_s):
+def run_scene(seed, index, budget_s):
     """Plan and run one scene; return plain values."""
-    law, scene = drawn_scene(seed, index)
+    law, scene = random_scene(seed, index)
     scene = replace(scene, budget_s=budget_s)
     plan = plan_scene(scene)
     began_s = time.thread_time()
@@ -50,7 +50,7 @@ def ratios(ledger, rows):
     """Return planned over actual time of each run, planned from the runs before it, shape (runs,)."""
     found = []
     for row in rows:
-        found.append(ledger.expected(row["kind"], row["planned_s"]).time_s / row["taken_s"])
+        found.append(ledger.expected_time(row["kind"], row["planned_s"]).time_s / row["taken_s"])
         ledger.learn(row["kind"], row["planned_s"], row["taken_s"])
     return np.array(found)
 
@@ -72,7 +72,7 @@ def main():
     is_there = given.save is not None and given.save.exists()
     rows = [json.loads(line) for line in given.save.read_text().splitlines()] if is_there else []
     for index in range(len(rows), given.count):
-        rows.append(measured(given.seed, index, given.budget))
+        rows.append(run_scene(given.seed, index, given.budget))
         if given.save is not None:
             with given.save.open("a") as file:
                 file.write(json.dumps(rows[-1]) + "\n")

@@ -51,7 +51,7 @@ def other(specimen: Specimen, rng: np.random.Generator, shares: tuple[float, ...
     )
 
 
-def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool | None]]:
+def check_draw(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool | None]]:
     """Return a text, and whether each bound contains the truth; None if a parameter is not determined."""
     rng = np.random.default_rng([seed, index])
     while True:
@@ -64,7 +64,7 @@ def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool 
         level_vpp = float(rng.uniform(1.2, 3.0) if sine else rng.uniform(7, 12))
         noise = float(10 ** rng.uniform(0.5, 2))
         with tempfile.TemporaryDirectory() as folder:
-            shaken = world.shaken(
+            shaken = world.shake(
                 Path(folder),
                 kind,
                 level_vpp,
@@ -106,7 +106,7 @@ def wilson(held: int, count: int) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def counted(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
+def coverage_lines(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
     """Yield for each parameter how often its bounds contain the truth."""
     by_name: dict[str, list[bool | None]] = defaultdict(list)
     for each in found:
@@ -138,10 +138,10 @@ def main() -> None:
     shard, shards = (int(part) for part in asked.shard.split("/"))
     found = []
     for index in range(shard - 1, asked.draws, shards):
-        words, held = drawn(asked.seed, index, world)
+        words, held = check_draw(asked.seed, index, world)
         print(f"{index}: {words}", flush=True)
         found.append(held)
-    print("\n".join(counted(found)))
+    print("\n".join(coverage_lines(found)))
 
 
 if __name__ == "__main__":

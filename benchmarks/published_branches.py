@@ -20,7 +20,7 @@ from scipy.io import loadmat
 
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis.exchange import ImportMapping, import_recording
-from vibench.analysis.tones.order_tracking import tracked_orders
+from vibench.analysis.tones.order_tracking import track_orders
 from vibench.analysis.tones.sine_fit import fit_sine, steady_phase
 
 EXCERPTS = Path(__file__).parents[1] / "tests/analysis/exchange/flutter_rig"
@@ -47,7 +47,7 @@ class HeldCycle:
     stated_criterion: float
 
 
-def held_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
+def read_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
     """Import a file and analyse the recording."""
     stated = loadmat(path, variable_names=["amplitude", "freq_actual", "Wind_sped", "error_tol"])
     metres_per_volt = mapping.channels[0].scale
@@ -58,7 +58,7 @@ def held_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
     phase = steady_phase(heave.size, frequency_hz / rate_hz, 0.0)
     interval = round(PERIODS * rate_hz / frequency_hz)
     response, wanted = (
-        tracked_orders(each, phase, interval_samples=interval, orders=ORDERS).order(1.0)
+        track_orders(each, phase, interval_samples=interval, orders=ORDERS).order(1.0)
         for each in (heave, target)
     )
     sizes = np.abs(response)
@@ -76,10 +76,10 @@ def held_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
     )
 
 
-def held_cycles(source: Path, mapping: ImportMapping) -> list[HeldCycle]:
+def read_cycles(source: Path, mapping: ImportMapping) -> list[HeldCycle]:
     """Analyse all files of a folder."""
     with tempfile.TemporaryDirectory() as folder:
-        return [held_cycle(each, mapping, Path(folder)) for each in sorted(source.glob("CBC_*stable_*.mat"))]
+        return [read_cycle(each, mapping, Path(folder)) for each in sorted(source.glob("CBC_*stable_*.mat"))]
 
 
 def main() -> None:
@@ -91,7 +91,7 @@ def main() -> None:
     mapping = load_toml(EXCERPTS / "mapping.toml", ImportMapping)
     if given.rate is not None:
         mapping = mapping.model_copy(update={"sample_rate_hz": given.rate})
-    for each in held_cycles(given.folder, mapping):
+    for each in read_cycles(given.folder, mapping):
         heave = 1e3 * each.heave_m
         print(
             f"| {each.name} | {each.wind_m_per_s:.3g} | {each.frequency_hz:.4g} | {each.stated_hz:.4g} | "

@@ -107,7 +107,7 @@ def is_chaotic(scene: Scene) -> bool:
     return found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}
 
 
-def described(scene: Scene) -> str:
+def scene_line(scene: Scene) -> str:
     """Return the parameters of a scene as one line."""
     specimen, drive = scene.specimen, scene.drive
     gaps = "/".join(f"{1e6 * gap_m:.4g}" for gap_m in dict.fromkeys(specimen.gaps_m))

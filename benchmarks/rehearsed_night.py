@@ -89,7 +89,7 @@ class Account:
         self._began_s = time.monotonic()
         self._last: dict[str, PointResult] = {}
 
-    def ended(self, point_result: PointResult) -> None:
+    def note_result(self, point_result: PointResult) -> None:
         """Record the result of a point; a resumed campaign reports the earlier points again."""
         is_new = self._last.get(point_result.name) is None
         self._last[point_result.name] = point_result
@@ -97,7 +97,7 @@ class Account:
             held = f"{resident_mb():6.0f} MB  {open_files():4} files open"
             print(f"{len(self._last):4} points  {held}  {self.wall_s:6.0f} s", flush=True)
 
-    def happened(self, event: CampaignEvent) -> None:
+    def note_event(self, event: CampaignEvent) -> None:
         """Print an event if `--say` was given."""
         if "--say" in sys.argv:
             print(f"{self.wall_s:7.1f} s {event.kind}: {event.text}"[:200], flush=True)
@@ -107,7 +107,7 @@ class Account:
         """Elapsed time since the campaign began [s]."""
         return time.monotonic() - self._began_s
 
-    def tell(self) -> None:
+    def print_summary(self) -> None:
         """Print the summary of the night."""
         wall_s, used = self.wall_s, os.times()
         print(
@@ -137,13 +137,13 @@ def main() -> None:
         orders = CampaignRequest(campaign=plan, folder=folder / "night", after_failure=AfterFailure.GO_ON)
         for _ in range(MORNINGS):
             try:
-                engine.measure(orders, account.ended, account.happened)
+                engine.measure(orders, account.note_result, account.note_event)
                 break
             except RecordingError as error:
                 # Resume, as a user would after making room on the disk.
                 print(f"ended: {str(error)[:150]}; resumed", flush=True)
                 orders = orders.model_copy(update={"existing": ExistingRecordings.RESUME})
-        account.tell()
+        account.print_summary()
         print(f"faults played: {len(engine.played_faults)}; load {os.getloadavg()[0]:.1f}")
 
 

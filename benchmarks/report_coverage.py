@@ -47,7 +47,7 @@ FARTHEST_HZ = 5.0
 
 
 @dataclass(frozen=True)
-class Held:
+class BoundCheck:
     """One bound of one measurement, compared with the truth."""
 
     kind: str
@@ -63,7 +63,7 @@ class Held:
         return f"{self.kind}, {'linear' if self.is_linear else 'any motion'}", self.quantity
 
 
-def drawn(
+def random_plan(
     rng: np.random.Generator, kind: str, *, is_weak: bool
 ) -> WhiteNoise | Dwell | SineSweep | SteppedSine:
     """Return a random short plan of a kind."""
@@ -89,7 +89,7 @@ def drawn(
             return SteppedSine(amplitude_vpp=level_vpp, frequencies_hz=steps_hz, settle_s=1.0, record_s=0.6)
 
 
-def repeated(rig: Rig, rng: np.random.Generator) -> Rig:
+def with_new_noise(rig: Rig, rng: np.random.Generator) -> Rig:
     """Return the same rig with other noise, and another clock error within the stated limit."""
     other = {
         "seed": int(rng.integers(1, 1 << 30)),
@@ -176,7 +176,7 @@ def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]
     return bool(1e-6 * found["base amplitude A0"][0] * relative > min(specimen.gaps_m))
 
 
-def named(quantity: str, specimen: Specimen) -> str | None:
+def stable_name(quantity: str, specimen: Specimen) -> str | None:
     """Return a name that is the same in all repeats: modes by number, largest values without frequency."""
     found = re.search(r"([\d.]+) Hz", quantity)
     if found is None or "largest" in quantity or "A0" in quantity:
@@ -187,21 +187,21 @@ def named(quantity: str, specimen: Specimen) -> str | None:
     return f"mode {mode + 1}, {what}" if distance[mode] < FARTHEST_HZ else None
 
 
-def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float, float]], object]:
+def measure_once(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float, float]], object]:
     """Measure once; return value and expanded uncertainty by quantity, and the analysis."""
     with open_bench(rig) as bench:
         ended = run_measurement(bench, Measurement(name="measured", excitation=plan, ramp_s=0.3), path)
     if ended.state is not RunState.FINISHED:
         print(f"measured again, for the run {ended.state.value}: {ended.reason}", file=sys.stderr, flush=True)
         path.unlink()
-        return measured(rig, plan, path)
+        return measure_once(rig, plan, path)
     done = analyse_files([path], "measured", Simulation.LEFT_OUT)
     if not done.results:
         raise AnalysisError(str(done.failures))
     (result,) = done.results
     found = {}
     for each in budgets_of(result):
-        name = named(each.quantity, specimen_of(rig))
+        name = stable_name(each.quantity, specimen_of(rig))
         told = {one.cause.value: one.relative for one in each.contributions}
         missing = {"noise", "chance"} & {cause for cause, relative in told.items() if relative is None}
         if name is not None and not missing and name not in found:
@@ -211,7 +211,7 @@ def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float,
 
 def scenes(
     rigs: int, seed: int, shard: tuple[int, int], kinds: list[str], *, draws_sensors: bool
-) -> Iterator[Held]:
+) -> Iterator[BoundCheck]:
     """Yield the compared bounds of every kind of measurement on every rig of a shard."""
     first, of = shard
     for number in range(first - 1, rigs, of):
@@ -222,7 +222,7 @@ def scenes(
             words = f"{words}, {sensors}"
         rig, is_weak = with_stated_clock(rig), number % 4 == 0
         for kind in KINDS:
-            plan = drawn(rng, kind, is_weak=is_weak)
+            plan = random_plan(rng, kind, is_weak=is_weak)
             if kind in kinds:
                 yield from within_limits(
                     rig, plan, (seed, number, KINDS.index(kind)), f"rig {number}: {words}", is_weak=is_weak
@@ -231,7 +231,7 @@ def scenes(
 
 def within_limits(
     rig: Rig, plan: object, seeds: tuple[int, int, int], words: str, *, is_weak: bool
-) -> list[Held]:
+) -> list[BoundCheck]:
     """Return the compared bounds of a plan; halve its level as long as it exceeds the limits."""
     scene = f"{words}, {plan.amplitude_vpp:.2g} Vpp"
     rng, kind = np.random.default_rng(seeds), KINDS[seeds[-1]]
@@ -244,13 +244,13 @@ def within_limits(
 
 def repeats(
     rig: Rig, plan: object, rng: np.random.Generator, kind: str, *, is_weak: bool, scene: str
-) -> Iterator[Held]:
+) -> Iterator[BoundCheck]:
     """Measure a plan repeatedly, and yield every bound compared with the truth."""
     told: dict[tuple[str, bool], list[tuple[float, float]]] = defaultdict(list)
     for _ in range(REPEATS):
         again = plan.model_copy(update={"seed": int(rng.integers(1, 1 << 30))}) if kind == "noise" else plan
         with TemporaryDirectory() as folder:
-            found, analysis = measured(repeated(rig, rng), again, Path(folder) / "measured.h5")
+            found, analysis = measure_once(with_new_noise(rig, rng), again, Path(folder) / "measured.h5")
         is_linear = is_weak and not reaches_a_stop(rig, plan, found)
         is_linear |= kind == "noise" and not scatters_beyond_noise(analysis.response.periodic)
         for name, value in found.items():
@@ -259,7 +259,7 @@ def repeats(
             lines = analysis.response.frequency_response
             exact = np.abs(base_transmissibility(specimen_of(rig), lines.frequency_hz)[:, 0])
             misses = (lines.magnitude_lower > exact) | (lines.magnitude_upper < exact)
-            yield Held(kind, LINES, is_weak, float(np.mean(misses)), scene)
+            yield BoundCheck(kind, LINES, is_weak, float(np.mean(misses)), scene)
     true = true_values(rig, plan)
     for (name, is_linear), values in told.items():
         value, expanded = np.transpose(values)
@@ -273,10 +273,10 @@ def repeats(
         else:
             continue
         for each in off:
-            yield Held(kind, name, is_linear, float(each), scene)
+            yield BoundCheck(kind, name, is_linear, float(each), scene)
 
 
-def table(found: list[Held]) -> Iterator[str]:
+def table(found: list[BoundCheck]) -> Iterator[str]:
     """Yield the lines of the table, one row for each kind of bound."""
     rows = defaultdict(list)
     for each in found:
@@ -310,7 +310,7 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.add is not None:
         kept = (json.loads(line) for path in asked.add for line in path.read_text("utf-8").splitlines())
-        print("\n".join(table([Held(**each) for each in kept])))
+        print("\n".join(table([BoundCheck(**each) for each in kept])))
         return
     part, of = (int(each) for each in asked.shard.split("/"))
     found = []

@@ -27,7 +27,7 @@ Text = tuple[str, str]
 """Place of a text, and the text."""
 
 
-def _tracked(*patterns: str) -> list[Path]:
+def _git_files(*patterns: str) -> list[Path]:
     """Return tracked files; git's ``*`` matches slashes too."""
     listed = subprocess.run(
         ["git", "ls-files", *patterns], cwd=ROOT, capture_output=True, text=True, check=True
@@ -37,7 +37,7 @@ def _tracked(*patterns: str) -> list[Path]:
 
 def product_sources() -> list[Path]:
     """Return the Python files of the packages, without tests, benchmarks and examples."""
-    return _tracked(*(f"{folder}/*.py" for folder in PRODUCT))
+    return _git_files(*(f"{folder}/*.py" for folder in PRODUCT))
 
 
 def docstrings(path: Path) -> Iterator[Text]:
@@ -117,16 +117,16 @@ def _from_files(read: str, paths: list[Path]) -> list[Text]:
     return [text for path in paths for text in readers[read](path)]
 
 
-def drawn(seed: int, count: int, since: str | None) -> dict[str, list[Text]]:
+def draw_texts(seed: int, count: int, since: str | None) -> dict[str, list[Text]]:
     """Return random texts by kind, in equal numbers; the same seed and sources give the same texts."""
     sources = product_sources()
     kinds = {
-        "document": _from_files("document", _tracked("README.md", "CONTRIBUTING.md", "docs/*.md")),
+        "document": _from_files("document", _git_files("README.md", "CONTRIBUTING.md", "docs/*.md")),
         "docstring": _from_files("docstring", sources),
         "comment": _from_files("comment", sources),
         "message": _from_files("message", sources),
         "commit title": list(_commit_titles(since)),
-        "test name": _from_files("test name", _tracked("tests/*test_*.py")),
+        "test name": _from_files("test name", _git_files("tests/*test_*.py")),
     }
     chance = random.Random(seed)
     share = -(-count // len(kinds))
@@ -141,7 +141,7 @@ def main() -> None:
     options.add_argument("--since", help="only commit titles after this tag or commit")
     chosen = options.parse_args()
     number = 0
-    for kind, texts in drawn(chosen.seed, chosen.count, chosen.since).items():
+    for kind, texts in draw_texts(chosen.seed, chosen.count, chosen.since).items():
         print(f"== {kind}")
         for place, text in texts:
             number += 1

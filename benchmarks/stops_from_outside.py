@@ -59,7 +59,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import KnobSheet, Rig, save_knob_sheet
-from vibench.acquisition.stopping.program import heeded_signals, signal_name
+from vibench.acquisition.stopping.program import signal_name, stop_signals
 from vibench.virtual_rig import VirtualRig
 
 VIBENCH = str(Path(sys.executable).with_name("vibench"))
@@ -88,7 +88,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Found:
+class CellResult:
     """Result of one cell."""
 
     cell: Cell
@@ -156,18 +156,18 @@ class Laboratory:
         self.process = subprocess.Popen(["/bin/sh", "-c", shell, "sh", *script], start_new_session=True)
         os.close(slave)
         threading.Thread(target=self._read, args=(self._terminal,), daemon=True).start()
-        self.until(self._is_announced, "engine")
+        self.wait_until(self._is_announced, "engine")
         self.client = EngineClient.attach(self.engine.address, patience_s=PATIENCE_S)
 
     def run_into(self, state: str, after_s: float) -> None:
         """Wait for a state of the run, and then for ``after_s``."""
         first = "recording" if state in ("held", "ramping_down") else state
-        self.until(lambda: self.run_state() == first and self.is_loud(), first)
+        self.wait_until(lambda: self.run_state() == first and self.is_loud(), first)
         if state == "held":
             self.client.stop(StopLevel.HOLD)
         elif state == "ramping_down":
             self.client.stop(StopLevel.RAMP)
-        self.until(lambda: self.run_state() == state, state)
+        self.wait_until(lambda: self.run_state() == state, state)
         time.sleep(after_s)
 
     def run_state(self) -> str:
@@ -183,7 +183,7 @@ class Laboratory:
         """Type keys on the terminal of the process."""
         os.write(self._terminal, keys)
 
-    def until(self, is_so: Callable[[], bool], what: str) -> None:
+    def wait_until(self, is_so: Callable[[], bool], what: str) -> None:
         """Wait for a condition; raise TimeoutError if it takes too long or the process ends."""
         give_up_s = time.monotonic() + 2 * PATIENCE_S
         while not is_so():
@@ -191,7 +191,7 @@ class Laboratory:
                 raise TimeoutError(f"no {what}: {self._said.decode(errors='replace')[-300:]}")
             time.sleep(0.005)
 
-    def ended(self) -> int | None:
+    def exit_code(self) -> int | None:
         """Wait for the process to end and return its exit code; None if it continues."""
         try:
             return self.process.wait(PATIENCE_S)
@@ -271,47 +271,47 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
         signal_name(number): (
             send(number), WITHIN_ABORT_S + (RAMP_S if number == signal.SIGINT else 0.0), SUBJECTS
         )
-        for number in sorted({*heeded_signals(), signal.SIGHUP})  # nohup must not change the draw
+        for number in sorted({*stop_signals(), signal.SIGHUP})  # nohup must not change the draw
         if signal_name(number) in signal.Signals.__members__
     },
 }  # fmt: skip
 
 
 @contextmanager
-def limited(pid: int, what: int, most: int) -> Iterator[None]:
+def limit_resource(pid: int, what: int, most: int) -> Iterator[None]:
     """Set a resource limit of a process."""
     resource.prlimit(pid, what, (most, resource.prlimit(pid, what)[1]))
     yield
 
 
-def exhausted(laboratory: Laboratory) -> Iterator[None]:
+def exhaust_memory(laboratory: Laboratory) -> Iterator[None]:
     """Limit the memory of the process to its present size."""
     status = Path(f"/proc/{laboratory.engine.pid}/status").read_text()
     size_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmSize"))
-    with limited(laboratory.engine.pid, resource.RLIMIT_AS, 1024 * size_kb):
+    with limit_resource(laboratory.engine.pid, resource.RLIMIT_AS, 1024 * size_kb):
         yield
 
 
 def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
     """Prevent the process from opening more files."""
     highest = max(int(each.name) for each in Path(f"/proc/{laboratory.engine.pid}/fd").iterdir())
-    with limited(laboratory.engine.pid, resource.RLIMIT_NOFILE, highest + 1):
+    with limit_resource(laboratory.engine.pid, resource.RLIMIT_NOFILE, highest + 1):
         yield
 
 
 def disk_full(laboratory: Laboratory) -> Iterator[None]:
     """Make every write to a file fail."""
-    with limited(laboratory.engine.pid, resource.RLIMIT_FSIZE, 0):
+    with limit_resource(laboratory.engine.pid, resource.RLIMIT_FSIZE, 0):
         yield
 
 
-def folder_gone(laboratory: Laboratory) -> Iterator[None]:
+def remove_folder(laboratory: Laboratory) -> Iterator[None]:
     """Remove the folder of the recordings."""
     shutil.rmtree(laboratory.recordings, ignore_errors=True)
     yield
 
 
-def shimmed(condition: str) -> Callable[[Laboratory], Iterator[None]]:
+def with_shim(condition: str) -> Callable[[Laboratory], Iterator[None]]:
     """Return a function that starts a condition of the shim."""
 
     def make(laboratory: Laboratory) -> Iterator[None]:
@@ -337,12 +337,12 @@ def both_cores_busy(_: Laboratory) -> Iterator[None]:
 CONDITIONS: dict[str, Callable[[Laboratory], Iterator[None]]] = {
     "idle": nothing,
     "busy": both_cores_busy,
-    "memory exhausted": exhausted,
+    "memory exhausted": exhaust_memory,
     "no descriptors": no_descriptors,
-    "no threads": shimmed("no threads"),
-    "folder gone": folder_gone,
+    "no threads": with_shim("no threads"),
+    "folder gone": remove_folder,
     "disk full": disk_full,
-    "clock stepped": shimmed("clock stepped"),
+    "clock stepped": with_shim("clock stepped"),
 }
 LASTING = ("settling", "recording", "held")
 DEAD_STATES = tuple(each for each in STATES if each != "held")
@@ -356,7 +356,7 @@ def bound_s(cell: Cell, load: float) -> float:
     return max(within_s, LOADED_S) if load > 2 * (os.cpu_count() or 1) else within_s
 
 
-def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
+def measure_cell(laboratory: Laboratory, cell: Cell, after_s: float) -> CellResult:
     """Run one cell and return its result."""
     happen, _, _ = CAUSES[cell.cause]
     exits: dict[str, int | None] = {}
@@ -372,11 +372,11 @@ def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
         if cell.cause.startswith("stop "):
             exits["stop"] = code
         if cell.subject == "measure":
-            exits["measure"] = laboratory.ended()
-    return Found(cell, took_s, bound_s(cell, load), exits, load)
+            exits["measure"] = laboratory.exit_code()
+    return CellResult(cell, took_s, bound_s(cell, load), exits, load)
 
 
-def killed(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
+def kill_driver(laboratory: Laboratory, cell: Cell, after_s: float) -> CellResult:
     """Kill the driving process; with a dead man's switch, the drive must end by itself."""
     load = os.getloadavg()[0]
     laboratory.start(cell.subject)
@@ -384,7 +384,7 @@ def killed(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
     since_s = time.monotonic()
     os.kill(laboratory.engine.pid, signal.SIGKILL)
     took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
-    return Found(cell, took_s, DEAD_MAN_S + LATE_S, {}, load)
+    return CellResult(cell, took_s, DEAD_MAN_S + LATE_S, {}, load)
 
 
 def stop_cells() -> list[Cell]:
@@ -459,7 +459,7 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
     app.exec()
 
 
-def compiled_shim(folder: Path) -> Path | None:
+def compile_shim(folder: Path) -> Path | None:
     """Compile the shim; return None without a compiler."""
     compiler, shim = shutil.which("cc"), folder / "shim.so"
     if compiler is None:
@@ -468,7 +468,7 @@ def compiled_shim(folder: Path) -> Path | None:
     return shim
 
 
-def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
+def campaign(options: argparse.Namespace, folder: Path) -> Iterable[CellResult]:
     """Measure the cells of a shard that are not in the file yet."""
     number, count = (int(each) for each in options.shard.split("/"))
     chooser = random.Random(options.seed)
@@ -477,7 +477,7 @@ def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
     chooser.shuffle(cells)
     chosen = [(at, cell, chooser.uniform(0.0, 0.3)) for at, cell in enumerate(cells[: options.count])]
     done = {json.loads(line)["number"] for line in _lines(options.save)}
-    carry_out = killed if options.dead_man else measured
+    carry_out = kill_driver if options.dead_man else measure_cell
     for at, cell, after_s in chosen:
         if at % count != number - 1 or at in done:
             continue
@@ -514,12 +514,12 @@ def _lines(path: Path) -> list[str]:
     return path.read_text().splitlines() if path.exists() else []
 
 
-def summed(paths: list[Path]) -> bool:
+def print_totals(paths: list[Path]) -> bool:
     """Print how many stops were silent in time, and the worst of each cause; return whether all were."""
     found = [json.loads(line) for path in paths for line in _lines(path)]
     keys = ("took_s", "within_s", "exits", "load")
     for each in found:
-        each["complaint"] = Found(Cell(**each["cell"]), *(each[key] for key in keys)).complaint
+        each["complaint"] = CellResult(Cell(**each["cell"]), *(each[key] for key in keys)).complaint
     bad = [each for each in found if each["complaint"]]
     print(f"{len(found) - len(bad)} of {len(found)} stops: silent in time, with the right exit code")
     for key in ("cause", "condition", "state"):
@@ -550,11 +550,11 @@ def main() -> None:
     if options.drive:
         drive(*options.drive)
     if options.sum:
-        raise SystemExit(not summed(options.sum))
+        raise SystemExit(not print_totals(options.sum))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         os.environ |= {"VIBENCH_STATE_DIR": f"{name}/state", "VIBENCH_LOCK_DIR": name, "SHIM_FOLDER": name}
-        shim = compiled_shim(folder)
+        shim = compile_shim(folder)
         if shim is not None:
             os.environ["LD_PRELOAD"] = str(shim)
         else:

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vibench.sim import Accuracy, Branch, FrequencyPath, Harmonic, Specimen, integrate, load_specimen
-from vibench.sim.branches import MotionSearch, shot_branches
+from vibench.sim.branches import MotionSearch, shoot_branches
 
 AIM_DEG = {2: -135.0, 3: -90.0}
 BANDS_HZ = {2: (180.0, 260.0), 3: (270.0, 420.0)}
@@ -56,7 +56,7 @@ def stable_stretches(branch: Branch) -> Iterator[slice]:
 def describe(specimen: Specimen, level_m: float, periods: int, search: MotionSearch) -> Iterator[str]:
     """Yield one line for each stable part of the branches at a level."""
     path = FrequencyPath((level_m,))
-    for found in shot_branches(specimen, path, *BANDS_HZ[periods], search):
+    for found in shoot_branches(specimen, path, *BANDS_HZ[periods], search):
         if found.periods != periods:
             continue
         branch = found.branch

@@ -31,7 +31,7 @@ def resident_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def sustained(minutes: float, folder: Path) -> list[float]:
+def record_dwell(minutes: float, folder: Path) -> list[float]:
     """Record a dwell with impacts; return the memory at the end of each minute [MB]."""
     memory_mb: list[float] = []
 
@@ -53,7 +53,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
-        memory_mb = sustained(minutes, folder)
+        memory_mb = record_dwell(minutes, folder)
         wall_s, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s
         with open_recording(folder / "run.h5") as recording:
             signal_s, gaps = recording.duration_s, len(recording.gaps)

@@ -140,14 +140,14 @@ class Laboratory:
             knobs = self.virtual.rig.knobs
             sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=knobs)
             self.client.open(self.served, sheet)
-        self.until(lambda: self.client.status().state is EngineState.READY, "an open bench")
+        self.wait_until(lambda: self.client.status().state is EngineState.READY, "an open bench")
 
     def run_into(self, state: str) -> None:
         """Start a recording and wait for a state; repeat, because a check may fail on a busy computer."""
         for _ in range(ATTEMPTS):
             self._begin()
             first = "recording" if state in ("held", "ramping_down") else state
-            self.until(
+            self.wait_until(
                 lambda: self.has_ended() or (self.run_state() == first and self.is_loud()),  # noqa: B023
                 first,
             )
@@ -157,7 +157,7 @@ class Laboratory:
             self.client.stop(StopLevel.HOLD)
         elif state == "ramping_down":
             self.client.stop(StopLevel.RAMP)
-        self.until(lambda: self.run_state() == state, state)
+        self.wait_until(lambda: self.run_state() == state, state)
 
     def has_ended(self) -> bool:
         """Return whether the run has ended."""
@@ -182,7 +182,7 @@ class Laboratory:
         """Return whether the output was loud within the last 0.1 s."""
         return time.monotonic() - self.witness.last_loud_s < 0.1
 
-    def until(self, is_so: Callable[[], bool], what: str) -> None:
+    def wait_until(self, is_so: Callable[[], bool], what: str) -> None:
         """Wait for a condition; exit with an error if it takes too long."""
         give_up_s = time.monotonic() + PATIENCE_S
         while not is_so():
@@ -288,7 +288,7 @@ def connections(laboratory: Laboratory) -> Iterator[None]:
 
 
 @contextmanager
-def limited(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
+def limit_resource(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
     """Set a resource limit of the engine's process, and restore it at the end."""
     pid = laboratory.pid
     before = resource.prlimit(pid, what)
@@ -304,19 +304,19 @@ def limited(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
 def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
     """Prevent the engine from opening more files."""
     highest = max(int(each.name) for each in Path(f"/proc/{laboratory.pid}/fd").iterdir())
-    with limited(laboratory, resource.RLIMIT_NOFILE, highest + 1):
+    with limit_resource(laboratory, resource.RLIMIT_NOFILE, highest + 1):
         yield
 
 
 @contextmanager
 def disk_full(laboratory: Laboratory) -> Iterator[None]:
     """Make every write to a file fail."""
-    with limited(laboratory, resource.RLIMIT_FSIZE, 0):
+    with limit_resource(laboratory, resource.RLIMIT_FSIZE, 0):
         yield
 
 
 @contextmanager
-def stalled(laboratory: Laboratory) -> Iterator[None]:
+def stall_engine(laboratory: Laboratory) -> Iterator[None]:
     """Suspend the engine for a second, then continue it."""
     os.kill(laboratory.pid, signal.SIGSTOP)
     begun_s = time.monotonic()
@@ -330,14 +330,14 @@ def stalled(laboratory: Laboratory) -> Iterator[None]:
 CONDITIONS = {
     "idle": idle,
     "both cores busy": busy,
-    "stopped, continued": stalled,
+    "stopped, continued": stall_engine,
     "2,000 connections": connections,
     "no descriptors": no_descriptors,
     "disk full": disk_full,
 }
 
 
-def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> float:
+def measure_cell(laboratory: Laboratory, cause: str, state: str, condition: str) -> float:
     """Run one cell and return its time to silence [s]."""
     laboratory.ready()
     before = resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE)
@@ -345,7 +345,7 @@ def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> 
         stack.callback(laboratory.virtual.faults.heal)
         laboratory.run_into(state)
         if condition == "stopped, continued":
-            with stalled(laboratory):
+            with stall_engine(laboratory):
                 CAUSES[cause].happen(laboratory)
             since_s = time.monotonic()
         else:
@@ -356,7 +356,7 @@ def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> 
     with suppress(ProcessLookupError):
         resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE, before)
     if cause == "SIGTERM":
-        laboratory.until(lambda: laboratory.engine is None or not laboratory.engine.is_alive, "end")
+        laboratory.wait_until(lambda: laboratory.engine is None or not laboratory.engine.is_alive, "end")
     else:
         with suppress(EngineError):
             laboratory.client.close()
@@ -370,7 +370,7 @@ def table(laboratory: Laboratory, share: float, seed: int) -> bool:
     cells = cells[: max(1, round(share * len(cells)))]
     found: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for number, (cause, state, condition) in enumerate(cells, start=1):
-        took_s = measured(laboratory, cause, state, condition)
+        took_s = measure_cell(laboratory, cause, state, condition)
         found.setdefault((cause, condition), []).append((took_s, state))
         late = "  LATE" if took_s > CAUSES[cause].within_s else ""
         print(f"{number:3d} {cause:20s} {state:14s} {condition:20s} {took_s:6.3f} s{late}", flush=True)
@@ -383,7 +383,7 @@ def table(laboratory: Laboratory, share: float, seed: int) -> bool:
     return all(took_s <= CAUSES[cause].within_s for (cause, _), each in found.items() for took_s, _ in each)
 
 
-def tried(laboratory: Laboratory, tries: int, commands: int) -> bool:
+def try_conditions(laboratory: Laboratory, tries: int, commands: int) -> bool:
     """Count how often a living engine is not found under each condition; return whether it always was."""
     missed = 0
     for condition, make in CONDITIONS.items():
@@ -436,7 +436,7 @@ def main() -> None:
         laboratory = Laboratory(virtual, Path(folder))
         try:
             if options.tries or options.commands:
-                holds = tried(laboratory, options.tries, options.commands)
+                holds = try_conditions(laboratory, options.tries, options.commands)
             else:
                 holds = table(laboratory, options.cells, options.seed)
         finally:

@@ -39,7 +39,7 @@ def write_recording(folder, samples):
                 rng.standard_normal(min(BLOCK, samples - first)).tofile(file)
 
 
-def ours(folder, samples):
+def run_vibench(folder, samples):
     """Average all ten spectra and cross-spectra of four channels, block by block."""
     spectra = SegmentSpectra(CHANNELS, SEGMENT)
     for first in range(0, samples, BLOCK):
@@ -52,7 +52,7 @@ def ours(folder, samples):
     return spectra.averages().density(0, 1, RATE_HZ)
 
 
-def theirs(folder, _samples):
+def run_scipy(folder, _samples):
     """Average the same ten spectra with scipy, on the whole arrays in memory."""
     record = [np.fromfile(channel_file(folder, channel), np.float64) for channel in range(CHANNELS)]
     settings = {"fs": RATE_HZ, "nperseg": SEGMENT, "detrend": False}
@@ -65,7 +65,7 @@ def theirs(folder, _samples):
     return result
 
 
-def measured(contestant, folder, samples, pipe):
+def run_program(contestant, folder, samples, pipe):
     """Run one program and send its time, peak memory and result."""
     idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     begin = time.perf_counter()
@@ -79,7 +79,7 @@ def run(contestant, folder, samples):
     """Run one program in a new process and return what it sends."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=measured, args=(contestant, folder, samples, sender))
+    process = context.Process(target=run_program, args=(contestant, folder, samples, sender))
     process.start()
     answer = receiver.recv()
     process.join()
@@ -93,8 +93,8 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_recording(folder, samples)
-        our_s, our_mb, our_result = run(ours, folder, samples)
-        their_s, their_mb, their_result = run(theirs, folder, samples)
+        our_s, our_mb, our_result = run(run_vibench, folder, samples)
+        their_s, their_mb, their_result = run(run_scipy, folder, samples)
     difference = np.max(np.abs(our_result / their_result - 1))
     print(f"{minutes:g} minutes of {CHANNELS} channels, segments of {SEGMENT}, all spectra and cross-spectra")
     print(f"vibench: {our_s:6.2f} s, {our_mb:7.0f} MB above the idle process")

@@ -40,7 +40,7 @@ BINS = 5
 
 
 @dataclass(frozen=True)
-class Compared:
+class Comparison:
     """Comparison of one quantity of one measurement with its draws."""
 
     scene: str
@@ -54,14 +54,14 @@ class Compared:
     draws: int
 
 
-def compared(
+def compare(
     rig: Rig,
     excitation: Dwell | WhiteNoise | SineSweep,
     scene: str,
     specimen: Specimen | None = None,
     draws: int = DRAWS,
     curves: dict[str, list[np.ndarray]] | None = None,
-) -> Iterator[Compared]:
+) -> Iterator[Comparison]:
     """Measure, simulate and compare; all draws of a quantity are added to ``curves``."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
@@ -73,7 +73,7 @@ def compared(
         if curves is not None and len(each.draws) == draws:
             curves.setdefault(each.name, []).append(each.draws)
         rank = int(each.rank[0]) if each.compared == 1 else None
-        yield Compared(
+        yield Comparison(
             f"{scene}, {simulation.run.impact_rate_hz:.0f} impacts/s",
             each.name,
             each.compared,
@@ -85,16 +85,16 @@ def compared(
         )
 
 
-def seeded(rig: Rig, seed: int) -> Rig:
+def with_seed(rig: Rig, seed: int) -> Rig:
     """Return the same rig with another noise seed."""
     return rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"seed": seed})})
 
 
-def same_dwell(first_seed: int, seeds: int) -> Iterator[Compared]:
+def same_dwell(first_seed: int, seeds: int) -> Iterator[Comparison]:
     """Yield the comparisons of one chaotic dwell, repeated with other noise."""
     plan = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.5, duration_s=4.0)
     for seed in range(first_seed, first_seed + seeds):
-        yield from compared(seeded(RIG, seed), plan, f"seed {seed}")
+        yield from compare(with_seed(RIG, seed), plan, f"seed {seed}")
 
 
 def random_rig(rng: np.random.Generator) -> tuple[Rig, str]:
@@ -115,11 +115,11 @@ def random_rig(rng: np.random.Generator) -> tuple[Rig, str]:
         "amplitude_limit_m": document["specimen"]["amplitude_limit_m"],
     }
     document["shaker"] = shaker.model_dump(mode="json")
-    rig = seeded(Rig.model_validate(document), int(rng.integers(1, 1 << 30)))
+    rig = with_seed(Rig.model_validate(document), int(rng.integers(1, 1 << 30)))
     return rig, f"gap {1e6 * gap_m:.0f} um, damping {1e6 * damping_s:.0f} us"
 
 
-def random_scenes(count: int, seed: int) -> Iterator[Compared]:
+def random_scenes(count: int, seed: int) -> Iterator[Comparison]:
     """Measure a dwell and noise on each of ``count`` random rigs."""
     rng = np.random.default_rng(seed)
     for number in range(count):
@@ -138,8 +138,8 @@ def random_scenes(count: int, seed: int) -> Iterator[Compared]:
             seed=int(rng.integers(1, 1 << 30)),
         )
         scene = f"rig {number}: {words}, {level_vpp:.2g} Vpp"
-        yield from compared(rig, dwell, f"{scene}, dwell {frequency_hz:g} Hz")
-        yield from compared(rig, noise, f"{scene}, noise")
+        yield from compare(rig, dwell, f"{scene}, dwell {frequency_hz:g} Hz")
+        yield from compare(rig, noise, f"{scene}, noise")
 
 
 def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSweep]:
@@ -150,19 +150,19 @@ def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSwee
     )
 
 
-def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> Iterator[Compared]:
+def true_sweeps(count: int, seed: int, curves: dict[str, list[np.ndarray]]) -> Iterator[Comparison]:
     """Measure sweeps of the shipped rig and of random rigs in turn."""
     for number in range(seed, seed + count):
         rng = np.random.default_rng(number)
-        rig, words = (seeded(RIG, number), "shipped rig") if number % 2 else random_rig(rng)
+        rig, words = (with_seed(RIG, number), "shipped rig") if number % 2 else random_rig(rng)
         start_hz = float(np.round(rng.uniform(180, 320)))
         rig, plan = sweep_of(rig, 1.5 if number % 2 else float(10 ** rng.uniform(-0.2, 0.6)), start_hz)
-        yield from compared(
+        yield from compare(
             rig, plan, f"rig {number}: {words}, sweep from {start_hz:g} Hz", None, DRAWS_OF_SWEEPS, curves
         )
 
 
-def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
+def wrong_sweeps(count: int, seed: int) -> Iterator[Comparison]:
     """Compare sweeps with simulated specimens whose parameters are wrong by a few times a fit's bounds."""
     true = gong2025()
     m0, m1, m2 = true.masses
@@ -173,9 +173,9 @@ def wrong_sweeps(count: int, seed: int) -> Iterator[Compared]:
         "m1 + 2 %": replace(true, masses=(m0, 1.02 * m1, m2)),
     }
     for number in range(seed, seed + count):
-        rig, plan = sweep_of(seeded(RIG, number), 1.5, 255.0)
+        rig, plan = sweep_of(with_seed(RIG, number), 1.5, 255.0)
         for words, specimen in wrong.items():
-            yield from compared(rig, plan, f"seed {number}, {words}", specimen, 16)
+            yield from compare(rig, plan, f"seed {number}, {words}", specimen, 16)
 
 
 def false_alarms(
@@ -201,7 +201,7 @@ def false_alarms(
     return found
 
 
-def stopped_early(trials: int, seed: int) -> Iterator[dict[str, object]]:
+def compare_early_stop(trials: int, seed: int) -> Iterator[dict[str, object]]:
     """Compare verdicts of 16 draws with those of an early stop at clear agreement, on synthetic values."""
     rng = np.random.default_rng(seed)
     tails = {
@@ -231,7 +231,7 @@ def stopped_early(trials: int, seed: int) -> Iterator[dict[str, object]]:
         }
 
 
-def summary(found: list[Compared]) -> dict[str, object]:
+def summary(found: list[Comparison]) -> dict[str, object]:
     """Return the number of quantities outside their limits, and a test of the ranks."""
     with_values = [each for each in found if each.compared]
     outside = sum(each.outside > 0 for each in with_values)
@@ -274,7 +274,7 @@ def main() -> None:
                 f"(limit {each.limit_z:.1f}{place}): {verdict}"
             )
             print(text, file=sys.stderr if asked.json else sys.stdout, flush=True)
-    for each in stopped_early(asked.stop, asked.seed) if asked.stop else ():
+    for each in compare_early_stop(asked.stop, asked.seed) if asked.stop else ():
         print(json.dumps(each), file=sys.stderr, flush=True)
     if asked.json:
         print(json.dumps({"summary": summary(found), "compared": [asdict(each) for each in found]}))

@@ -41,12 +41,12 @@ from vibench.acquisition.plan import (
     WhiteNoise,
 )
 from vibench.acquisition.rig import Rig, load_rig, specimen_of
-from vibench.analysis import AnalysisError, Expected, budgets_of, expected_uncertainty
+from vibench.analysis import AnalysisError, ExpectedResult, budgets_of, expected_uncertainty
 from vibench.analysis.frequency_response.resonance import resonances
 from vibench.analysis.frequency_response.transmissibility import transmissibility
 from vibench.analysis.kinds.analysis_kind import AnyResult
 from vibench.analysis.recordings.facts import recording_facts
-from vibench.analysis.results.growing_bounds import bound_of, bounds_of, result_so_far
+from vibench.analysis.results.growing_bounds import bounds_of, random_bound, result_so_far
 from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.uncertainty.budget import COVERAGE, RESULT_PATTERNS, WIDENING
 from vibench.analysis.uncertainty.expected import end_s, needed_s
@@ -67,7 +67,7 @@ FARTHEST_HZ = 5.0
 
 
 @dataclass(frozen=True)
-class Ended:
+class EndedQuantity:
     """One quantity of one recording that ended when one requested uncertainty was reached."""
 
     scene: int
@@ -98,7 +98,7 @@ def looks_s(first_s: float, longest_s: float, piece_s: float) -> list[float]:
     return found
 
 
-def drawn(number: int, seed: int) -> tuple[str, Rig, Measurement]:
+def draw_plan(number: int, seed: int) -> tuple[str, Rig, Measurement]:
     """Return a kind, a random rig with noisier sensors, and a plan."""
     rng = np.random.default_rng((seed, number))
     kind = KINDS[number % len(KINDS)]
@@ -145,13 +145,13 @@ def record(rig: Rig, plan: Measurement, path: Path) -> None:
         raise SystemExit(outcome.reason)
 
 
-def scene(number: int, seed: int) -> Iterator[Ended]:
+def scene(number: int, seed: int) -> Iterator[EndedQuantity]:
     """Record once, and end this recording at several requested uncertainties."""
-    kind, rig, plan = drawn(number, seed)
+    kind, rig, plan = draw_plan(number, seed)
     is_noise = kind == "noise"
     first_s, piece_s = (FEWEST_REALISATIONS * 1.0, 1.0) if is_noise else (plan.until.shortest_s, PIECE_S)
     expected = expected_uncertainty(plan, rig)
-    asked = [(name, wish) for name in WISHES[kind] for wish in wishes(expected, name, first_s)]
+    asked = [(name, wish) for name in WISHES[kind] for wish in predictions(expected, name, first_s)]
     ends: dict[tuple[str, float], tuple[float, AnyResult]] = {}
     last: AnyResult | None = None
     with TemporaryDirectory() as folder:
@@ -178,9 +178,9 @@ def scene(number: int, seed: int) -> Iterator[Ended]:
         expected_s = None if need_s is None else end_s(need_s, first_s, LONGEST_S)
         stopped_s, result = ends.get((name, wish), (LONGEST_S, last))
         for budget in () if result is None else budgets_of(result):
-            bound, key = bound_of(budget), budget.quantity.split(" Hz")[0]
+            bound, key = random_bound(budget), budget.quantity.split(" Hz")[0]
             if bound and re.search(RESULT_PATTERNS[name], budget.quantity):
-                yield Ended(
+                yield EndedQuantity(
                     scene=number,
                     kind=kind,
                     quantity=name,
@@ -196,7 +196,7 @@ def scene(number: int, seed: int) -> Iterator[Ended]:
                 )
 
 
-def wishes(expected: tuple[Expected, ...], name: str, first_s: float) -> Iterator[float]:
+def predictions(expected: tuple[ExpectedResult, ...], name: str, first_s: float) -> Iterator[float]:
     """Yield the uncertainties that are predicted for several times from the description of the rig."""
     mine = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
     scatter = max((each.scatter or 0.0 for each in mine), default=0.0)
@@ -205,7 +205,7 @@ def wishes(expected: tuple[Expected, ...], name: str, first_s: float) -> Iterato
         yield min(COVERAGE * WIDENING * scatter * float(np.sqrt(mine[0].time_s / time_s)), 0.9)
 
 
-def table(found: list[Ended]) -> Iterator[str]:
+def table(found: list[EndedQuantity]) -> Iterator[str]:
     """Yield the table: coverage with and without widening, time saved, quality of predictions."""
     chaos = {each.scene: each.whole for each in found if each.kind == "chaos"}
     rows, times, ratios = defaultdict(list), defaultdict(dict), defaultdict(dict)
@@ -243,7 +243,7 @@ def table(found: list[Ended]) -> Iterator[str]:
         )
 
 
-def saving(found: list[Ended], row: tuple[str, str]) -> float:
+def saving(found: list[EndedQuantity], row: tuple[str, str]) -> float:
     """Return the share of time saved against a fixed plan that suffices for 95 % of similar requests.
 
     Requests are similar if they are predicted to take the same time. The time that they really need depends
@@ -315,11 +315,11 @@ def synthetic_results(kind: str, record: np.ndarray, time_s: float) -> dict[str,
     return {}
 
 
-def synthetic(number: int, seed: int) -> Iterator[Ended]:
+def synthetic(number: int, seed: int) -> Iterator[EndedQuantity]:
     """End one synthetic record at uncertainties that other records of its kind reach after random times."""
     kind = tuple(SYNTHETIC)[number % len(SYNTHETIC)]
     first_s = 8.0 if kind == "streamed noise" else 2.0
-    scatter = promised(kind)
+    scatter = rms_uncertainties(kind)
     rng = np.random.default_rng((seed, number))
     record = synthetic_record(kind, rng)
     looks = looks_s(first_s, LONGEST_S, PIECE_S)
@@ -335,7 +335,7 @@ def synthetic(number: int, seed: int) -> Iterator[Ended]:
             value, sd = told[time_s].get(name, (np.nan, np.inf))
             if factor * sd <= wish:
                 break
-        yield Ended(
+        yield EndedQuantity(
             scene=number, kind=kind, quantity=name, wish=wish, is_reached=bool(factor * sd <= wish),
             stopped_s=time_s, longest_s=LONGEST_S, expected_s=end_s(promise_s, first_s, LONGEST_S),
             value=float(value), bound=float(factor * sd), whole=float(value), true=true[name],
@@ -349,7 +349,7 @@ def shown_peak() -> float:
 
 
 @cache
-def promised(kind: str) -> dict[str, float]:
+def rms_uncertainties(kind: str) -> dict[str, float]:
     """Return the rms standard uncertainty of eight other whole records, by result."""
     found = defaultdict(list)
     for number in range(8):
@@ -400,7 +400,7 @@ def main() -> None:
         return
     files = asked.add or ([asked.save] if asked.save is not None and asked.save.exists() else [])
     lines = [json.loads(line) for path in files for line in path.read_text("utf-8").splitlines()]
-    found = [Ended(**each) for line in lines for each in line["ends"]]
+    found = [EndedQuantity(**each) for line in lines for each in line["ends"]]
     if asked.add is None:
         part, of = (int(each) for each in asked.shard.split("/"))
         done = {line["scene"] for line in lines}

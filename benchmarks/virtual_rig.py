@@ -55,7 +55,7 @@ def world_speed(rig: Rig, amplitude_vpp: float) -> tuple[float, float]:
     sampler = world.sample(inputs, RATE_HZ)
     sampler.read(RATE_HZ)  # loads all code, and lets the motion settle
     before = world.plant.impacts
-    best = min(timed(lambda: sampler.read(BLOCK)) for _ in range(REPEATS))
+    best = min(clock(lambda: sampler.read(BLOCK)) for _ in range(REPEATS))
     return SECONDS / best, (world.plant.impacts - before) / (REPEATS * SECONDS)
 
 
@@ -78,7 +78,7 @@ def whole_chain_speed(rig: Rig, amplitude_vpp: float) -> float:
         reader.verify_array_shape = False
         block = np.empty((4, BLOCK))
         reader.read_many_sample(block, BLOCK)
-        return SECONDS / min(timed(lambda: reader.read_many_sample(block, BLOCK)) for _ in range(REPEATS))
+        return SECONDS / min(clock(lambda: reader.read_many_sample(block, BLOCK)) for _ in range(REPEATS))
 
 
 def sine(amplitude_vpp: float) -> tuple[str, ...]:
@@ -86,7 +86,7 @@ def sine(amplitude_vpp: float) -> tuple[str, ...]:
     return ("OUTP1:IMP INF", "FUNC SIN", "FREQ 260", f"VOLT {amplitude_vpp}VPP", "OUTP1:STAT ON")
 
 
-def timed(read: Callable[[], object]) -> float:
+def clock(read: Callable[[], object]) -> float:
     """Return the time to read ``SECONDS`` of rig time, block by block [s]."""
     begun = time.perf_counter()
     for _ in range(SECONDS * RATE_HZ // BLOCK):

@@ -120,7 +120,7 @@ def main() -> None:
     asked = parser.parse_args().walks
     if "predict" in asked:
         found = amplitude_to_engine()
-        tell("amplitude to engine", found)
+        print_path("amplitude to engine", found)
         own = set(found.loaded) - files_of_a_start()
         print(f"  files loaded: {len(found.loaded)}, {len(own)} of them by the command itself")
     if {"measure", "analyse"} & {*asked}:
@@ -128,19 +128,19 @@ def main() -> None:
             campaign, out = Path(folder) / "walk.toml", Path(folder) / "out"
             campaign.write_text(CAMPAIGN)
             words = ("measure", str(campaign), "--out", str(out))
-            tell(
+            print_path(
                 "samples to file",
                 walk(":run_campaign", "recording/_writer.py:RecordingWriter.append", *words),
             )
             if "analyse" in asked:
                 analysed = ("analyse", str(out / "sweep.h5"), "--out", str(Path(folder) / "report"))
-                tell(
+                print_path(
                     "recording through analyse",
                     walk(":analyse", "measurement_analysis.py:analyse", *analysed),
                 )
 
 
-def tell(what: str, found: Walk) -> None:
+def print_path(what: str, found: Walk) -> None:
     """Print one path."""
     print(f"{what}: {len(found.frames)} frames; {len(found.files)} files in {len(found.folders)} folders")
     for frame in found.frames:

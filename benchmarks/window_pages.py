@@ -59,11 +59,11 @@ def files(context: AppContext, path: Path) -> None:
         begun = time.monotonic()
         page.time_histories.show_recording(None)
         page.open_path(path)
-        until(lambda: bool(page.time_histories.plots))
+        wait_until(lambda: bool(page.time_histories.plots))
         print(
             f"{f'Files: {number} recording, click to picture':<44} {time.monotonic() - begun:.2f} s of clock"
         )
-        until(lambda monitor=monitor: monitor.rounds > LOOKS)
+        wait_until(lambda monitor=monitor: monitor.rounds > LOOKS)
         print(f"{'Files: longest piece of that':<44} {1e3 * monitor.busiest_s:.0f} ms")
         monitor.stop()
     rng = np.random.default_rng(1)
@@ -74,7 +74,7 @@ def files(context: AppContext, path: Path) -> None:
     page.close()
 
 
-def until(is_so: Callable[[], bool]) -> None:
+def wait_until(is_so: Callable[[], bool]) -> None:
     """Run the event loop until a condition is true."""
     loop = QEventLoop()
     timer = QTimer(interval=5)

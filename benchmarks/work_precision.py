@@ -69,14 +69,14 @@ def main():
     for motion in MOTIONS:
         if motion.regime is Regime.FREE:
             continue
-        works = measured(motion)
+        works = run_solvers(motion)
         curves[motion.name] = works
         print(*table_of({motion.name: works}), sep="\n", flush=True)
     if arguments.markdown:
         write_section(arguments.markdown, curves)
 
 
-def measured(motion):
+def run_solvers(motion):
     """Run every solver on a motion at every tolerance."""
     span_s = CHAOTIC_S if motion.regime is Regime.CHAOTIC else PERIODIC_S
     span_s = round(span_s * motion.frequency_hz) / motion.frequency_hz
@@ -139,7 +139,7 @@ OURS = "vibench"
 
 def solvers_of(motion):
     """Yield every solver for a motion."""
-    yield solver_of(OURS, lambda tolerance, start, span_s: ours(motion, tolerance, start, span_s))
+    yield solver_of(OURS, lambda tolerance, start, span_s: run_vibench(motion, tolerance, start, span_s))
     for method in ("DOP853", "LSODA"):
         yield solver_of(f"scipy {method}", lambda *run, m=method: with_scipy(motion, m, *run), SLOW_COST_S)
     if importlib.util.find_spec("numbalsoda"):
@@ -156,7 +156,7 @@ def solvers_of(motion):
             )
 
 
-def ours(motion, tolerance, start, span_s):
+def run_vibench(motion, tolerance, start, span_s):
     """Prepare a run of this engine; return the job."""
     run = FollowedRun(motion.specimen, motion.drive, tolerance, start)
 

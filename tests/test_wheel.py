@@ -157,7 +157,7 @@ def test_a_shipped_campaign_is_measured_and_analysed_from_the_wheel(python, user
     assert list((users_folder / "analysed").rglob("*.html"))
 
 
-def lowest_allowed():
+def lowest_versions():
     """Yield each requirement at the lowest version that pyproject.toml allows."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
@@ -177,7 +177,7 @@ def test_vibench_works_with_the_lowest_allowed_version_of_every_required_library
 ):
     """docs/decisions/0005-dependencies.md gives the reason for each lower bound."""
     python = empty_environment(tmp_path / "lowest")
-    pip("--python", python, "install", "--prefer-binary", wheel, *lowest_allowed())
+    pip("--python", python, "install", "--prefer-binary", wheel, *lowest_versions())
     run(python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen")
     assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
     arguments = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")

@@ -63,24 +63,24 @@ def write_stop_file(stop: str, reason: str) -> None:
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
     """Return the result of a stop request, after waiting until the program has obeyed or failed to obey."""
-    written_ns, give_up_s = _changed_ns(stop) or 0, time.monotonic() + TAKEN_S
-    while _changed_ns(stop) is not None:
+    written_ns, give_up_s = _modified_ns(stop) or 0, time.monotonic() + TAKEN_S
+    while _modified_ns(stop) is not None:
         if time.monotonic() > give_up_s:
             return Fate.NOT_TAKEN
         time.sleep(LOOK_S)
     taken, silent, seen_ns = answer_path(stop, "taken"), answer_path(stop, "silent"), 0
     give_up_s = time.monotonic() + HEEDED_S
     # An older confirmation belongs to an earlier stop.
-    while (_changed_ns(silent) or -1) < written_ns:
-        if (changed_ns := _changed_ns(taken) or seen_ns) != seen_ns:
+    while (_modified_ns(silent) or -1) < written_ns:
+        if (changed_ns := _modified_ns(taken) or seen_ns) != seen_ns:
             seen_ns, give_up_s = changed_ns, time.monotonic() + HEEDED_S
         if time.monotonic() > give_up_s or not is_alive():
-            return Fate.SILENT if (_changed_ns(silent) or -1) >= written_ns else Fate.UNCONFIRMED
+            return Fate.SILENT if (_modified_ns(silent) or -1) >= written_ns else Fate.UNCONFIRMED
         time.sleep(LOOK_S)
     return Fate.SILENT
 
 
-def _changed_ns(path: str) -> int | None:
+def _modified_ns(path: str) -> int | None:
     try:
         return os.stat(path).st_mtime_ns  # noqa: PTH116 - as above
     except FileNotFoundError:

@@ -88,7 +88,7 @@ def continuous_strong(r: Reading) -> Values:
 )
 def balance_weak(r: Reading) -> Values:
     """At 1 µm the analytical solution of n = 5 agrees with integration."""
-    return _agreeing(r, WEAK_M)
+    return _agreement(r, WEAK_M)
 
 
 @costly_claim(
@@ -99,7 +99,7 @@ def balance_weak(r: Reading) -> Values:
 )
 def balance_strong(r: Reading) -> Values:
     """At 50 µm the analytical solution of n = 5 predicts the main behaviour of Response I."""
-    return _agreeing(r, STRONG_M)
+    return _agreement(r, STRONG_M)
 
 
 def _solutions(r: Reading, amplitude_m: float) -> list[Reals]:
@@ -115,14 +115,14 @@ def _solutions(r: Reading, amplitude_m: float) -> list[Reals]:
             for each in states
         ]
 
-    return r.evidence.remembered(("balance", specimen, r.case.frequencies_hz, amplitude_m), solve)
+    return r.evidence.compute_once(("balance", specimen, r.case.frequencies_hz, amplitude_m), solve)
 
 
 def _lowest(r: Reading, amplitude_m: float) -> Reals:
     return np.array([np.min(each) if each.size else np.nan for each in _solutions(r, amplitude_m)])
 
 
-def _agreeing(r: Reading, amplitude_m: float) -> Values:
+def _agreement(r: Reading, amplitude_m: float) -> Values:
     """Return the share of frequencies at which a first-order solution is within 10 % of each response."""
     curve, solutions = r.level(amplitude_m, CONTINUOUS), _solutions(r, amplitude_m)
     return tuple(

@@ -77,19 +77,19 @@ class Case(FigureOptions):
         except ValueError as error:
             raise InvalidRequest(f"the sum cannot be {self.sum_model}: {error}") from error
 
-    def fitted(self, model: str) -> str:
+    def model_name(self, model: str) -> str:
         """Return a model's name, with the indentation of the fit if this case changes it."""
         return model if self.fit_m == FIT_M or not model.startswith("power:") else f"{model}:{self.fit_m:g}"
 
     def specimen(self, contact: str = "hertz") -> Specimen:
         """Return the paper's specimen with the options of this case."""
-        return super().specimen(self.fitted(contact))
+        return super().specimen(self.model_name(contact))
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
         """Return a study with the initial state of this case."""
         if self.draw:
             replaced["starts"] = (GivenStart(label=f"draw {self.draw}", state=self.start),)
-        return super().study(tuple(map(self.fitted, models)), amplitudes_m, **replaced)
+        return super().study(tuple(map(self.model_name, models)), amplitudes_m, **replaced)
 
     @property
     def start(self) -> tuple[float, float, float, float, float, float]:

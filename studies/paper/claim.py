@@ -34,14 +34,14 @@ class Expectation:
     def sentence(self) -> str:
         """The bounds in words."""
         if math.isinf(self.high):
-            return f"≥ {self.shown(self.low)}"
+            return f"≥ {self.number_text(self.low)}"
         if math.isinf(self.low):
-            return f"≤ {self.shown(self.high)}"
+            return f"≤ {self.number_text(self.high)}"
         if self.low == self.high:
-            return self.shown(self.low)
-        return f"{self.shown(self.low, '')} to {self.shown(self.high)}"
+            return self.number_text(self.low)
+        return f"{self.number_text(self.low, '')} to {self.number_text(self.high)}"
 
-    def shown(self, value: float, unit: str | None = None) -> str:
+    def number_text(self, value: float, unit: str | None = None) -> str:
         """Return a number with its unit."""
         if not np.isfinite(value):
             return "none"
@@ -81,7 +81,7 @@ class Claim:
     says: str
     measured_by: str
     """Method of measurement, in one sentence."""
-    wanted: tuple[Expectation, ...]
+    limits: tuple[Expectation, ...]
     """Requirements; the claim holds if all of them are met."""
     measure: Callable[[Reading], Values]
     tried: tuple[Alternative, ...]
@@ -95,7 +95,7 @@ class Claim:
 
     def is_met_by(self, values: Values) -> bool:
         """Return whether every number lies within its bounds; NaN does not."""
-        return all(each.low <= value <= each.high for each, value in zip(self.wanted, values, strict=True))
+        return all(each.low <= value <= each.high for each, value in zip(self.limits, values, strict=True))
 
 
 Measure = Callable[[Reading], Values]
@@ -112,11 +112,11 @@ def claim(
 ) -> Callable[[Measure], Claim]:
     """Return a decorator for a measuring function; its docstring is the paper's statement."""
 
-    def made(measure: Measure) -> Claim:
+    def make_claim(measure: Measure) -> Claim:
         key, says = measure.__name__.replace("_", "-"), " ".join((measure.__doc__ or "").split())
         return Claim(key, place, says, measured_by, wanted, measure, tried, remark, draws, is_scored)
 
-    return made
+    return make_claim
 
 
 costly_claim = partial(claim, tried=(), is_scored=False)
@@ -139,7 +139,7 @@ class Finding:
 
     case: Case
     draws: tuple[tuple[float, ...], ...]
-    met: int
+    met_draws: int
     """Number of initial states for which the claim holds."""
 
     @property
@@ -150,12 +150,12 @@ class Finding:
     @property
     def is_met(self) -> bool:
         """Whether the claim holds for every initial state."""
-        return self.met == len(self.draws)
+        return self.met_draws == len(self.draws)
 
     @property
     def is_met_in_part(self) -> bool:
         """Whether the claim holds for some initial states, but not for all."""
-        return 0 < self.met < len(self.draws)
+        return 0 < self.met_draws < len(self.draws)
 
     def spread(self, number: int) -> tuple[float, float]:
         """Return smallest and largest value of one number over the initial states; NaN if one is missing."""
@@ -177,10 +177,10 @@ class Judgement:
             return Verdict.HOLDS
         if self.findings[0].is_met_in_part:
             return Verdict.HOLDS_FOR_SHARE
-        return Verdict.FAILS if self.met_under is None else Verdict.HOLDS_UNDER
+        return Verdict.FAILS if self.first_met is None else Verdict.HOLDS_UNDER
 
     @property
-    def met_under(self) -> Finding | None:
+    def first_met(self) -> Finding | None:
         """The first finding for which the claim holds."""
         return next((each for each in self.findings if each.is_met), None)
 
@@ -199,9 +199,9 @@ def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
 
 def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
     values = tuple(float(each) for each in claim.measure(Reading(evidence, case)))
-    if len(values) != len(claim.wanted):
+    if len(values) != len(claim.limits):
         raise InvalidRequest(
-            f"the claim {claim.key!r} requires {len(claim.wanted)} numbers, but {len(values)} were measured; "
+            f"the claim {claim.key!r} requires {len(claim.limits)} numbers, but {len(values)} were measured; "
             "measure one for each requirement"
         )
     return values

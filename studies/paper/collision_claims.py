@@ -146,7 +146,7 @@ def sweep(r: Reading) -> Values:
         return first, last
 
     swept_as = (case.sweep_amplitude_m, case.sweep_falls, case.sweep_goes)
-    return r.evidence.remembered(("sweep", swept_as, specimen, case.accuracy, case.start), run)
+    return r.evidence.compute_once(("sweep", swept_as, specimen, case.accuracy, case.start), run)
 
 
 def sweep_of(case: Case) -> tuple[LinearSweep, LinearSweep | Sampled]:

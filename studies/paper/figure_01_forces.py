@@ -27,7 +27,7 @@ def draw(options: FigureOptions) -> report.DrawnFigure:
         model: spring_of(gong2025(options.damping_time_s, options.gap_m, model)).force(p, np.zeros_like(p))
         for model in ("hertz", *_MODELS)
     }
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(3.4)
         axes = figure.subplots()
         axes.plot(1e6 * p, forces["hertz"], color=report.MEASURED, linewidth=1.8, label="Hertz stops")

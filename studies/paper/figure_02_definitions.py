@@ -20,7 +20,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     """Draw signal, spectrum and response curves at 5 um."""
     curve, specimen = responses(results), options.specimen()
     signal = time_signal(specimen, Harmonic(_SHOWN_HZ, _AMPLITUDE_M), options)
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(5.4)
         grid = figure.add_gridspec(2, 2)
         outline, spectrum = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])

@@ -46,7 +46,7 @@ def four_levels(
 ) -> report.DrawnFigure:
     """Draw Responses I and II at each amplitude in one panel; ``background`` draws behind them."""
     tables: list[report.Table] = []
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(6.6)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
         for number, (axes, amplitude_m) in enumerate(zip(panels.ravel(), AMPLITUDES_M, strict=True), 1):

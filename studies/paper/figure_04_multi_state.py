@@ -24,7 +24,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     specimen = options.specimen()
     signal = time_signal(specimen, Harmonic(_SHOWN_HZ, _AMPLITUDE_M), options)
     f = curve.frequency_hz
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(7.6)
         grid = figure.add_gridspec(4, 2)
         first, relative, exponent = (figure.add_subplot(grid[row, :]) for row in range(3))

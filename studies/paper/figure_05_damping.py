@@ -31,7 +31,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     undamped = responses(results, damping_time=0.0, amplitude=_LOW_M)
     higher = responses(results, damping_time=options.damping_time_s, amplitude=_HIGH_M)
     rows = ({"with damping": damped, "without damping": undamped}, {"A0 = 5 µm": damped, "A0 = 7 µm": higher})
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(6.2)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
         for row, curves in zip(panels, rows, strict=True):

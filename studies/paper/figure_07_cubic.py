@@ -24,7 +24,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     """Draw both models at four amplitudes; similar frequencies are shaded, rates are in the titles."""
     columns: dict[str, Reals] = {"frequency_hz": np.asarray(results.study.frequencies_hz)}
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(8.6)
         panels = figure.subplots(4, 2, sharex=True, sharey=True)
         for number, (row, amplitude_m) in enumerate(zip(panels, AMPLITUDES_M, strict=True), 1):

@@ -36,12 +36,12 @@ def draw(options: FigureOptions, levels: StudyResults, models: StudyResults) -> 
         for model in (_PIECE_WISE, _CONTINUOUS)
     )
     by_model = {model: responses(models, model=model).exponent_per_s for model in _MODELS}
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(8.0)
         (first, second), (apart, kinds), (outlines, spectra) = figure.subplots(3, 2)
-        _draw_exponents(first, f, _at(stops), "piece-wise")
-        _draw_exponents(second, f, _at(continuous), "continuous, n = 5")
-        _draw_exponents(apart, f, _at({a: stops[a] - continuous[a] for a in stops}), "their difference")
+        _draw_exponents(first, f, _by_level(stops), "piece-wise")
+        _draw_exponents(second, f, _by_level(continuous), "continuous, n = 5")
+        _draw_exponents(apart, f, _by_level({a: stops[a] - continuous[a] for a in stops}), "their difference")
         labelled = {_label(model): values for model, values in by_model.items()}
         _draw_exponents(kinds, f, labelled, f"models at {1e6 * _MODERATE_M:g} µm")
         kinds.legend(fontsize=7)
@@ -66,7 +66,7 @@ def draw(options: FigureOptions, levels: StudyResults, models: StudyResults) -> 
     )
 
 
-def _at(curves: dict[float, Reals]) -> dict[str, Reals]:
+def _by_level(curves: dict[float, Reals]) -> dict[str, Reals]:
     return {f"A0 = {1e6 * amplitude_m:g} µm": values for amplitude_m, values in curves.items()}
 
 

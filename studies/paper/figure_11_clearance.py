@@ -20,7 +20,7 @@ def draw(options: FigureOptions, *results: StudyResults) -> report.DrawnFigure:
     curves = {gap_m: responses(each) for gap_m, each in zip(GAPS_M, results, strict=True)}
     f = curves[GAPS_M[0]].frequency_hz
     columns = {"frequency_hz": f}
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(4.6)
         panels = figure.subplots(2, 1, sharex=True)
         for axes, what, label in zip(

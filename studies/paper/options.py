@@ -85,7 +85,7 @@ class FigureOptions:
         """Return the study of models at amplitudes under these options; other fields may be replaced."""
         chosen: dict[str, Any] = {
             "gaps_m": (self.gap_m,),
-            "specimen": self._described,
+            "specimen": self._specimen_table,
             "damping_times_s": (self.damping_time_s,) if self.damping_ratio is None else None,
             "frequencies_hz": self.frequencies_hz,
             "accuracy": self.accuracy,
@@ -98,7 +98,7 @@ class FigureOptions:
     def specimen(self, contact: str = "hertz") -> Specimen:
         """Return the paper's specimen under these options."""
         damping_time_s = self.damping_time_s if self.damping_ratio is None else None
-        return self._described.specimen(contact, damping_time_s, self.gap_m)
+        return self._specimen_table.specimen(contact, damping_time_s, self.gap_m)
 
     @property
     def only_damping_time_s(self) -> float:
@@ -111,7 +111,7 @@ class FigureOptions:
         return self.damping_time_s
 
     @property
-    def _described(self) -> SpecimenTable:
+    def _specimen_table(self) -> SpecimenTable:
         if self.damping_ratio is None:
             return _PAPER
         masses_and_springs = zip(_PAPER.masses_kg, _PAPER.stiffnesses, strict=True)

@@ -80,10 +80,10 @@ def reproduction(
     on_step("claims by setting")
     by_setting = claims_by_setting(every, evidence, case)
     tables = (score_table(by_damping), by_setting)
-    return Reproduction(judgements, by_damping, tables, case.choices, _made_with(evidence))
+    return Reproduction(judgements, by_damping, tables, case.choices, _origin_text(evidence))
 
 
-def _made_with(evidence: Evidence) -> str:
+def _origin_text(evidence: Evidence) -> str:
     """Return the number of computed points, processor time and version, from the study files."""
     studies = evidence.studies
     points = sum(each.study.grid.size for each in studies)
@@ -106,7 +106,7 @@ def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator
     if apart:
         yield from ("", "Claims that do not hold under the defaults:", "")
     for each in apart:
-        yield f"- **{each.claim.key}**: {each.claim.says} {_upheld(each)}".rstrip()
+        yield f"- **{each.claim.key}**: {each.claim.says} {_upholding_options(each)}".rstrip()
     for heading, judgements in found.sections.items():
         yield from ("", f"## {heading}", "", HEAD, f"|{'---|' * len(_HEADINGS)}")
         yield from (_row(each) for each in judgements)
@@ -130,17 +130,17 @@ def _row(result: Judgement) -> str:
 def _cells(result: Judgement) -> tuple[str, ...]:
     claim = result.claim
     measured = _values(claim, result.findings[0])
-    return f"{claim.key}: {claim.says}", claim.place, measured, wanted_text(claim), verdict_text(result)
+    return f"{claim.key}: {claim.says}", claim.place, measured, target_text(claim), verdict_text(result)
 
 
 def verdict_text(result: Judgement) -> str:
     """Return the verdict with the option for which it holds."""
-    under, first = result.met_under, result.findings[0]
+    under, first = result.first_met, result.findings[0]
     match result.verdict:
         case Verdict.HOLDS_FOR_SHARE:
-            share = wilson_share(first.met, len(first.draws))
+            share = wilson_share(first.met_draws, len(first.draws))
             return (
-                f"{result.verdict.value}: {first.met} of {len(first.draws)} "
+                f"{result.verdict.value}: {first.met_draws} of {len(first.draws)} "
                 f"({100 * share.low:.0f} to {100 * share.high:.0f} %)"
             )
         case Verdict.HOLDS_UNDER if under is not None:
@@ -151,27 +151,27 @@ def verdict_text(result: Judgement) -> str:
             return other.value
 
 
-def wanted_text(claim: Claim) -> str:
+def target_text(claim: Claim) -> str:
     """Return the requirements of a claim."""
-    sentences = [each.sentence for each in claim.wanted]
+    sentences = [each.sentence for each in claim.limits]
     return f"each {sentences[0]}" if sentences[1:] and len(set(sentences)) == 1 else "; ".join(sentences)
 
 
 def _difference(result: Judgement) -> str:
     """Return our numbers, the requirements, and the options under which the claim holds."""
     found = _values(result.claim, result.findings[0])
-    return f"We find {found}; required {wanted_text(result.claim)}. {_upheld(result)}".strip()
+    return f"We find {found}; required {target_text(result.claim)}. {_upholding_options(result)}".strip()
 
 
-def _upheld(result: Judgement) -> str:
+def _upholding_options(result: Judgement) -> str:
     """Return the options under which a claim holds, with their numbers, and the comment."""
     claim, alternatives = result.claim, result.findings[1:]
     sentences = [
         f"{'It holds under' if each.is_met else 'Values with'} {each.case.name}: {_values(claim, each)}."
         for each in alternatives
-        if each.met > 0
+        if each.met_draws > 0
     ]
-    if alternatives and result.met_under is None:
+    if alternatives and result.first_met is None:
         sentences.insert(0, f"It fails under all options tested ({len(alternatives)}){_except(result)}.")
     return " ".join([*sentences, claim.remark]).strip()
 
@@ -179,27 +179,27 @@ def _upheld(result: Judgement) -> str:
 def _except(result: Judgement) -> str:
     """Return the options under which a claim holds for some starts only."""
     return "".join(
-        f"; with {each.case.name} it holds for {each.met} of {len(each.draws)} starts"
+        f"; with {each.case.name} it holds for {each.met_draws} of {len(each.draws)} starts"
         for each in result.findings
         if each.is_met_in_part
     )
 
 
 def _values(claim: Claim, found: Finding) -> str:
-    text = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
+    text = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.limits))
     return text if len(found.draws) < 2 else f"{text}; from {len(found.draws)} starts"
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
     """Return one number, with its range over several initial states."""
-    value = f"{wanted.name}: {wanted.shown(found.values[number])}"
-    low, high = (wanted.shown(each, "") for each in found.spread(number))
+    value = f"{wanted.name}: {wanted.number_text(found.values[number])}"
+    low, high = (wanted.number_text(each, "") for each in found.spread(number))
     return value if low == high else f"{value} ({low} to {high})"
 
 
-def _tried(result: Judgement) -> Iterator[str]:
+def _tests(result: Judgement) -> Iterator[str]:
     for each in result.findings:
-        in_part = f"holds for {each.met} of {len(each.draws)} starts"
+        in_part = f"holds for {each.met_draws} of {len(each.draws)} starts"
         mark = in_part if each.is_met_in_part else "holds" if each.is_met else "does not hold"
         yield f"{each.case.name}: {_values(result.claim, each)} ({mark})"
 
@@ -233,7 +233,7 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
 def _card(heading: str, judgements: Sequence[Judgement]) -> Card:
     verdicts = [each.verdict for each in judgements]
     apart = [each for each in judgements if each.verdict is not Verdict.HOLDS]
-    tried = [(each.claim.key, text) for each in judgements if len(each.findings) > 1 for text in _tried(each)]
+    tried = [(each.claim.key, text) for each in judgements if len(each.findings) > 1 for text in _tests(each)]
     how = [(each.claim.key, each.claim.measured_by) for each in judgements]
     return Card(
         name=heading,

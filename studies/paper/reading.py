@@ -33,14 +33,14 @@ class Evidence:
 
     def study(self, study: Study) -> StudyResults:
         """Return the results of a study; equal studies are solved once."""
-        return self.remembered(study, lambda: self.solve(study))
+        return self.compute_once(study, lambda: self.solve(study))
 
     @property
     def studies(self) -> tuple[StudyResults, ...]:
         """All studies solved so far."""
         return tuple(each for each in self._remembered.values() if isinstance(each, StudyResults))
 
-    def remembered(self, key: object, compute: Callable[[], Computed]) -> Computed:
+    def compute_once(self, key: object, compute: Callable[[], Computed]) -> Computed:
         """Return a result, computed at the first call; ``key`` must contain all inputs of the computation."""
         if key not in self._remembered:
             self._remembered[key] = compute()
@@ -95,4 +95,4 @@ class Reading:
             return found
 
         key = ("ode45", specimen, amplitude_m, self.case.frequencies_hz)
-        return self.evidence.remembered(key, follow)
+        return self.evidence.compute_once(key, follow)

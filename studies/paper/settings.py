@@ -85,7 +85,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
     count = len(scores[0].held) + len(scores[0].failed)
     weak = np.array([each.weak_exponent_per_s for each in scores])
     moderate = np.array([each.moderate_exponent_per_s for each in scores])
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(4.6)
         top, low = figure.subplots(2, 1, sharex=True)
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")

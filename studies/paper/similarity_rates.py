@@ -38,7 +38,7 @@ def rates_figure(
 ) -> report.DrawnFigure:
     """Draw the similarity rates of several models over amplitude."""
     columns: dict[str, Reals] = {"amplitude_m": np.asarray(AMPLITUDES_M)}
-    with report.styled():
+    with report.figure_style():
         figure = report.new_figure(3.3)
         panels = figure.subplots(1, 2, sharey=True)
         for axes, (what, heading) in zip(panels, RESPONSES.items(), strict=True):

@@ -86,7 +86,7 @@ def chaos_escalates(r: Reading) -> Values:
 
 def _signal(r: Reading, amplitude_m: float) -> TimeSignal:
     key = ("signal", amplitude_m, r.specimen(), r.case.accuracy)
-    return r.evidence.remembered(
+    return r.evidence.compute_once(
         key, lambda: time_signal(r.specimen(), Harmonic(SHOWN_HZ, amplitude_m), r.case)
     )
 

@@ -261,12 +261,12 @@ class LoopbackDigitizer:
             Role.DRIVE_VOLTAGE: drive * world.drive_factor + world.hum_v * np.sin(angle * 50 / 160),
             Role.AMPLIFIER_VOLTAGE: drive * world.rig.amplifier.gain,
             Role.BASE_ACCELERATION: base,
-            Role.M0_VELOCITY: self._integrated(base),
+            Role.M0_VELOCITY: self._integrate(base),
         }
         volts = np.stack([physical[channel.role] / channel.units_per_volt for channel in self._channels])
         self._waiting = np.concatenate((self._waiting, volts), axis=1)
 
-    def _integrated(self, acceleration: Samples) -> Samples:
+    def _integrate(self, acceleration: Samples) -> Samples:
         """Return the velocity of this acceleration; contributions older than some seconds decay."""
         leak = 1 - 2 * np.pi * 0.1 / SAMPLE_RATE_HZ
         velocity, self._velocity = lfilter([1 / SAMPLE_RATE_HZ], [1, -leak], acceleration, zi=self._velocity)

@@ -122,7 +122,7 @@ STREAMED = {"band_start_hz": 40.0, "band_stop_hz": 600.0, "duration_s": 20.0}
 @pytest.fixture(scope="session")
 def streamed_noise():
     """20 s of streamed noise whose transmission is 2 at every frequency: plan, base, velocity, parts."""
-    base, velocity = synthetic.streamed(STREAMED["duration_s"], 20.0, 700.0, 1e-6, 5)
+    base, velocity = synthetic.noise_band(STREAMED["duration_s"], 20.0, 700.0, 1e-6, 5)
     plan = StreamedNoise(amplitude_vpp=0.1, settle_s=0.0, seed=1, **STREAMED)
     return plan, base, velocity, [synthetic.Part("noise", 0.0, STREAMED["duration_s"], {})]
 

@@ -51,7 +51,7 @@ class Part:
     numbers: dict
 
 
-def ramped(time_s, phase, rate, curvature, amplitude_m):
+def fade(time_s, phase, rate, curvature, amplitude_m):
     """Return amplitude * sin(phase) with half-cosine ramps; phase' = rate, phase'' = curvature."""
     left_s = time_s[-1] - time_s
     rising = time_s < left_s
@@ -75,27 +75,27 @@ def times(duration_s):
 def sine(duration_s, frequency_hz, amplitude_m):
     time_s = times(duration_s)
     omega = 2 * np.pi * frequency_hz
-    return ramped(time_s, omega * time_s, omega, 0.0, amplitude_m)
+    return fade(time_s, omega * time_s, omega, 0.0, amplitude_m)
 
 
 def chirp(duration_s, start_hz, stop_hz, amplitude_m):
     time_s = times(duration_s)
     growth = (stop_hz - start_hz) / duration_s
     phase = 2 * np.pi * (start_hz * time_s + 0.5 * growth * time_s**2)
-    return ramped(time_s, phase, 2 * np.pi * (start_hz + growth * time_s), 2 * np.pi * growth, amplitude_m)
+    return fade(time_s, phase, 2 * np.pi * (start_hz + growth * time_s), 2 * np.pi * growth, amplitude_m)
 
 
 def multisine(duration_s, lines_hz, amplitude_m, seed):
     time_s = times(duration_s)
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines_hz))
     parts = [
-        ramped(time_s, 2 * np.pi * f * time_s + p, 2 * np.pi * f, 0.0, amplitude_m)
+        fade(time_s, 2 * np.pi * f * time_s + p, 2 * np.pi * f, 0.0, amplitude_m)
         for f, p in zip(lines_hz, phases, strict=True)
     ]
     return Motion(sum(each.displacement_m for each in parts), sum(each.acceleration for each in parts))
 
 
-def streamed(duration_s, low_hz, high_hz, rms_m, seed):
+def noise_band(duration_s, low_hz, high_hz, rms_m, seed):
     """Return Gaussian base motion in a band and the velocity of a mass with twice that displacement."""
     count = round(duration_s * RATE)
     omega = 2 * np.pi * np.fft.rfftfreq(count, 1 / RATE)
@@ -174,7 +174,7 @@ def write_recording(
 
     ``velocity`` holds the samples of the channel ``response``.
     """
-    writer = begun_recording(
+    writer = start_recording(
         folder,
         excitation,
         motion,
@@ -191,7 +191,7 @@ def write_recording(
     return writer.finish(state, reason)
 
 
-def begun_recording(
+def start_recording(
     folder: Path,
     excitation,
     motion,

@@ -25,7 +25,7 @@ from vibench.analysis.overlay.overlay import AbstractOverlay
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.compared_recording import ComparedRecording
 from vibench.analysis.sine.dwell_analysis import DwellMotion
-from vibench.analysis.tables import Labelled, holds_array, rows, unit_of
+from vibench.analysis.tables import Tabular, holds_array, rows, unit_of
 from vibench.analysis.uncertainty.budget import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
@@ -72,13 +72,13 @@ def test_a_dataset_round_trips_through_netcdf(response, tmp_path):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Part(Labelled):
+class Part(Tabular):
     time_s: np.ndarray
     force_n_per_m: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Whole(Labelled):
+class Whole(Tabular):
     frequency_hz: np.ndarray
     states: np.ndarray
     part: Part
@@ -108,7 +108,7 @@ class Mode:
 
 
 @dataclasses.dataclass(frozen=True)
-class Modes(Labelled):
+class Modes(Tabular):
     modes: tuple[Mode, ...]
 
 
@@ -232,7 +232,7 @@ def reachable_kinds():
     """Return every result class and nested part class, with the annotations of its fields."""
     for each in pkgutil.walk_packages(analysis.__path__, "vibench.analysis."):
         importlib.import_module(each.name)
-    found, waiting = {}, [each for each in kinds_below(Labelled) if each.__module__.startswith("vibench.")]
+    found, waiting = {}, [each for each in kinds_below(Tabular) if each.__module__.startswith("vibench.")]
     while waiting:
         kind = waiting.pop()
         if kind in found or not dataclasses.is_dataclass(kind):
@@ -339,7 +339,7 @@ def test_rows_with_different_units_get_a_column_of_units():
     m0 = dataclasses.replace(f0, parameter=Parameter.M0)
 
     @dataclasses.dataclass(frozen=True)
-    class Fitted(Labelled):
+    class Fitted(Tabular):
         values: tuple[FittedValue, ...]
 
     mixed, alike = Fitted((f0, m0)).to_xarray(), Fitted((f0, f0)).to_xarray()
@@ -352,11 +352,11 @@ def test_rows_with_different_units_get_a_column_of_units():
 def test_every_result_with_arrays_can_be_converted_to_a_dataset():
     found = {*results(), *composite_results()}
     assert len(found) > 25
-    assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []
+    assert sorted(each.__name__ for each in found if not issubclass(each, Tabular)) == []
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Measured(Labelled):
+class Measured(Tabular):
     DOCUMENT: typing.ClassVar = "*part lowest_hz=frequency_hz.0 missing_m=absent.size_m folder"
 
     part: "Spread"

@@ -24,7 +24,7 @@ from . import (
     recordings_mutants,
     toml_files,
 )
-from .tally import Attack, Shard, Tally, saved_tallies
+from .tally import Attack, Shard, Tally, read_tallies
 
 TARGETS: dict[str, Attack] = {
     "toml": toml_files.attack,
@@ -48,7 +48,7 @@ def main() -> int:
     """Run an attack or add up saved results; the exit code is 1 if something was found."""
     options = _options()
     if options.sum:
-        tallies = _summary([tally for path in options.sum for tally in saved_tallies(path)])
+        tallies = _summary([tally for path in options.sum for tally in read_tallies(path)])
     else:
         part, of = (int(each) for each in options.shard.split("/"))
         until_s = time.monotonic() + 60 * options.minutes

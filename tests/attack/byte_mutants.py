@@ -24,7 +24,7 @@ FLOATS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, -0.0
 MOST_AT_ONCE = 6
 
 
-def mutated_bytes(content: bytes, chance: random.Random, others: tuple[bytes, ...] = ()) -> bytes:
+def mutate_bytes(content: bytes, chance: random.Random, others: tuple[bytes, ...] = ()) -> bytes:
     """Change a few places of ``content``; ``others`` are files of the same format that give pieces."""
     data = bytearray(content)
     changes = [_flip, _overwrite, _overwrite_float, _cut, _repeat, _insert, _end_early, _blank]

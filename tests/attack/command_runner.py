@@ -45,7 +45,7 @@ class CommandRunner:
     def run(self, case: Case) -> Ending:
         """Run a case in a new folder, which is removed afterwards."""
         with tempfile.TemporaryDirectory(prefix="vibench_attack_") as name:
-            case.lay(Path(name))
+            case.write(Path(name))
             return self.run_in(Path(name), case)
 
     def run_in(self, folder: Path, case: Case) -> Ending:

@@ -34,7 +34,7 @@ Faults = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Said:
+class Member:
     """Result of the analysis of one member."""
 
     ending: str
@@ -42,7 +42,7 @@ class Said:
     about: str
 
 
-def members(target: str, member: Callable[[np.random.Generator, Path], Said]) -> Callable[[Shard], Tally]:
+def members(target: str, member: Callable[[np.random.Generator, Path], Member]) -> Callable[[Shard], Tally]:
     """Return the attack for one kind of member."""
 
     def attack(shard: Shard) -> Tally:
@@ -112,7 +112,7 @@ def filter_motion(specimen: Specimen, moved_m: np.ndarray) -> tuple[np.ndarray, 
     )
 
 
-def stepped_sine(rng: np.random.Generator, folder: Path) -> Said:
+def stepped_sine(rng: np.random.Generator, folder: Path) -> Member:
     """Stepped sine of a specimen that has settled, or not."""
     specimen = specimen_without_contact(rng)
     count = int(rng.integers(1, 4))
@@ -178,7 +178,7 @@ def stepped_sine(rng: np.random.Generator, folder: Path) -> Said:
     done = analyse_files([path], "steps", Simulation.LEFT_OUT)
     about = f"{plan!r} {specimen.masses} {specimen.damping_ratios} {noise_name}"
     if not done.results:
-        return Said("refused", (), f"{about} {done.failures}")
+        return Member("refused", (), f"{about} {done.failures}")
     found = done.results[0].analysis.response
     truth = np.abs(base_transmissibility(specimen, hz)[:, 0])
     size = found.response_i * np.hypot(
@@ -199,7 +199,7 @@ def stepped_sine(rng: np.random.Generator, folder: Path) -> Said:
         ]
     is_told = np.isfinite(found.sd_response_ii)
     ending = "told" if is_told.all() else "withheld in part" if is_told.any() else "withheld"
-    return Said(ending, tuple(faults), about)
+    return Member(ending, tuple(faults), about)
 
 
 attack_steps = members("steps", stepped_sine)
@@ -224,7 +224,7 @@ def draw_drift(rng: np.random.Generator, count: int) -> np.ndarray:
     return shape / np.max(np.abs(shape))
 
 
-def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
+def periodic_noise(rng: np.random.Generator, folder: Path) -> Member:
     """Noise realisations of a specimen that drifts, is nonlinear, both, or neither."""
     specimen = specimen_without_contact(rng)
     drift, bent = str(rng.choice(DRIFTS)), str(rng.choice(DISTORTIONS, p=(0.7, 0.1, 0.1, 0.1)))
@@ -277,7 +277,7 @@ def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
         f"noise {noise_m_per_s:.2g}"
     )
     if not done.results:
-        return Said("refused", (), f"{about} {done.failures}")
+        return Member("refused", (), f"{about} {done.failures}")
     analysis = done.results[0].analysis
     found = distortion(analysis.response.periodic)
     about += f"; {found.drift}, noise {found.noise_share:.2g}, distortion {found.distortion_share:.2g}"
@@ -292,10 +292,10 @@ def repeated_noise(rng: np.random.Generator, folder: Path) -> Said:
         faults.append(f"a gain drifts: {found.drift.text}")
     is_drift, is_distortion = found.drift is not None, found.distortion_share > found.noise_share
     ending = f"{'drift' if is_drift else 'no drift'}, {'distortion' if is_distortion else 'none'}"
-    return Said(ending, tuple(faults), about)
+    return Member(ending, tuple(faults), about)
 
 
-attack_drifts = members("drifts", repeated_noise)
+attack_drifts = members("drifts", periodic_noise)
 
 
 LIGHT_RATE_HZ = 25_600.0
@@ -329,7 +329,7 @@ def darken(rng: np.random.Generator, velocity: np.ndarray, first: int, stop: int
     return f"{count} drop-outs, {kind}, {1e3 * mean_s:g} ms, {len(starts)}", dark
 
 
-def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
+def dark_recording(rng: np.random.Generator, folder: Path) -> Member:
     """A dwell or a sweep, with and without drop-outs."""
     specimen = specimen_without_contact(rng)
     hz, settle_s, length_s = near_a_mode(rng, specimen), 1.0, float(rng.uniform(3, 5))
@@ -365,9 +365,9 @@ def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
     finally:
         synthetic.RATE = usual
     if not done[0].results:
-        return Said("refused with light", (), f"{about} {done[0].failures}")
+        return Member("refused with light", (), f"{about} {done[0].failures}")
     if not done[1].results:
-        return Said("refused", (), about)
+        return Member("refused", (), about)
     seen, found = (each.results[0] for each in done)
     faults, is_told = [], True
     for one, other in zip(budgets_of(seen), budgets_of(found), strict=True):
@@ -382,7 +382,7 @@ def dark_recording(rng: np.random.Generator, folder: Path) -> Said:
         kinds = [each.analysis.motion.verdict.kind for each in (seen, found)]
         if kinds[1] not in {kinds[0], MotionKind.UNDECIDED}:
             faults.append(f"{kinds[1]}, not {kinds[0]}")
-    return Said("told" if is_told else "withheld", tuple(faults), about)
+    return Member("told" if is_told else "withheld", tuple(faults), about)
 
 
 attack_dropouts = members("drop-outs", dark_recording)

@@ -13,9 +13,9 @@ from vibench.acquisition.engine._client import EngineAddress
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
 
-from .byte_mutants import EDGES, mutated_bytes
+from .byte_mutants import EDGES, mutate_bytes
 from .command_runner import ROOT
-from .json_mutants import mutated_json
+from .json_mutants import mutate_json
 from .limits import LONGEST_S, MOST_BYTES
 from .served_process import ServedProcess
 from .tally import Finding, Shard, Tally
@@ -40,21 +40,21 @@ REQUESTS: tuple[dict[str, Any], ...] = (
 """A valid request of every kind that neither plays nor ends: not `start`, `check` or `shutdown`."""
 
 
-def framed(text: bytes, payload: bytes = b"") -> bytes:
+def frame(text: bytes, payload: bytes = b"") -> bytes:
     """Return a message with its frame header."""
     return HEAD.pack(MAGIC, len(text), len(payload)) + text + payload
 
 
 def broken_frame(chance: random.Random) -> bytes:
     """Return data that begins like a message, and has a wrong header or ends too soon."""
-    text = mutated_json(chance.choice(REQUESTS), chance)
+    text = mutate_json(chance.choice(REQUESTS), chance)
     match chance.randrange(4):
         case 0:
             return HEAD.pack(MAGIC, chance.choice(EDGES) % 2**32, chance.choice(EDGES) % 2**32) + text
         case 1:
-            return framed(text)[: chance.randrange(len(text) + HEAD.size)]
+            return frame(text)[: chance.randrange(len(text) + HEAD.size)]
         case 2:
-            return mutated_bytes(framed(text), chance)
+            return mutate_bytes(frame(text), chance)
         case _:
             return chance.randbytes(chance.choice((0, 1, 11, 12, 13, 2000)))
 
@@ -65,7 +65,7 @@ class Trial:
     def __init__(self, process: ServedProcess) -> None:
         self._process = process
         self._address = EngineAddress.model_validate_json(process.until(lambda said: "\n" in said))
-        self._hello = framed(json.dumps({"ask": "hello", "token": self._address.token}).encode())
+        self._hello = frame(json.dumps({"ask": "hello", "token": self._address.token}).encode())
         self._viewer: socket.socket | None = None
         self.descriptors = process.descriptors
 
@@ -79,7 +79,7 @@ class Trial:
         request = chance.choice(REQUESTS)
         # Valid requests bring the engine into other states.
         is_right = chance.random() < 0.15
-        viewer.sendall(framed(json.dumps(request).encode() if is_right else mutated_json(request, chance)))
+        viewer.sendall(frame(json.dumps(request).encode() if is_right else mutate_json(request, chance)))
         taken = self._answer(viewer)
         if taken == "hung up":
             raise ConnectionError("a request in a whole frame was not answered")
@@ -114,8 +114,8 @@ class Trial:
 
     def _send_without_token(self, chance: random.Random) -> str:
         with closing(self._connect()) as stranger:
-            hello = mutated_json({"ask": "hello", "token": "x" * 43, "role": "visiting"}, chance)
-            said = framed(hello) if chance.random() < 0.5 else broken_frame(chance)
+            hello = mutate_json({"ask": "hello", "token": "x" * 43, "role": "visiting"}, chance)
+            said = frame(hello) if chance.random() < 0.5 else broken_frame(chance)
             return "door: " + self._send_and_end(stranger, said)
 
     def _send_and_end(self, connection: socket.socket, said: bytes) -> str:

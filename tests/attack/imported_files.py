@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 from scipy.io import savemat
 
-from .byte_mutants import mutated_bytes
+from .byte_mutants import mutate_bytes
 from .command_attack import attack_commands
 from .limits import Case, Ending
 from .tally import Shard, Tally
-from .text_mutants import mutated_fields
+from .text_mutants import mutate_fields
 
 RATE_HZ = 1000
 SAMPLES = 1500
@@ -165,9 +165,9 @@ def mutant(chance: random.Random) -> Case:
     suffix = chance.choice(tuple(WRITERS))
     content = good_files()[suffix]
     if suffix in TEXT and chance.random() < 0.8:
-        broken = mutated_fields(content.decode(), chance)
+        broken = mutate_fields(content.decode(), chance)
     else:
-        broken = mutated_bytes(content, chance, tuple(good_files().values()))
+        broken = mutate_bytes(content, chance, tuple(good_files().values()))
     return reading(suffix, broken, *(MAKING if chance.random() < 0.75 else ("--json",)))
 
 

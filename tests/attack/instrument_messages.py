@@ -16,7 +16,7 @@ import grpc
 from google.protobuf.descriptor import FieldDescriptor
 from nidaqmx._stubs import nidaqmx_pb2
 
-from .byte_mutants import EDGES, mutated_bytes
+from .byte_mutants import EDGES, mutate_bytes
 from .limits import LONGEST_S, MOST_BYTES
 from .served_process import ServedProcess
 from .tally import Finding, Shard, Tally
@@ -58,7 +58,7 @@ def broken_scpi(chance: random.Random) -> bytes:
         units.append(unit)
     line = chance.choice((";", ";:", ";;")).join(units).encode("utf-8", errors="replace")
     line = line[:300_000] + b"\n"
-    return mutated_bytes(line, chance) if chance.random() < 0.3 else line
+    return mutate_bytes(line, chance) if chance.random() < 0.3 else line
 
 
 # --- USB ----------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ def broken_usb(chance: random.Random) -> tuple[str, bytes]:
             frame = struct.pack(">BBHHH", 0xA1, chance.choice((1, 2, 3, 4, 5, 6, 7, 64, 128, 160)), *numbers)
         case _:
             frame = bytes([chance.choice((0x81, 0x02, 0x83, 0))])
-    return USB + method, mutated_bytes(frame, chance) if chance.random() < 0.4 else frame
+    return USB + method, mutate_bytes(frame, chance) if chance.random() < 0.4 else frame
 
 
 # --- DAQmx --------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def broken_call(chance: random.Random) -> tuple[str, bytes]:
     _fill(request, chance, 0 if chance.random() < 0.5 else STRANGE)
     content = request.SerializeToString()
     path = f"/{SERVICE.full_name}/{name}"
-    return path, mutated_bytes(content, chance) if chance.random() < 0.1 else content
+    return path, mutate_bytes(content, chance) if chance.random() < 0.1 else content
 
 
 STRANGE = 0.25

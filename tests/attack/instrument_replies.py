@@ -89,7 +89,7 @@ CARD = (
 )  # fmt: skip
 
 
-def drawn(chance: random.Random, kind: str) -> dict[str, Any]:
+def draw_oddity(chance: random.Random, kind: str) -> dict[str, Any]:
     """Choose at random what is odd about an instrument, and from which call on."""
     odd: dict[str, Any] = {
         "kind": kind,
@@ -114,7 +114,7 @@ def mutant(chance: random.Random, played: Callable[[random.Random], bytes]) -> C
         files["played.h5"] = played(chance)
         odd: dict[str, Any] = {"kind": kind}
     else:
-        odd = drawn(chance, kind)
+        odd = draw_oddity(chance, kind)
     measure = ("measure", "plan.toml", "--bench", "bench.toml", "--out", "out")
     waived, sheet = ("--check", "waived"), ("--knobs", "knobs.toml")
     commands: list[tuple[str, ...]] = [(*measure, *waived)]
@@ -424,7 +424,7 @@ def attack(shard: Shard) -> Tally:
     with CommandRunner() as runner, tempfile.TemporaryDirectory(prefix="vibench_replies_") as name:
         folder = Path(name)
         for usual in (_usual("sound card", "--check", "waived", "--knobs", "knobs.toml"), _usual("usb")):
-            usual.lay(folder)
+            usual.write(folder)
             ended = runner.run_in(folder, usual)
             if ended.code:
                 raise RuntimeError(f"a usual measurement failed: {ended.faults} {ended.err}")

@@ -4,14 +4,14 @@ import json
 import random
 from typing import Any
 
-from .byte_mutants import FLOATS, mutated_bytes
+from .byte_mutants import FLOATS, mutate_bytes
 from .text_mutants import TEXTS
 
 NUMBERS = (0, -1, 1, 0.5, 2**31, 2**63, -(2**63) - 1, 10**400, 1e-320, *FLOATS)
 OTHERS = (None, True, False, [], {}, [[]], [None] * 50, {"": {}}, {"ask": "stop"}, "2026-01-01", 1 << 70)
 
 
-def mutated_json(document: Any, chance: random.Random) -> bytes:
+def mutate_json(document: Any, chance: random.Random) -> bytes:
     """Change one to three places of a document; sometimes a few bytes too."""
     changed = json.loads(json.dumps(document))
     for _ in range(chance.randint(1, 3)):
@@ -20,7 +20,7 @@ def mutated_json(document: Any, chance: random.Random) -> bytes:
     if chance.random() < 0.04:
         depth = chance.choice((50, 900, 20_000))
         return b'{"a":' * depth + text + b"}" * depth
-    return mutated_bytes(text, chance) if chance.random() < 0.1 else text
+    return mutate_bytes(text, chance) if chance.random() < 0.1 else text
 
 
 def _change(document: Any, chance: random.Random) -> Any:

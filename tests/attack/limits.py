@@ -27,7 +27,7 @@ class Case:
     function that is called after the command."""
     hangs_s: float = HANGS_S
 
-    def lay(self, folder: Path) -> None:
+    def write(self, folder: Path) -> None:
         """Write the files."""
         for name, content in self.files.items():
             path = folder / name

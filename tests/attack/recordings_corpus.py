@@ -16,10 +16,10 @@ from ..analysis.synthetic_recordings import (
     RATE,
     VOLTS_PER_METRE,
     Part,
-    begun_recording,
     chirp,
+    noise_band,
     sine,
-    streamed,
+    start_recording,
 )
 
 SETTLE_S, DWELL_S, SWEEP_S, NOISE_S = 0.3, 1.0, 2.0, 3.0
@@ -32,24 +32,24 @@ def _dwell(folder: Path, name: str, **more: object) -> object:
     part = Part("dwell", SETTLE_S, SETTLE_S + DWELL_S, {"frequency_hz": 260.0})
     # m0 moves like the base with three times the amplitude; no check of a file depends on it.
     velocity = 3 * np.gradient(motion.displacement_m, 1 / RATE)
-    return begun_recording(folder, plan, motion, velocity, [part], name=name, **more)
+    return start_recording(folder, plan, motion, velocity, [part], name=name, **more)
 
 
 def _sweep(folder: Path) -> object:
     motion = chirp(SWEEP_S, 240.0, 290.0, 1e-6)
     plan = SineSweep(amplitude_vpp=2e-2, start_hz=240.0, stop_hz=290.0, duration_s=SWEEP_S, settle_s=0.0)
     velocity = 3 * np.gradient(motion.displacement_m, 1 / RATE)
-    return begun_recording(folder, plan, motion, velocity, [Part("sweep", 0.0, SWEEP_S, {})], name="sweep")
+    return start_recording(folder, plan, motion, velocity, [Part("sweep", 0.0, SWEEP_S, {})], name="sweep")
 
 
 def _noise(folder: Path) -> object:
-    motion, velocity = streamed(NOISE_S, 50.0, 600.0, 1e-6, seed=3)
+    motion, velocity = noise_band(NOISE_S, 50.0, 600.0, 1e-6, seed=3)
     plan = StreamedNoise(
         amplitude_vpp=9e-2, band_start_hz=50.0, band_stop_hz=600.0, settle_s=0.0, duration_s=NOISE_S, seed=3
     )
     part = Part("noise", 0.0, NOISE_S, {})
     assert VOLTS_PER_METRE * motion.displacement_m.max() < 5.0
-    return begun_recording(folder, plan, motion, velocity, [part], name="noise", hole=(9000, 9100))
+    return start_recording(folder, plan, motion, velocity, [part], name="noise", hole=(9000, 9100))
 
 
 def _save_result(path: Path) -> None:

@@ -107,7 +107,7 @@ class KilledCampaigns:
 
 
 @dataclass(frozen=True)
-class Kept:
+class SafeContent:
     """What must survive a kill and the runs after it."""
 
     seals: dict[str, str]
@@ -123,7 +123,7 @@ def write_campaign(folder: Path, bench: str) -> None:
     (folder / "campaign.toml").write_text(CAMPAIGNS[bench], encoding="utf-8")
 
 
-def state_of(out: Path) -> Kept:
+def state_of(out: Path) -> SafeContent:
     """Return what exists after a kill."""
     journal = out / "killed.campaign.sqlite"
     points = read_journal(journal) if journal.exists() and _has_begun(journal) else ()
@@ -136,7 +136,7 @@ def state_of(out: Path) -> Kept:
             committed[part.name.removesuffix(".part")] = {
                 role: file[role][:samples].tobytes() for role in roles
             }
-    return Kept(seals, committed)
+    return SafeContent(seals, committed)
 
 
 def _has_begun(journal: Path) -> bool:
@@ -149,7 +149,7 @@ def _has_begun(journal: Path) -> bool:
         connection.close()
 
 
-def lost(kept: Kept, out: Path) -> list[str]:
+def loss(kept: SafeContent, out: Path) -> list[str]:
     """Return what has been lost after a later run."""
     now = state_of(out)
     said = [
@@ -205,7 +205,7 @@ def attack_one(
         write_campaign(folder, bench)
         out, said = folder / "out", []
         for attempt in range(kills):
-            kept = state_of(out) if out.exists() else Kept({}, {})
+            kept = state_of(out) if out.exists() else SafeContent({}, {})
             kind = chance.choice(kinds)
             most = CALLS[kind.split()[0]] if kind in CALL_KINDS else MOST_OPERATIONS[kind]
             ended = runs.run(
@@ -215,7 +215,7 @@ def attack_one(
                 number=1 + int(most * chance.random() ** 2),
                 moment_s=chance.uniform(0.0, LATEST_S),
             )
-            said += [f"kill {attempt} ({kind}): {each}" for each in lost(kept, out)] if out.exists() else []
+            said += [f"kill {attempt} ({kind}): {each}" for each in loss(kept, out)] if out.exists() else []
             if kind in CALL_KINDS and ended["code"] == 1 and "Traceback" not in ended["err"]:
                 tally.count(kind, ended["took_s"])
                 continue
@@ -224,11 +224,11 @@ def attack_one(
                 said += [f"run {attempt} ended with {ended['code']}: {ended['err']}"] if ended["code"] else []
                 break
             tally.count(kind, ended["took_s"])
-        kept = state_of(out) if out.exists() else Kept({}, {})
+        kept = state_of(out) if out.exists() else SafeContent({}, {})
         ended = runs.run(folder, *(("--resume",) if out.exists() else ()))
         if ended["code"] != 0:
             return [*said, f"the last run ended with {ended['code']}: {ended['err']}"]
-        return [*said, *lost(kept, out), *at_the_end(out, POINTS[bench])]
+        return [*said, *loss(kept, out), *at_the_end(out, POINTS[bench])]
 
 
 def attack(shard: Shard) -> Tally:
@@ -241,7 +241,7 @@ def attack(shard: Shard) -> Tally:
     return tally
 
 
-def built_library(folder: Path) -> Path:
+def build_library(folder: Path) -> Path:
     """Compile the library whose system calls fail."""
     library = folder / "system_calls.so"
     source = Path(__file__).with_name("system_calls.c")
@@ -254,7 +254,7 @@ def attack_calls(shard: Shard) -> Tally:
     tally = shard.tally("calls")
     with (
         tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder,
-        KilledCampaigns(built_library(Path(folder))) as runs,
+        KilledCampaigns(build_library(Path(folder))) as runs,
     ):
         for number, chance in shard.chances(tally):
             if said := attack_one(runs, chance, tally, kinds=CALL_KINDS):
@@ -330,7 +330,7 @@ def _prepare_to_die(kind: str, number: int, moment_s: float) -> None:
         case "write":
             os.pwrite = _deadly(os.pwrite, number)
         case "torn write":
-            os.pwrite = _torn(os.pwrite, number)
+            os.pwrite = _tear(os.pwrite, number)
         case "sync":
             os.fdatasync = os.fsync = _deadly(os.fsync, number)
         case "rename":
@@ -358,7 +358,7 @@ def _deadly(operation: Callable[..., Any], number: int) -> Callable[..., Any]:
     return operate
 
 
-def _torn(write: Callable[..., int], number: int) -> Callable[..., int]:
+def _tear(write: Callable[..., int], number: int) -> Callable[..., int]:
     left = [number]
 
     def operate(descriptor: int, data: Any, offset: int) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 from vibench.acquisition.recording._seal import write_seal
 from vibench.sim.hdf5_files.door import UnsafeHdf5
 
-from .byte_mutants import mutated_bytes
+from .byte_mutants import mutate_bytes
 from .command_attack import attack_commands
 from .limits import Case
 from .recordings_corpus import good_recordings
@@ -82,7 +82,7 @@ def mutant(chance: random.Random) -> Case:
     good = good_recordings()
     name = chance.choice(tuple(good))
     if chance.random() < 0.3:
-        content = mutated_bytes(good[name], chance, tuple(good.values()))
+        content = mutate_bytes(good[name], chance, tuple(good.values()))
     else:
         content = restructure(name, good[name], chance)
     return reading(name, content, chance)

@@ -93,7 +93,7 @@ class Shard:
         Raises ValueError if the file belongs to another seed or shard.
         """
         mine = f"{self.part + 1}/{self.of} of seed {self.seed}"
-        kept = () if self.saved is None or not self.saved.exists() else saved_tallies(self.saved)
+        kept = () if self.saved is None or not self.saved.exists() else read_tallies(self.saved)
         found = next((each for each in kept if each.target == target), Tally(target, shard=mine))
         if found.shard != mine:
             raise ValueError(f"{self.saved} holds shard {found.shard}, not {mine}; give another file")
@@ -112,14 +112,14 @@ class Shard:
 
 def save(tally: Tally, path: Path) -> None:
     """Save the results of a shard for a target; the file is replaced as a whole."""
-    kept = saved_tallies(path) if path.exists() else []
+    kept = read_tallies(path) if path.exists() else []
     tallies = [*(each for each in kept if each.target != tally.target), tally]
     unfinished = path.with_suffix(".tmp")
     unfinished.write_text(json.dumps([asdict(each) for each in tallies], indent=1), encoding="utf-8")
     unfinished.replace(path)
 
 
-def saved_tallies(path: Path) -> list[Tally]:
+def read_tallies(path: Path) -> list[Tally]:
     """Read the saved results of a shard."""
     return [_tally(content) for content in json.loads(path.read_text(encoding="utf-8"))]
 

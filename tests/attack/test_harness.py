@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from .byte_mutants import mutated_bytes
+from .byte_mutants import mutate_bytes
 from .command_runner import CommandRunner
 from .limits import HANGS_S, LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
-from .tally import Finding, Shard, Tally, save, saved_tallies
-from .text_mutants import mutated_toml
+from .tally import Finding, Shard, Tally, read_tallies, save
+from .text_mutants import mutate_toml
 from .toml_files import CAMPAIGNS, ROOT, reading
 
 GOOD = Ending(code=0, out="{}", err="", took_s=1.0, clock_s=1.0, peak_bytes=200_000_000)
@@ -43,7 +43,7 @@ def test_every_violation_of_the_limits_is_a_fault(ending):
 
 def test_a_mutant_depends_on_its_seed_and_number_only():
     def mutants(shard):
-        return {number: mutated_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances(Tally("toml"))}
+        return {number: mutate_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances(Tally("toml"))}
 
     whole = mutants(Shard(7, 40))
     parts = [mutants(Shard(7, 40, part, 3)) for part in range(3)]
@@ -61,7 +61,7 @@ def test_tallies_of_shards_are_added_up(tmp_path):
     second.count(1)
     second.findings.append(Finding("toml", 1, 2, ("a traceback",), "TypeError"))
     save(second, tmp_path / "second.json")
-    first.add(*saved_tallies(tmp_path / "second.json"))
+    first.add(*read_tallies(tmp_path / "second.json"))
     assert first == Tally("toml", 3, {"0": 2, "1": 1}, 2.0, 7, second.findings)
     with pytest.raises(ValueError, match="different targets"):
         first.add(Tally("imports"))
@@ -75,12 +75,12 @@ def test_a_shard_continues_from_its_file(tmp_path):
         tally = shard.tally("toml")
         for number, _ in shard.chances(tally):
             tally.count(number)
-            assert tally.done == (saved_tallies(path)[0].done if path.exists() else 0)
+            assert tally.done == (read_tallies(path)[0].done if path.exists() else 0)
         return tally
 
     assert tally_after(3).codes == {"0": 1, "2": 1}
     assert tally_after(7).codes == {"0": 1, "2": 1, "4": 1, "6": 1}
-    assert tally_after(7) == saved_tallies(path)[0]
+    assert tally_after(7) == read_tallies(path)[0]
     with pytest.raises(ValueError, match="holds shard 1/2 of seed 7, not 2/2 of seed 7; give another file"):
         tally_after(7, part=1)
 
@@ -88,8 +88,8 @@ def test_a_shard_continues_from_its_file(tmp_path):
 def test_an_empty_document_can_be_mutated():
     for number in range(200):
         chance = random.Random(number)
-        assert isinstance(mutated_bytes(b"", chance, (b"abc",)), bytes)
-        assert isinstance(mutated_toml("", chance, ("a = 1",)), bytes)
+        assert isinstance(mutate_bytes(b"", chance, (b"abc",)), bytes)
+        assert isinstance(mutate_toml("", chance, ("a = 1",)), bytes)
 
 
 @pytest.mark.thorough

@@ -12,7 +12,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 
 from . import recordings_kills
 from .recordings_corpus import good_recordings
-from .recordings_kills import CALLS, FAULTS, LIBRARY, ROOT, WHEN, KilledCampaigns, at_the_end, built_library
+from .recordings_kills import CALLS, FAULTS, LIBRARY, ROOT, WHEN, KilledCampaigns, at_the_end, build_library
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or shutil.which("cc") is None, reason="preloads a C library"
@@ -124,7 +124,7 @@ print(len(first), len(list_recordings(folder, "all")))
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    return built_library(tmp_path_factory.mktemp("library"))
+    return build_library(tmp_path_factory.mktemp("library"))
 
 
 def run_with_fault(library, code, folder, call, when, fault="ENOSPC"):
@@ -202,10 +202,10 @@ from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.campaign import list_recordings, verify_recordings
 from vibench.analysis import analyse
 from vibench.analysis.errors import AnalysisError
-from vibench.analysis.exchange import Format, excerpt, export_samples, opened_source
+from vibench.analysis.exchange import Format, excerpt, export_samples, open_source
 shim = ctypes.CDLL(os.environ[LIBRARY])
 def read_source(path):
-    with opened_source(path) as source:
+    with open_source(path) as source:
         source.read(source.channels[-1], 0, 100)
 READ = {
     "verify": lambda path: verify_recordings(path)[0].sentence,

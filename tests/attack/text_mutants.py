@@ -3,7 +3,7 @@
 import random
 import re
 
-from .byte_mutants import mutated_bytes
+from .byte_mutants import mutate_bytes
 
 NUMBERS = (
     "0", "-0.0", "-1", "1", "2", "1e9", "1000000000", "1e-300", "1e300", "1.7976931348623157e308", "-1e308",
@@ -50,30 +50,30 @@ _VALUE = re.compile(
 _KEY = re.compile(r"(?m)(?P<key>[A-Za-z_][A-Za-z0-9_]*)\s*=")
 
 
-def mutated_toml(text: str, chance: random.Random, others: tuple[str, ...] = ()) -> bytes:
+def mutate_toml(text: str, chance: random.Random, others: tuple[str, ...] = ()) -> bytes:
     """Change a few values, keys, lines or tables of a TOML file; sometimes a few bytes too."""
     changes = [_other_value] * 6 + [_near_number] * 3 + [_other_key] * 2
-    changes += [_without_line, _line_twice, _lines_exchanged, _other_table]
+    changes += [_without_line, _line_twice, _exchange_lines, _other_table]
     if others:
         changes.append(lambda held, by: _line_from(held, by, by.choice(others)))
     for _ in range(chance.randint(1, MOST_AT_ONCE)):
         text = chance.choice(changes)(text, chance)
     content = text.encode("utf-8", errors="surrogatepass")
-    return mutated_bytes(content, chance) if chance.random() < 0.08 else content
+    return mutate_bytes(content, chance) if chance.random() < 0.08 else content
 
 
 def any_value(chance: random.Random) -> str:
     """Return a value of any type as TOML."""
     match chance.randrange(4):
         case 0:
-            return _quoted(chance.choice(TEXTS))
+            return _quote(chance.choice(TEXTS))
         case 1:
             return chance.choice(OTHER_VALUES)
         case _:
             return chance.choice(NUMBERS)
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return '"' + "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in text) + '"'
 
 
@@ -87,7 +87,7 @@ def _other_value(text: str, chance: random.Random) -> str:
         case "number", True:
             value = chance.choice(NUMBERS)
         case "text", True:
-            value = _quoted(chance.choice(TEXTS))
+            value = _quote(chance.choice(TEXTS))
         case _:
             value = any_value(chance)
     return text[: one.start()] + value + text[one.end() :]
@@ -134,7 +134,7 @@ def _line_twice(text: str, chance: random.Random) -> str:
     return "\n".join(lines)
 
 
-def _lines_exchanged(text: str, chance: random.Random) -> str:
+def _exchange_lines(text: str, chance: random.Random) -> str:
     lines = _lines(text)
     a, b = chance.randrange(len(lines)), chance.randrange(len(lines))
     lines[a], lines[b] = lines[b], lines[a]
@@ -164,14 +164,14 @@ def _line_from(text: str, chance: random.Random, other: str) -> str:
 _FIELD = re.compile(r"[^,;\s]+")
 
 
-def mutated_fields(text: str, chance: random.Random) -> bytes:
+def mutate_fields(text: str, chance: random.Random) -> bytes:
     """Change a few fields or lines of a text table; sometimes a few bytes too."""
     for _ in range(chance.randint(1, MOST_AT_ONCE)):
-        text = chance.choice((_other_field, _other_field, _without_line, _line_twice, _lines_exchanged))(
+        text = chance.choice((_other_field, _other_field, _without_line, _line_twice, _exchange_lines))(
             text, chance
         )
     content = text.encode("utf-8", errors="surrogatepass")
-    return mutated_bytes(content, chance) if chance.random() < 0.25 else content
+    return mutate_bytes(content, chance) if chance.random() < 0.25 else content
 
 
 def _other_field(text: str, chance: random.Random) -> str:

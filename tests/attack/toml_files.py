@@ -7,7 +7,7 @@ from .command_attack import attack_commands
 from .command_runner import ROOT
 from .limits import Case
 from .tally import Shard, Tally
-from .text_mutants import mutated_toml
+from .text_mutants import mutate_toml
 
 BROKEN = "broken.toml"
 ESTIMATE = ("--out", "out", "--estimate", "--json")
@@ -89,7 +89,7 @@ def mutant(chance: random.Random) -> Case:
     """Break a file of a random kind."""
     kind = chance.choice(tuple(KINDS))
     texts, _ = KINDS[kind]
-    return reading(kind, mutated_toml(chance.choice(texts), chance, texts))
+    return reading(kind, mutate_toml(chance.choice(texts), chance, texts))
 
 
 def attack(shard: Shard) -> Tally:

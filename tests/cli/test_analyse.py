@@ -23,7 +23,7 @@ def noise():
     plan = StreamedNoise(
         amplitude_vpp=0.1, band_start_hz=50, band_stop_hz=600, settle_s=0, duration_s=SECONDS, seed=1
     )
-    base, velocity = synthetic.streamed(SECONDS, 20.0, 700.0, 1e-6, 5)
+    base, velocity = synthetic.noise_band(SECONDS, 20.0, 700.0, 1e-6, 5)
     return plan, base, velocity, [synthetic.Part("noise", 0.0, SECONDS, {})]
 
 
@@ -63,7 +63,7 @@ def test_options_for_estimator_quantity_and_resolution_are_applied_and_reported(
 def test_a_growing_recording_is_analysed_up_to_its_last_sample(vibench_here, noise, tmp_path):
     plan, base, velocity, parts = noise
     half = round(SECONDS * synthetic.RATE / 2)
-    with synthetic.begun_recording(
+    with synthetic.start_recording(
         tmp_path, plan, base, velocity, parts, name="growing", samples=half
     ) as writer:
         deadline_s = time.monotonic() + PATIENCE_S

@@ -16,7 +16,7 @@ GAP_M = 45e-6
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory):
     """Return a recording of a dwell with impacts in the simulated world."""
-    return world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
+    return world.shake(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
 
 
 @pytest.mark.thorough
@@ -49,7 +49,7 @@ def test_json_contains_bounds_and_undetermined_values(vibench_here, shaken, tmp_
 def test_an_untrackable_recording_gets_a_sentence_beside_the_report(vibench_here, tmp_path, monkeypatch):
     rigid = world.RIG.specimen.model_copy(update={"contact": "rigid:0.8"})
     monkeypatch.setattr(world, "RIG", world.RIG.model_copy(update={"specimen": rigid}))
-    recorded = world.shaken(tmp_path, 260.0, 1.5, seed=51, specimen=gong2025())
+    recorded = world.shake(tmp_path, 260.0, 1.5, seed=51, specimen=gong2025())
     done = vibench_here("analyse", recorded.path, "--hidden", "--no-simulate", "--out", "told", cwd=tmp_path)
     assert "shaken: no hidden motion: stops of the kind 'rigid' cannot be tracked" in done.stderr
     assert (tmp_path / "told" / "report.html").exists()

@@ -128,7 +128,7 @@ def test_a_recording_of_a_killed_program_is_recovered(vibench, tmp_path):
     part = tmp_path / "recordings" / "dwell.h5.part"
     with subprocess.Popen(arguments, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as running:
         while running.poll() is None:
-            if part.exists() and committed(part) > 0:
+            if part.exists() and samples_in(part) > 0:
                 running.send_signal(signal.SIGKILL)
             with contextlib.suppress(subprocess.TimeoutExpired):
                 running.wait(0.01)
@@ -139,7 +139,7 @@ def test_a_recording_of_a_killed_program_is_recovered(vibench, tmp_path):
         assert recording.samples > 0
 
 
-def committed(part):
+def samples_in(part):
     try:
         with open_recording(part) as recording:
             return recording.samples
@@ -195,7 +195,7 @@ def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_p
         (("analyse", "x.h5", "--draws=-3"), "-3"),
         (("analyse", "x.h5", "--draws", "1e9"), "'1e9'"),
         (("analyse", "x.h5", "--draws", "1000000000"), "1000000000"),
-        (("analyse", "x.h5", "--draws", "many"), "'many' is not a number"),
+        (("analyse", "x.h5", "--draws", "many"), "'many' is not a whole number"),
     ],
 )
 def test_an_invalid_option_value_is_refused_and_quoted(vibench_here, tmp_path, words, said):

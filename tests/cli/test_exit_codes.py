@@ -77,8 +77,8 @@ def test_text_for_a_whole_number_is_refused_with_an_example(vibench_here, tmp_pa
     assert "'abc' is not a whole number; give a number such as 5" in " ".join(said.split())
 
 
-def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(answered):
-    assert "needs about" in answered("predict", *SCENE, "--error", "1e-6", "--time", "0.2s")
+def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_of):
+    assert "needs about" in output_of("predict", *SCENE, "--error", "1e-6", "--time", "0.2s")
 
 
 @pytest.mark.parametrize("time", ["1e9h", "1e300h"])

@@ -50,7 +50,7 @@ def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(output_of, refusa
     asked = plan(tmp_path, text)
     told = output_of("map", asked, "--out", "a", "--json")
     assert told["is_complete"]
-    assert told["computed"] == open_map(tmp_path / "a" / FILE).computed
+    assert told["computed"] == open_map(tmp_path / "a" / FILE).points
     with xarray.open_dataset(tmp_path / "a" / FILE, engine="h5netcdf") as labelled:
         np.testing.assert_array_equal(
             labelled["response_i"], open_map(tmp_path / "a" / FILE).values("response_i")

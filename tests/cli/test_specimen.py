@@ -175,8 +175,8 @@ def test_a_gap_in_metres_gives_a_warning(vibench_here, tmp_path):
     assert "if 30 micrometres were meant, give 3e-05" in said
 
 
-def test_the_forces_of_all_laws_are_drawn(answered, tmp_path):
-    answered("specimen", "--forces", "drawn")
+def test_the_forces_of_all_laws_are_drawn(output_of, tmp_path):
+    output_of("specimen", "--forces", "drawn")
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000
 
 

@@ -158,7 +158,7 @@ class StoppedBefore(Engine):
 
     def __init__(self, supervision):
         super().__init__(supervision)
-        self.switch.ask(StopRequest.by(Cause.KEYBOARD, "SIGINT"))
+        self.switch.ask(StopRequest.of(Cause.KEYBOARD, "SIGINT"))
 
 
 def test_a_campaign_stopped_during_its_check_is_reported(vibench_here, tmp_path, monkeypatch):

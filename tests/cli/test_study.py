@@ -92,7 +92,7 @@ def test_ctrl_c_keeps_what_is_computed_and_resume_continues(vibench, tmp_path):
         running.kill()
     assert running.returncode == 3
     assert b"stopped: continue with --resume" in out
-    kept = open_study(tmp_path / "a.h5").kept
+    kept = open_study(tmp_path / "a.h5").done
     assert 0 < kept < LONG_POINTS
     resumed = vibench("study", asked, "--out", "a.h5", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
@@ -103,7 +103,7 @@ def test_ctrl_c_keeps_what_is_computed_and_resume_continues(vibench, tmp_path):
 
 def has_results(path):
     """Return whether an unfinished file already contains a result."""
-    return path.exists() and path.stat().st_size > 0 and open_study(path).kept > 0
+    return path.exists() and path.stat().st_size > 0 and open_study(path).done > 0
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_the_live_twin_reports_hidden_motion_and_a_change_ends_the_run_if_planne
     client.turn_twin(TwinSwitch.OFF)
     assert client.status().twin is None
     until(client, lambda status: status.samples > told.end_sample + 51_200)
-    client.tell_change("The specimen is not what it was.")
+    client.note_change("The specimen is not what it was.")
     status = until(client, lambda status: status.state not in DRIVING)
     assert [each.state for each in status.rows] == ["failed"]
     assert "as on_changed_specimen requires" in status.rows[0].reason
@@ -119,7 +119,7 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     assert "live twin has ended" in status.messages[-1].what
     before = status.samples
     until(client, lambda status: status.samples > before + 10_000)
-    client.tell_change("The upper gap is 46 um.")
+    client.note_change("The upper gap is 46 um.")
     client.stop("abort", "enough")
     until(client, lambda status: status.state not in DRIVING)
     events, gaps = events_and_gaps(tmp_path)
@@ -132,7 +132,7 @@ def test_a_twin_continues_with_one_sentence_if_its_baseline_cannot_be_stored(tmp
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     rig = load_rig("virtual_rig")
     known = {Hidden.M1: KnownNumber(value=2.1e-3, low=2.0e-3, high=2.2e-3)}
-    live = SimpleNamespace(watch=ChangeWatch(Level(mean=1.0, sd=0.1)), known=known)
+    live = SimpleNamespace(watch=ChangeWatch(Level(mean=1.0, sd=0.1)), numbers=known)
     following = _Following(None, rig, specimen_of(rig), live, (0, 1), plan="dwell")
     with full_disk():
         following._keep_baseline()

@@ -194,7 +194,7 @@ def test_measuring_to_export_works_by_keyboard(bench, qtbot, tmp_path, qapp, wid
     key(Qt.Key.Key_A, CONTROL)
     key(Qt.Key.Key_M, ALT)
     qtbot.waitUntil(lambda: bench.page is compare)
-    qtbot.waitUntil(lambda: len(compare.curves.ticked()) == before + 1, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: len(compare.curves.ticked_curves()) == before + 1, timeout=PATIENCE_MS)
     timer = type_into_dialog(qtbot, str(tmp_path / "overlay.svg"))
     key(Qt.Key.Key_X, ALT)
     qtbot.waitUntil((tmp_path / "overlay.svg").exists, timeout=PATIENCE_MS)

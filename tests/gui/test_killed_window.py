@@ -18,7 +18,7 @@ from vibench.acquisition.engine import (
     EngineState,
     Supervision,
     announced_engines,
-    left_alone,
+    unattended_engine,
 )
 from vibench.acquisition.recording import EventKind, RecordingState
 from vibench.gui.page.app_context import USUAL_PATIENCE_S
@@ -120,12 +120,12 @@ def silent_after_s(window, number, folder):
 def test_a_new_window_shows_and_supervises_an_unattended_run(window, qtbot, tmp_path):
     bridge, left = window.context.bridge, tmp_path / "left"
     with measuring_window(left, Supervision.UNATTENDED, os.environ["VIBENCH_STATE_DIR"]):
-        window.look_for_left_campaign()
+        window.adopt_left_campaign()
         qtbot.waitUntil(lambda: not window.context.background.is_busy, timeout=100_000)
         assert bridge.engine_pid is None, "it has a window that looks after it"
     # The engine sees at its next poll that the window is gone.
-    qtbot.waitUntil(lambda: left_alone() is not None, timeout=60_000)
-    window.look_for_left_campaign()
+    qtbot.waitUntil(lambda: unattended_engine() is not None, timeout=60_000)
+    window.adopt_left_campaign()
     qtbot.waitUntil(lambda: bridge.state is EngineState.RUNNING, timeout=100_000)
     assert window.page is window.pages[RUN]
     assert "trial" in window.strip.notices[-1].what

@@ -51,14 +51,14 @@ def test_a_claim_within_its_bounds_holds_without_testing_options():
 def test_a_claim_names_the_first_option_under_which_it_holds():
     found = judge({2e-5: (80.0,), 3e-5: (120.0,), 5e-5: (130.0,)}, at_least("exponent", "1/s", 100.0))
     assert found.verdict is Verdict.HOLDS_UNDER
-    assert found.met_under.case.name == DAMPED.name
+    assert found.first_met.case.name == DAMPED.name
     assert len(found.findings) == 2
 
 
 def test_a_claim_that_holds_under_no_option_fails_and_keeps_all_findings():
     found = judge({2e-5: (1.0,), 3e-5: (2.0,), 5e-5: (3.0,)}, at_most("share", "%", 0.5))
     assert found.verdict is Verdict.FAILS
-    assert found.met_under is None
+    assert found.first_met is None
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
 
 
@@ -68,7 +68,7 @@ def test_a_claim_that_holds_for_some_initial_states_states_their_share():
     found = judgement(sweep, Evidence(no_studies), CASE)
     assert found.verdict is Verdict.HOLDS_FOR_SHARE
     (only,) = found.findings
-    assert (only.met, only.values, only.spread(0)) == (2, (310.0,), (288.0, 330.0))
+    assert (only.met_draws, only.values, only.spread(0)) == (2, (310.0,), (288.0, 330.0))
     assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
 
 
@@ -133,5 +133,5 @@ def test_numbers_of_a_claim_are_shown_with_their_units():
     assert about("peak", "Hz", 95.0, 1.0).sentence == "94 to 96 Hz"
     assert at_least("share", "%", 0.9).sentence == "≥ 90 %"
     assert at_most("largest", "1/s", 10.0).sentence == "≤ 10 1/s"
-    assert at_least("share", "%", 0.9).shown(0.5) == "50 %"
-    assert at_least("share", "%", 0.9).shown(math.nan) == "none"
+    assert at_least("share", "%", 0.9).number_text(0.5) == "50 %"
+    assert at_least("share", "%", 0.9).number_text(math.nan) == "none"

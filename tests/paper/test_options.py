@@ -48,8 +48,8 @@ def test_a_fitted_model_has_the_contact_force_at_the_fitted_indentation(model):
     k1_p = case.specimen().stiffnesses[1] * 45.45e-6
     assert fitted - k1_p == pytest.approx(stops - k1_p, rel=1e-9)
     assert case.study((model,), (5e-6,)).models == (f"{model}:4.5e-07",)
-    assert CASE.fitted(model) == model
-    assert case.fitted("hertz") == "hertz"
+    assert CASE.model_name(model) == model
+    assert case.model_name("hertz") == "hertz"
 
 
 @pytest.mark.thorough

@@ -10,7 +10,7 @@ from vibench.analysis.report import ReportTable, write_page
 from vibench.cli.paper.case import SCORED_S, Case, damping
 from vibench.cli.paper.claim import Verdict, at_least, claim, judgement
 from vibench.cli.paper.claims import CLAIMS, SECTIONS
-from vibench.cli.paper.page import HEAD, Reproduction, reproduction_document, reproduction_page, wanted_text
+from vibench.cli.paper.page import HEAD, Reproduction, reproduction_document, reproduction_page, target_text
 from vibench.cli.paper.reading import Evidence
 from vibench.cli.paper.settings import DampingScore, score_figure, score_table
 
@@ -139,8 +139,8 @@ def test_the_claims_page_in_docs_matches_the_claims_in_the_code():
     for each in CLAIMS:
         row = kept[each.key]
         assert row.startswith(f"| **{each.key}**: {each.says} | {each.place} |")
-        assert f"| {wanted_text(each)} |" in row
-        assert all(f"{wanted.name}: ".replace("|", "&#124;") in row for wanted in each.wanted)
+        assert f"| {target_text(each)} |" in row
+        assert all(f"{wanted.name}: ".replace("|", "&#124;") in row for wanted in each.limits)
 
 
 def test_the_claims_page_in_docs_has_the_damping_scores_and_figures():

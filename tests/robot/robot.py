@@ -117,8 +117,8 @@ class Robot:
         self.findings, self.done = [], Counter()
         self.errors = (folder / "stderr").open(errors="replace")
         self.recent = deque(maxlen=25)
-        sys.excepthook = self._raised
-        sys.unraisablehook = lambda told: self._raised(
+        sys.excepthook = self._on_exception
+        sys.unraisablehook = lambda told: self._on_exception(
             type(told.exc_value), told.exc_value, told.exc_traceback
         )
         qInstallMessageHandler(self._log_qt)
@@ -183,7 +183,7 @@ class Robot:
                 if not shown.is_current:
                     self.find(
                         f"{name}: {shown.widget.accessibleName() or type(shown.widget).__name__} shows "
-                        f"{str(shown.inputs)[:300]} while {str(shown.wanted)[:300]} is asked for"
+                        f"{str(shown.inputs)[:300]} while {str(shown.current)[:300]} is asked for"
                     )
 
     def find(self, what):
@@ -396,7 +396,7 @@ class Robot:
         if dialog.isVisible():
             dialog.reject()
 
-    def _raised(self, kind, error, trace):
+    def _on_exception(self, kind, error, trace):
         if issubclass(kind, KeyboardInterrupt):
             sys.__excepthook__(kind, error, trace)
             os._exit(2)

@@ -53,5 +53,5 @@ def test_the_robot_reports_an_exception_with_its_source_file(robot):
     try:
         robot.nothing  # noqa: B018
     except AttributeError as error:
-        robot._raised(AttributeError, error, error.__traceback__)
+        robot._on_exception(AttributeError, error, error.__traceback__)
     assert "test_harness.py" in robot.findings[0]

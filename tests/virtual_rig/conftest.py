@@ -59,7 +59,7 @@ class Sampling:
         self.clipped = clipped if self.clipped is None else self.clipped | clipped
         return np.clip(volts, -limits, limits)
 
-    def overloaded(self) -> np.ndarray:
+    def overload_flags(self) -> np.ndarray:
         clipped, self.clipped = self.clipped, None
         return np.zeros(len(self.inputs), bool) if clipped is None else clipped
 

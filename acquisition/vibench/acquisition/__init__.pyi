@@ -29,16 +29,16 @@ from .host.beside import Beside as Beside
 from .host.chosen import ChosenFrom as ChosenFrom
 from .host.extras import (
     naming_its_extra as naming_its_extra,
-    need_extra as need_extra,
-    need_space as need_space,
+    require_extra as require_extra,
+    require_space as require_space,
 )
-from .host.printable import printable as printable, shortened as shortened
+from .host.printable import printable as printable, shorten as shorten
 from .host.schema import json_schema as json_schema, schema_line as schema_line
 from .host.shipped import (
     all_shipped as all_shipped,
     built_site as built_site,
     documentation_page as documentation_page,
-    named as named,
+    file_path as file_path,
     shipped as shipped,
     shipped_folder as shipped_folder,
 )
@@ -46,7 +46,7 @@ from .host.toml_file import (
     load_toml as load_toml,
     save_toml as save_toml,
     toml_text as toml_text,
-    validated as validated,
+    validate as validate,
 )
 from .instruments import (
     Block as Block,

@@ -23,7 +23,7 @@ from .frequency_response.modal_fit import Resonance as Resonance
 from .frequency_response.request import (
     FrequencyResponseRequest as FrequencyResponseRequest,
     MagnitudeScale as MagnitudeScale,
-    quantities_named as quantities_named,
+    parse_view as parse_view,
 )
 from .frequency_response.resonance import resonances as resonances
 from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
@@ -54,7 +54,7 @@ from .results.campaign_results import (
     budget_sentences as budget_sentences,
     budgets_of as budgets_of,
     campaign_summary as campaign_summary,
-    merged_results as merged_results,
+    merge_results as merge_results,
     other_responses as other_responses,
     recordings_in as recordings_in,
     result_summary as result_summary,
@@ -69,10 +69,10 @@ from .results.measurement_analysis import analyse as analyse
 from .results.spectral_functions import scan_files as scan_files, spectral_functions as spectral_functions
 from .signals.window import Window as Window
 from .uncertainty.expected import (
-    Expected as Expected,
+    ExpectedResult as ExpectedResult,
     TimeShare as TimeShare,
     expected_recorded_s as expected_recorded_s,
     expected_uncertainty as expected_uncertainty,
+    fit_to as fit_to,
     recorded_s as recorded_s,
-    within as within,
 )

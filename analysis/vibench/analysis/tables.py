@@ -178,7 +178,7 @@ COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m
 """Names of independent variables; the first of these names in a result gives the coordinate of its arrays."""
 
 
-class Labelled:
+class Tabular:
     """Base class of results that can be converted to JSON, and to an xarray Dataset with units."""
 
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})

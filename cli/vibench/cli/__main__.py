@@ -25,10 +25,10 @@ from vibench.acquisition import (
     AcquisitionError,
     Beside,
     CheckStopped,
-    need_extra,
-    need_space,
     printable,
-    shortened,
+    require_extra,
+    require_space,
+    shorten,
 )
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
@@ -99,14 +99,14 @@ class LateCommand(TyperCommand):
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
         """Parse the arguments with the real command."""
         if not named.get("resilient_parsing"):
-            need_space(self._place.space_mb, self._place.advice)
+            require_space(self._place.space_mb, self._place.advice)
         command = typer.main.get_command(self._place.load())
         command.name = self.name
         with explain_refusals([] if named.get("resilient_parsing") else args):
             context = command.make_context(info_name, [*args], *given, **named)
         if not named.get("resilient_parsing"):
             for extra in self._place.extras:
-                need_extra(extra)
+                require_extra(extra)
         return context
 
 
@@ -324,7 +324,7 @@ def _disk_trouble(error: Exception) -> str:
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
     name = str(error.filename2 or error.filename or "a file")  # for a failed copy, filename2 is the target
-    return DISK_ERRORS[error.errno].format(name=shortened(name, NAME_SHOWN))
+    return DISK_ERRORS[error.errno].format(name=shorten(name, NAME_SHOWN))
 
 
 def _shortage(error: BaseException | None) -> str:

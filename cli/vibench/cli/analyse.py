@@ -26,9 +26,9 @@ from vibench.analysis import (
     analyse_files,
     budget_sentences,
     campaign_summary,
-    merged_results,
+    merge_results,
     other_responses,
-    quantities_named,
+    parse_view,
     recordings_in,
     update_model,
 )
@@ -61,7 +61,7 @@ NOISE = "Transmission of noise"
 OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "overlap", "confidence")
 
 
-class _Hidden(StrEnum):
+class _Output(StrEnum):
     OMITTED = "left out"
     REPORTED = "told"
     STORED = "kept"
@@ -142,7 +142,7 @@ def analyse(
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
     request = options.request().request
-    request = replace(request, segment_s=segment, view=quantities_named(quantity, scale))
+    request = replace(request, segment_s=segment, view=parse_view(quantity, scale))
     if fit and specimen is not None:
         raise InvalidRequest(
             "--fit and --specimen were given; give only one of them, to select the overlaid specimen"
@@ -166,7 +166,7 @@ def analyse(
             overlays,
             (simulation, draws),
             fit=tuple(free or ()) if fit else None,
-            hidden=_Hidden.STORED if keep else _Hidden.REPORTED if hidden else _Hidden.OMITTED,
+            hidden=_Output.STORED if keep else _Output.REPORTED if hidden else _Output.OMITTED,
             overlay=overlay,
             as_json=as_json,
         )
@@ -180,7 +180,7 @@ def _analyse(
     simulated: tuple[Simulation, int],
     *,
     fit: Sequence[Parameter] | None,
-    hidden: _Hidden,
+    hidden: _Output,
     overlay: Specimen | None,
     as_json: bool,
 ) -> None:
@@ -205,14 +205,14 @@ def _analyse(
             for role, having in other_responses(paths).items()
         }
     if updated is not None:
-        results = replace(results, model_sentences=(updated := updated.checked(results)).sentences)
+        results = replace(results, model_sentences=(updated := updated.confirm(results)).sentences)
     from vibench.analysis.report import check_warnings, findings, write_report
 
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
         motion_document = (
             {"hidden_motion": {each.name: each.to_dict() for each in motions}}
-            if hidden is not _Hidden.OMITTED
+            if hidden is not _Output.OMITTED
             else {}
         )
         further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
@@ -235,14 +235,14 @@ def _analyse(
         report = write_report(results, place, folder / "figures", diagrams, motions, maps)
         if not as_json:
             console.print("The report:", bold(report.resolve()))
-        if updated is not None and updated.fitted:
+        if updated is not None and updated.is_fitted:
             specimen_file = free_path(folder / "specimen.toml")
             save_toml(updated.description, specimen_file)
             if not as_json:
                 console.print("The specimen:", bold(specimen_file.resolve()))
     if has_report:
         _write_reports(others, folder, as_json=as_json)
-    complain_about(merged_results(name, (results, *others.values())))
+    complain_about(merge_results(name, (results, *others.values())))
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
@@ -258,14 +258,14 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 
 
 def hidden_motions(
-    results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
+    results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Output
 ) -> Iterator[HiddenMotion]:
     """Yield the estimated motion of m1 for each recording; print an error if the estimate fails."""
-    for facts in results.facts if hidden is not _Hidden.OMITTED else ():
+    for facts in results.facts if hidden is not _Output.OMITTED else ():
         with open_recording(facts.path) as recording:
             try:
                 motion = hidden_motion(recording, specimen, observer=observer)
-                if hidden is _Hidden.STORED:
+                if hidden is _Output.STORED:
                     keep_hidden_motion(recording, motion)
                 yield motion
             except AnalysisError as error:

@@ -12,10 +12,10 @@ from vibench.acquisition import (
     StopSwitch,
     Verdict,
     check_bench,
+    file_path,
     last_check,
     list_instruments,
     list_rig_instruments,
-    named,
     open_bench,
     stop_on_signal,
 )
@@ -82,7 +82,7 @@ def check(
             "was done; leave out --last or the other option"
         )
     path = bench_path(bench)
-    result = _last(load_rig(path)) if last else _now(path, out, knobs, new_reference=new_reference)
+    result = _last(load_rig(path)) if last else _run_check(path, out, knobs, new_reference=new_reference)
     if as_json:
         print_json(result.model_dump(mode="json"))
     else:
@@ -105,12 +105,12 @@ def new(
 
     The report is stored beside the file. Exit code 1 if a finding forbids switching the amplifier on.
     """
-    page = new_bench(target, named(template, "hardware_configs"), answers)
+    page = new_bench(target, file_path(template, "hardware_configs"), answers)
     if page.verdict is Verdict.FAIL:
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _now(path: Path, out: Path, knobs: Path | None, *, new_reference: bool) -> CheckResult:
+def _run_check(path: Path, out: Path, knobs: Path | None, *, new_reference: bool) -> CheckResult:
     rig, switch = load_rig(path), StopSwitch()
     with open_bench(rig) as opened, stop_on_signal(switch, "bench check"):
         if knobs is not None:

@@ -52,7 +52,7 @@ class Answers:
     @classmethod
     def read(cls, path: Path) -> "Answers":
         """Return the operator's answers from a TOML file."""
-        return cls({key: str(value) for key, value in _flat(toml_table(path))})
+        return cls({key: str(value) for key, value in _flatten(toml_table(path))})
 
     @property
     def questions(self) -> tuple[Question, ...]:
@@ -68,7 +68,7 @@ class Answers:
         console.print(f"{question.text} [{held}] {answer}")
         return answer
 
-    def wired(self, pair: str) -> str:
+    def connection(self, pair: str) -> str:
         """Return the answer whether a pair of connectors is wired; empty for no."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
@@ -94,11 +94,11 @@ def _name_in_a_comment(answer: str) -> str:
     return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 
-def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+def _flatten(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = []
     for key, value in table.items():
         if isinstance(value, dict):
-            found += _flat(value, f"{before}{key}.")
+            found += _flatten(value, f"{before}{key}.")
         else:
             found.append((f"{before}{key}", value))
     return found
@@ -173,6 +173,6 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
 
 def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPage:
     confirm: Confirm | None = None if given is None or rig.virtual is not None else given.knobs
-    wired, switch = partial(_confirm_wire, target) if given is None else given.wired, StopSwitch()
+    wired, switch = partial(_confirm_wire, target) if given is None else given.connection, StopSwitch()
     with open_bench(rig, confirm) as bench, stop_on_signal(switch, "bench new"):
         return first_day(bench, target, operator, wired, switch)

@@ -133,7 +133,7 @@ def _drive(
             f"--amplitude was given as {amplitude!r} and --frequency as {frequency!r}; give one of them as a "
             "range START:STOP and the other as one number"
         )
-    return (), _along(a, f)
+    return (), _axis_options(a, f)
 
 
 def _resonance(
@@ -155,7 +155,7 @@ def _resonance(
     }
 
 
-def _along(amplitude: Range, frequency: Range) -> dict[str, object]:
+def _axis_options(amplitude: Range, frequency: Range) -> dict[str, object]:
     if frequency.stop is not None:
         return {
             "along": Parameter.FREQUENCY,
@@ -178,7 +178,7 @@ def _recorded_curves(path: Path) -> tuple[Sequence[Curve], tuple[tuple[float, fl
 
 def _branch_in_words(number: int, line: BranchLine, along: Parameter) -> str:
     scale, unit = (1.0, "Hz") if along is Parameter.FREQUENCY else (1e6, "µm")
-    place = scale * line.along(along)
+    place = scale * line.axis_values(along)
     named = ", ".join(
         f"{each.kind} {scale * (each.frequency_hz if along is Parameter.FREQUENCY else each.amplitude_m):.5g}"
         for each in line.events

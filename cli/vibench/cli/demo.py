@@ -21,7 +21,7 @@ from vibench.analysis import (
     CampaignResults,
     analyse_files,
     campaign_summary,
-    merged_results,
+    merge_results,
 )
 from vibench.sim.background import Pool, Progress
 from vibench.sim.operating_system.this import replace_file
@@ -73,7 +73,7 @@ class Analyst:
 
     def together(self) -> CampaignResults:
         """Return the results of all recordings as one campaign."""
-        return merged_results(self._name, tuple(self.results()))
+        return merge_results(self._name, tuple(self.results()))
 
 
 @contextmanager
@@ -105,14 +105,14 @@ def demo(
     console.print()
     with second_process(campaign.name, draws) as analyst:
 
-        def recorded(point_result: PointResult) -> None:
+        def take_recording(point_result: PointResult) -> None:
             if point_result.outcome is PointOutcome.RECORDED:
                 analyst.take(point_result.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
         with the_bench(load_rig(rig), "demo") as engine:
             point_results = engine.measure(
-                CampaignRequest(campaign=campaign, folder=folder / "recordings"), recorded
+                CampaignRequest(campaign=campaign, folder=folder / "recordings"), take_recording
             )
         if {
             point_result.name

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
+from vibench.acquisition import MissingLibrary, require_extra, shipped_folder
 from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
@@ -123,7 +123,7 @@ def _place(folder: Path) -> str:
 def instruments() -> Iterator[tuple[str, str]]:
     """Yield the instruments found, with libraries, drivers and permissions."""
     try:
-        need_extra("bench")
+        require_extra("bench")
     except MissingLibrary as error:
         yield "libraries", str(error)
         return

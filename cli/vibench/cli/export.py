@@ -11,7 +11,7 @@ from vibench.analysis import (
     FrequencyResponseRequest,
     InvalidRequest,
     MagnitudeScale,
-    quantities_named,
+    parse_view,
     recordings_in,
     scan_files,
     spectral_functions,
@@ -66,9 +66,7 @@ def export(
                 "of a scan is exported by --to uff --spectra, with --out and --quantity if needed"
             )
         place = recording.resolve()
-        request = FrequencyResponseRequest(
-            view=quantities_named(quantity or "displacement", MagnitudeScale.LOG)
-        )
+        request = FrequencyResponseRequest(view=parse_view(quantity or "displacement", MagnitudeScale.LOG))
         with external_data(allow_external):
             path = file_at(out, place / f"{place.name}.uff")
             _report(tuple(scan_files(recordings_in(recording), request, path)), as_json=as_json)
@@ -82,7 +80,7 @@ def export(
             print_warnings([f"{recording.name}: {seal.sentence}"])
         path = file_at(out, recording.with_name(f"{chosen.name}.{to.value}"))
         if spectra:
-            view = quantities_named(quantity or "displacement", MagnitudeScale.LOG)
+            view = parse_view(quantity or "displacement", MagnitudeScale.LOG)
             functions = spectral_functions(chosen, FrequencyResponseRequest(view=view))
             written = export_functions(chosen, functions, to, path)
         else:

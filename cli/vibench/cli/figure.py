@@ -55,12 +55,12 @@ def figure(
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
 
-    def simulated(each: int) -> "Iterator[DrawnFigure]":
+    def draw_simulated(each: int) -> "Iterator[DrawnFigure]":
         yield paper_figure(each).draw(options, *(studies(one) for one in figure_studies[each]))
 
     written: list[dict[str, object]] = []
     for each in numbers:
-        for one in experiment(each) if each in EXPERIMENT else simulated(each):
+        for one in experiment(each) if each in EXPERIMENT else draw_simulated(each):
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
             written.append({"figure": each, "title": one.title, "files": [str(path) for path in paths]})
@@ -92,10 +92,10 @@ def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iter
     results = analyse_files(recordings_in(folder), folder.name)
     print_warnings(check_warnings(results))
     complain_about(results)
-    return lambda number: _measured(number, results)
+    return lambda number: _result_figures(number, results)
 
 
-def _measured(number: int, results: CampaignResults) -> "Iterator[DrawnFigure]":
+def _result_figures(number: int, results: CampaignResults) -> "Iterator[DrawnFigure]":
     from vibench.analysis.report import recording_figures, result_figures
 
     match number:

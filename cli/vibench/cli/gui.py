@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import named
+from vibench.acquisition import file_path
 
 from .options import option
 from .paths import BenchPath
@@ -23,7 +23,7 @@ def gui(
     """Open the window, in which you check a bench, plan, run and watch tests, and compare results."""
     command = [sys.executable, "-m", WINDOW]
     if bench is not None:
-        command += ["--bench", str(named(bench, "hardware_configs"))]
+        command += ["--bench", str(file_path(bench, "hardware_configs"))]
     if screenshots is not None:
         command += ["--screenshots", str(screenshots)]
     ended = subprocess.run(command, check=False)  # noqa: S603 - this interpreter, and our own package

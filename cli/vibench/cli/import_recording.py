@@ -10,7 +10,7 @@ import typer
 
 from vibench.acquisition import load_toml
 from vibench.analysis import InvalidRequest
-from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, opened_source
+from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, open_source
 
 from .options import option
 from .output import console, print_json
@@ -41,7 +41,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
         _print_contents(file, as_json)
         return
     meaning = load_toml(mapping, ImportMapping)
-    with opened_source(file) as source:
+    with open_source(file) as source:
         longest = max(each.samples for each in source.channels)
     target = file_at(out, file.with_suffix(".h5"))
     with transfer_bar("import", longest * len(meaning.channels)) as observer:
@@ -53,7 +53,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
 
 
 def _print_contents(file: Path, as_json: bool) -> None:
-    with opened_source(file) as source:
+    with open_source(file) as source:
         channels = source.channels
     if as_json:
         print_json({"file": str(file), "channels": [asdict(each) for each in channels]})

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import load_toml, named
+from vibench.acquisition import file_path, load_toml
 from vibench.analysis import InvalidRequest, recorded_response
 from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
 from vibench.analysis.report import SHOWN, ImageKind
@@ -64,7 +64,7 @@ def map_motions(
     as_json: AsJson = False,
 ) -> None:
     """Map the motions over two parameters or two start coordinates, or along one parameter."""
-    request = load_toml(named(plan, "studies/maps"), Map)
+    request = load_toml(file_path(plan, "studies/maps"), Map)
     gaps_m = request.specimen.specimen().gaps_m if request.gap_m is None else _ends(request.gap_m)
     print_warnings(plausibility_warnings(_ends(request.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
@@ -106,7 +106,7 @@ def map_motions(
     else:
         print_result(results, stability)
         console.print("The figure:", bold(drawn[0].resolve()))
-    complain_about_points(request, list(results.failures()), results.kept)
+    complain_about_points(request, list(results.failures()), results.done)
 
 
 def _ends(given: float | Range) -> tuple[float, ...]:
@@ -131,7 +131,7 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
 
 def _boundary_words(results: MapResults) -> str:
     unknown = "The uncertainty exponent is not determined:"
-    if len(results.plan.varied) == 1:
+    if len(results.plan.varying) == 1:
         return f"{unknown} ranges for two coordinates of the initial state are needed."
     rough = _roughness(results)
     if rough is None:
@@ -143,7 +143,7 @@ def _boundary_words(results: MapResults) -> str:
 
 
 def _roughness(results: MapResults) -> UncertaintyExponent | None:
-    is_plane = results.plan.is_basin and len(results.plan.varied) == 2
+    is_plane = results.plan.is_basin and len(results.plan.varying) == 2
     return uncertainty_exponent(results.motion_numbers[:, 0]) if is_plane else None
 
 
@@ -154,7 +154,7 @@ def document(results: MapResults, stability: tuple[KickStability, ...], file: Pa
     return {
         "file": str(file),
         "points": results.plan.grid.size,
-        "computed": results.computed,
+        "computed": results.points,
         "is_complete": results.is_complete,
         "audit": None
         if audit is None

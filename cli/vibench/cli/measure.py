@@ -35,7 +35,7 @@ from vibench.acquisition.engine import (
     TwinSwitch,
     serving,
 )
-from vibench.acquisition.plan import Campaign, played_alike, require_within_limits
+from vibench.acquisition.plan import Campaign, distinct_drives, require_within_limits
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 from vibench.sim import number_of
 
@@ -45,7 +45,7 @@ from .output import ExitCode, console, errors, leave_output_to_json, paragraph, 
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
-    from vibench.analysis import Expected, TimeShare
+    from vibench.analysis import ExpectedResult, TimeShare
 
 
 class Form(StrEnum):
@@ -58,7 +58,7 @@ class Form(StrEnum):
 def print_estimate(
     expected: CampaignEstimate,
     form: Form,
-    known: Mapping[str, Sequence["Expected"]] = MappingProxyType({}),
+    known: Mapping[str, Sequence["ExpectedResult"]] = MappingProxyType({}),
     shares: Sequence["TimeShare"] = (),
     ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
 ) -> None:
@@ -84,9 +84,9 @@ def print_estimate(
                     console.print(f"{name}: {each.sentence}")
 
 
-def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
+def expected_results(campaign: Campaign, rig: Rig) -> dict[str, tuple["ExpectedResult", ...]]:
     """Return the expected results of each measurement; raise LimitExceeded for a plan beyond a limit."""
-    for point in played_alike(campaign.points()):
+    for point in distinct_drives(campaign.points()):
         require_within_limits(point.measurement, rig)
     found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
     return {name: each for name, each in found.items() if each}
@@ -205,8 +205,8 @@ def measure(
     existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
     shares: tuple[TimeShare, ...] = ()
     if time_limit is not None:
-        plan, shares = vibench.analysis.within(plan, rig, duration_s(time_limit))
-    known = expected_of(plan, rig) if only_estimate else {}
+        plan, shares = vibench.analysis.fit_to(plan, rig, duration_s(time_limit))
+    known = expected_results(plan, rig) if only_estimate else {}
     print_estimate(
         estimate_campaign(plan, rig, out, existing),
         Form.JSON if as_json and only_estimate else Form.TEXT,

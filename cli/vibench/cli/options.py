@@ -66,10 +66,10 @@ class RequestOptions(Generic[Request]):
 
     def request(self, **others: object) -> Request:
         """Return the request after the command has set other fields; raise InvalidRequest if forbidden."""
-        return validated(self.model, {**others, **self.typed})
+        return build_request(self.model, {**others, **self.typed})
 
 
-def validated(model: type[Request], given: Mapping[str, object]) -> Request:
+def build_request(model: type[Request], given: Mapping[str, object]) -> Request:
     """Return a request with these values; raise InvalidRequest that names the first forbidden value."""
     from pydantic import ValidationError
 

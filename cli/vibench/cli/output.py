@@ -10,7 +10,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from vibench.acquisition import printable, shortened
+from vibench.acquisition import printable, shorten
 
 if TYPE_CHECKING:
     from rich.progress import TextColumn
@@ -39,7 +39,7 @@ class PrintableConsole(Console):
 
     def print(self, *objects: Any, **settings: Any) -> None:
         """Print each string as one line; use `paragraph` for text of several lines."""
-        super().print(*map(_shown, objects), **settings)
+        super().print(*map(_printable, objects), **settings)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """Render tables, progress bars and lines of text, with control characters escaped."""
@@ -48,8 +48,8 @@ class PrintableConsole(Console):
             yield segment if segment.control else Segment(text, segment.style)
 
 
-def _shown(each: Any) -> Any:
-    return shortened(printable(each), LONGEST_LINE) if isinstance(each, str) else each
+def _printable(each: Any) -> Any:
+    return shorten(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
 # Allow no markup and no emoji codes, because names and paths may look like such codes.

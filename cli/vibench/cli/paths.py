@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from vibench.acquisition import ConfigurationError, named
+from vibench.acquisition import ConfigurationError, file_path
 
 from .options import option
 
@@ -40,7 +40,7 @@ def external_data(allowed: bool) -> AbstractContextManager[None]:
 
 def bench_path(given: Path | None) -> Path:
     """Return the path of the hardware configuration; by default the virtual rig's."""
-    return named("virtual_rig" if given is None else given, "hardware_configs")
+    return file_path("virtual_rig" if given is None else given, "hardware_configs")
 
 
 def rig_at(bench: Path | None, faults: Path | None) -> "Rig":

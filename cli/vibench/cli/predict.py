@@ -117,7 +117,7 @@ def predict(
 
             existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
             found = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
-            points, failures, kept = list(found.predictions()), list(found.failures()), found.kept
+            points, failures, kept = list(found.predictions()), list(found.failures()), found.done
             taken_s = found.values("taken").ravel().tolist()
     if as_json:
         from vibench.sim.study import software
@@ -185,7 +185,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
     plans = [plan_scene(scene) for scene in scenes]
     passages = []
-    for _, run in groupby(range(len(plans)), lambda number: plans[number].alike):
+    for _, run in groupby(range(len(plans)), lambda number: plans[number].batch_key):
         alike = list(run)
         each = [(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]
         passages.append(_passage(each, has_target=study.target is not None))
@@ -221,7 +221,7 @@ def _table(title: str, headings: Sequence[str], caption: str | None = None) -> T
 
 
 def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
-    title = "Responses I and II of m0 and of p = y - z, over the base amplitude [-]; relative error"
+    title = "Responses I and II of m0 and p = y - z over the base amplitude, relative error"
     headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     rows = _table(title, headings + ["exponent [1/s]"] * has_exponents)
     step = max(1, -(-len(points) // _SHOWN))

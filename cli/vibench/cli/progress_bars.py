@@ -68,7 +68,7 @@ def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
                 bars.tasks[0].total = None  # reset alone keeps the total of the previous stage
                 bars.reset(bar, description=progress.note)
                 return
-            left = "" if progress.left_s is None else f"{_duration(progress.left_s)} left"
+            left = "" if progress.remaining_s is None else f"{_duration(progress.remaining_s)} left"
             left += f", {progress.note}" if progress.note else ""
             bars.update(bar, total=progress.of, completed=progress.done, left=left)
 

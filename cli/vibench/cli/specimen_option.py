@@ -39,5 +39,5 @@ def specimen_request(
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])
-    print_warnings(plausibility_warnings(ends_m, request.shaken.gaps_m))
+    print_warnings(plausibility_warnings(ends_m, request.chosen_specimen.gaps_m))
     return request

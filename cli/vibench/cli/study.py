@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import load_toml, named
+from vibench.acquisition import file_path, load_toml
 from vibench.sim.study import (
     ExistingStudy,
     Study,
@@ -40,7 +40,7 @@ def study(
 ) -> None:
     """Predict every combination of the values in a file, starting with the longest runs."""
     require_suffix(out, ".h5")
-    request = load_toml(named(plan, "studies"), Study)
+    request = load_toml(file_path(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
     )
@@ -63,8 +63,8 @@ def study(
     else:
         failed = sum(1 for _ in results.failures())
         state = "complete" if results.is_complete else "stopped: continue with --resume"
-        console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
-    complain_about_points(request, list(results.failures()), results.kept)
+        console.print(f"{out}: {results.done} of {results.study.grid.size} points, {failed} failed ({state})")
+    complain_about_points(request, list(results.failures()), results.done)
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
@@ -72,7 +72,7 @@ def document(results: StudyResults, out: Path) -> dict[str, object]:
     return {
         "file": str(out),
         "points": results.study.grid.size,
-        "kept": results.kept,
+        "kept": results.done,
         "is_complete": results.is_complete,
         "sessions": len(results.sessions),
         "failures": [{**where, "message": why} for where, why in results.failures()],
@@ -107,7 +107,7 @@ class KeptStudies:
         self._failed += print_failures(study, list(results.failures()))
         if not results.is_complete:
             errors.print(
-                f"stopped after {results.kept} of {study.grid.size} points; repeat the command to continue"
+                f"stopped after {results.done} of {study.grid.size} points; repeat the command to continue"
             )
             raise typer.Exit(ExitCode.STOPPED)
         return results

@@ -13,7 +13,7 @@ from vibench.sim import Rest
 from vibench.sim.accuracy_benchmark.curve import CurvePoint, scene_curve
 from vibench.sim.study import Study
 
-from .options import Fields, RequestOptions, option, validated
+from .options import Fields, RequestOptions, build_request, option
 from .output import console, print_json, print_table
 from .paper.options import AMPLITUDES_M
 from .paths import AsJson, room_for_folder
@@ -71,7 +71,7 @@ def tradeoff(
 def _study(
     amplitude_m: float, frequency_hz: float, typed: Mapping[str, Any], target: dict[str, str]
 ) -> Study:
-    return validated(
+    return build_request(
         Study,
         {
             "specimen": read_specimen(typed.get("specimen")),

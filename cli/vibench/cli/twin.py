@@ -64,7 +64,7 @@ class _Following:
     run_id: int = -1
     plan: str = ""
     missed: int = 0
-    begun_s: float = 0.0
+    start_s: float = 0.0
     busy_s: float = 0.0
     is_kept: bool = False
 
@@ -94,7 +94,7 @@ class _Following:
         baseline = kept_baseline(baseline_path(self.rig, self.specimen))
         self.live.begin_run(None if baseline is None else baseline.levels.get(self.plan))
         self.missed, self.is_kept = 0, False
-        self.begun_s, self.busy_s = time.monotonic(), time.process_time()
+        self.start_s, self.busy_s = time.monotonic(), time.process_time()
 
     def _take(self, piece: SampleSlice, status: EngineStatus, most: int) -> None:
         assert status.bench is not None
@@ -108,20 +108,20 @@ class _Following:
             for sentence in self.live.take(
                 piece.first_sample + begin, base[part], velocity[part], frequency_hz
             ):
-                self.client.tell_change(sentence)
+                self.client.note_change(sentence)
         self._keep_baseline()
-        self.client.tell_twin(self._status(piece.sample_rate_hz))
+        self.client.publish_twin(self._status(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
         """Store the estimated parameters and usual residual once, as a baseline for checking later runs."""
         live, watch = self.live, self.live.watch
-        if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
+        if self.is_kept or watch.usual is None or watch.has_changed or not live.numbers:
             return
         self.is_kept = True
         path = baseline_path(self.rig, self.specimen)
         before = kept_baseline(path)
         if before is None:
-            before = Baseline(bench=self.rig.name, since=datetime.now(UTC), numbers=live.known, levels={})
+            before = Baseline(bench=self.rig.name, since=datetime.now(UTC), numbers=live.numbers, levels={})
         if self.plan not in before.levels:
             levels = {**before.levels, self.plan: watch.usual}
             try:
@@ -150,7 +150,7 @@ class _Following:
             numbers=tuple(each.row[:2] for each in self.live.found),
             level=newest.level if np.isfinite(newest.level) else None,
             limit=newest.limit if np.isfinite(newest.limit) else None,
-            busy_share=used_s / max(time.monotonic() - self.begun_s, 1e-3),
+            busy_share=used_s / max(time.monotonic() - self.start_s, 1e-3),
             missed_s=self.missed / rate_hz,
         )
 
@@ -184,7 +184,7 @@ def twin(
             following = _following(client, rig, specimen, executor)
             if new_baseline:
                 baseline_path(rig, following.specimen).unlink(missing_ok=True)
-            client.tell_twin(TwinStatus(pid=os.getpid(), state="waiting", sentence="nothing is measured"))
+            client.publish_twin(TwinStatus(pid=os.getpid(), state="waiting", sentence="nothing is measured"))
             console.print(f"Following {engine.what}, process {engine.pid}; Ctrl-C ends the twin.")
             while True:
                 time.sleep(following.look())

@@ -23,7 +23,7 @@ from typing import Self
 
 import numpy as np
 from helic_link import HelicLink, Packet
-from helic_signals import READ, Coefficients, Glide, Played, pd_gains
+from helic_signals import READ, Coefficients, Glide, Signal, pd_gains
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost
 from vibench.acquisition.instruments import Identity
@@ -71,7 +71,7 @@ class HelicController:
         self._error: InstrumentError | None = None
         """Error after which no further request is possible; None without one."""
         self._gains: tuple[float, ...] = ()
-        self._now = Played(0.0, np.zeros(self._harmonics, dtype=np.complex128))
+        self._now = Signal(0.0, np.zeros(self._harmonics, dtype=np.complex128))
         self._glide: Glide | None = None
         self._coefficients: Coefficients | None = None
         self._blocks: list[LoopBlock] = []
@@ -93,7 +93,7 @@ class HelicController:
         host, port = session(config.resource)
         link = HelicLink(host, port, int(config.options.get("stream_port", port + 1)))
         try:
-            read = checked(link, config)
+            read = check_board(link, config)
             return cls(link, config, read)
         except BaseException:
             link.close()  # this closes the board's gate
@@ -122,7 +122,7 @@ class HelicController:
         with self._turn:
             report = self._new_report()
             try:
-                self._go_over(Played(program.frequency_hz, wanted), gains, program.glide_s)
+                self._go_over(Signal(program.frequency_hz, wanted), gains, program.glide_s)
             except InstrumentError as error:
                 self._give_up(error)
                 raise
@@ -183,19 +183,19 @@ class HelicController:
         time_s = max(self._following, 0) / self._facts.rate_hz
         return LoopReport(state=self._state, reason=self._reason, time_s=time_s, blocks=blocks)
 
-    def _go_over(self, wanted: Played, gains: tuple[float, ...], glide_s: float) -> None:
+    def _go_over(self, wanted: Signal, gains: tuple[float, ...], glide_s: float) -> None:
         if gains != self._gains:
             for name, gain in zip(GAINS, gains, strict=True):
                 self._link.set(name, gain)
             self._gains = gains
         if self._state is LoopState.SILENT:
-            self._tell(Played(wanted.frequency_hz, np.zeros_like(wanted.volts)))
+            self._send(Signal(wanted.frequency_hz, np.zeros_like(wanted.volts)))
             open_gate(self._link)
             self._late, self._at_limit = self._ticks_late(), 0
         samples = max(glide_s * self._facts.rate_hz, 1.0)
         self._glide = Glide(self._following, samples, self._now, wanted, is_last=False)
 
-    def _tell(self, played: Played) -> None:
+    def _send(self, played: Signal) -> None:
         if played.frequency_hz != self._now.frequency_hz:
             self._link.set("freq", played.frequency_hz)
         if np.any(played.volts != self._now.volts):
@@ -212,7 +212,7 @@ class HelicController:
     def _close_gate(self) -> None:
         self._link.set("arm", 0)
         self._state, self._glide, self._coefficients = LoopState.SILENT, None, None
-        self._tell(replace(self._now, volts=np.zeros_like(self._now.volts)))
+        self._send(replace(self._now, volts=np.zeros_like(self._now.volts)))
 
     def _give_up(self, error: InstrumentError) -> None:
         """Silence the board after an error: by command or, if that fails, by closing the connection."""
@@ -251,7 +251,7 @@ class HelicController:
         """Receive samples and continue a glide or a ramp, in a separate thread."""
         while not self._leaving.is_set():
             try:
-                packets = self._link.heard(LISTENING_S)
+                packets = self._link.read_packets(LISTENING_S)
                 with self._turn:
                     if packets and self._error is None:
                         for each in packets:
@@ -293,7 +293,7 @@ class HelicController:
         if glide is None:
             return
         share = (self._following - glide.start) / glide.samples
-        self._tell(glide.begin.towards(glide.end, share) if share < 1.0 else glide.end)
+        self._send(glide.begin.blend(glide.end, share) if share < 1.0 else glide.end)
         if share >= 1.0:
             self._glide = None
             if glide.is_last:
@@ -310,7 +310,7 @@ def session(resource: str) -> tuple[str, int]:
     return found[1], int(found[2])
 
 
-def checked(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
+def check_board(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
     """Check a board against its configuration, clear its program, and return the sources to be read."""
     missing = [each for each in (*GAINS, "ctrl_ki") if each not in link.parameters]
     if missing:

@@ -137,9 +137,9 @@ class HelicLink:
             self._sequence = (self._sequence + 1) % 256
             try:
                 self._control.sendall(frame(ask, self._sequence, payload))
-                head = self._received(_HEAD.size)
+                head = self._receive(_HEAD.size)
                 magic, kind, sequence, length = _HEAD.unpack(head)
-                rest = self._received(length + 2)
+                rest = self._receive(length + 2)
             except OSError as error:
                 raise InstrumentLost(
                     f"the board at {self.where} does not answer ({error or type(error).__name__}). Its gate "
@@ -161,7 +161,7 @@ class HelicLink:
             )
         return answer
 
-    def _received(self, count: int) -> bytes:
+    def _receive(self, count: int) -> bytes:
         parts = b""
         while len(parts) < count:
             part = self._control.recv(count - len(parts))
@@ -202,7 +202,7 @@ class HelicLink:
         self.request(Ask.STREAM_SETUP, struct.pack("<HIB", 1, 0, len(numbers)) + numbers)
         self.request(Ask.STREAM_START, struct.pack("<H", self._samples.getsockname()[1]))
 
-    def heard(self, timeout_s: float) -> list[Packet]:
+    def read_packets(self, timeout_s: float) -> list[Packet]:
         """Wait for samples, and return all packets that have arrived."""
         packets: list[Packet] = []
         self._samples.settimeout(timeout_s)

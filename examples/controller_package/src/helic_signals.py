@@ -18,17 +18,17 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Signal:
     """Signal set on the board: frequency, and coefficient of each harmonic [V]."""
 
     frequency_hz: float
     volts: Volts
 
-    def towards(self, other: "Played", share: float) -> "Played":
+    def blend(self, other: "Signal", share: float) -> "Signal":
         """Return the signal at a ``share`` of the way to ``other``, along a half cosine."""
         share = 0.5 - 0.5 * float(np.cos(np.pi * min(share, 1.0)))
         frequency_hz = self.frequency_hz + share * (other.frequency_hz - self.frequency_hz)
-        return Played(frequency_hz, self.volts + share * (other.volts - self.volts))
+        return Signal(frequency_hz, self.volts + share * (other.volts - self.volts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +38,8 @@ class Glide:
     start: int
     """Number of the first sample."""
     samples: float
-    begin: Played
-    end: Played
+    begin: Signal
+    end: Signal
     is_last: bool
     """Whether the gate closes at the end of the glide."""
 

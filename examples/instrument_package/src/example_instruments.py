@@ -150,17 +150,17 @@ class PlainScpiGenerator:
                 self._session.close()
 
     def _command(self, message: str) -> None:
-        self._talk(self._session.write, message)
+        self._call(self._session.write, message)
         if not (reply := self._ask("SYST:ERR?")).startswith("0"):
             raise InstrumentError(
                 f"the generator refused {message!r}: {reply}. Check the value and try again"
             )
 
     def _ask(self, message: str) -> str:
-        self._talk(self._session.write, message)
-        return self._talk(self._session.read_raw).decode("ascii", errors="replace").strip()
+        self._call(self._session.write, message)
+        return self._call(self._session.read_raw).decode("ascii", errors="replace").strip()
 
-    def _talk(self, call, *arguments):
+    def _call(self, call, *arguments):
         if not self._is_open:
             raise InstrumentError("the generator is closed; open the bench again")
         try:

@@ -12,7 +12,7 @@ from vibench.analysis.overlay.simulated_channels import SimulatedChannels
 from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 
 
-def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[SteppedResponse]]:
+def _refuse_draws(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[SteppedResponse]]:
     raise UnusableData(
         "the branch was not simulated: a fast loop held its motions; driven by the recorded voltage "
         "alone, the model leaves them; compare the motions with the branch of the model"
@@ -21,5 +21,5 @@ def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[Stepp
 
 # A branch may have several motions at one frequency, so it is not a curve over frequency.
 BRANCH_CONTINUATION = replace(
-    stepped_analysis(lambda *_: nan, SegmentLabel.BRANCH), draws=_undrawn, curves=lambda *_: iter(())
+    stepped_analysis(lambda *_: nan, SegmentLabel.BRANCH), draws=_refuse_draws, curves=lambda *_: iter(())
 )

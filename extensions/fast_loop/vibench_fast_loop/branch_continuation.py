@@ -93,7 +93,7 @@ class BranchContinuation(AbstractFeedback):
         """Return the segment in which a point is recorded."""
         return Segment(SegmentLabel.BRANCH, {"point": number, "frequency_hz": frequency_hz})
 
-    def perturbed(self, number: int, frequency_hz: float, size_v: float) -> Segment:
+    def perturbation_segment(self, number: int, frequency_hz: float, size_v: float) -> Segment:
         """Return the segment in which the drive of a point is perturbed."""
         numbers = {"point": number, "frequency_hz": frequency_hz, "size_v": size_v}
         return Segment(SegmentLabel.PERTURBED, numbers)

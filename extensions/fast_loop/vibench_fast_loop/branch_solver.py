@@ -106,7 +106,7 @@ class BranchSolver:
         along = np.array([1.0, 0.0, 0.0])
         return PredictedPoint(self._begin, along * self._begin[0], along, 0.0)
 
-    def next(self, points: Sequence[MeasuredPoint], length: float, way: float) -> PredictedPoint:
+    def predict(self, points: Sequence[MeasuredPoint], length: float, way: float) -> PredictedPoint:
         """Return a prediction at distance ``length``; ``way`` (1 or -1) is the direction at the start."""
         here = points[-1]
         if len(points) == 1:
@@ -114,7 +114,7 @@ class BranchSolver:
             level = -self._slope[0, 0] / self._slope[0, 1]
             moved = np.concatenate([[way, way * level], np.zeros(len(here.unknowns) - 2)])
         else:
-            behind = _behind(points)
+            behind = _reference(points)
             chord = here.place - behind.place
             along = chord / np.linalg.norm(chord)
             moved = (here.unknowns - behind.unknowns) / np.linalg.norm(chord)
@@ -192,7 +192,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 
-def _behind(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
+def _reference(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
     """Return the newest point far enough from the last point to define a direction, else the first point."""
     here = points[-1]
     for there in reversed(points[1:-1]):

@@ -125,7 +125,7 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
                 return len(points), BranchEnd.POINTS
             if tries <= _EASY:
                 length = min(length * _GROWTH, 1.0)
-        found = yield from _correct(player, solver, solver.next(points, length, way))
+        found = yield from _correct(player, solver, solver.predict(points, length, way))
 
 
 def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[MeasuredPoint, int] | None]:
@@ -253,7 +253,7 @@ def perturbed_stability(
     phases = yield from _play_changes(player, setting, first_v * changes[:_TRIAL], None)
     seen = max(envelope_deviation(each, period) for each in _join(phases, channels))
     size_v = first_v * min(plan.perturbation / max(seen, _NEVER), _MOST_SIZE / _FIRST_SIZE)
-    segment = plan.perturbed(number, frequency_hz, size_v)
+    segment = plan.perturbation_segment(number, frequency_hz, size_v)
     course = np.concatenate([-changes[-_LEAD:], changes, -changes, np.zeros((1, len(_CHANGED)))])
     phases = yield from _play_changes(player, setting, size_v * course, segment)
     after = yield from player.measure(setting, abs(before.base_m[0]))

@@ -20,16 +20,16 @@ from vibench.analysis.figures.style import (
     MEASURED,
     SIMULATED,
     DrawnFigure,
+    figure_style,
     legend_above,
     new_figure,
-    prefixed,
-    styled,
+    with_prefix,
 )
 from vibench.analysis.recordings.facts import specimen_of
 from vibench.analysis.report import STEPPED
 from vibench.analysis.signals.arrays import Reals
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
-from vibench.analysis.tables import Labelled, table
+from vibench.analysis.tables import Tabular, table
 from vibench.sim import Branch, Specimen
 
 from .fast_loop import impact_branch
@@ -39,7 +39,7 @@ _LEAST = 3
 
 
 @dataclass(frozen=True)
-class HeldBranch(Labelled):
+class HeldBranch(Tabular):
     """Motions of one branch in recorded order; arrays of shape (points,)."""
 
     frequency_hz: Reals
@@ -113,8 +113,8 @@ _ROOM_HZ = 1.0
 def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
     """Draw the amplitude of m0 over frequency at the held points, with the model's branch."""
     found = held_branch(analysis.facts.feedback)
-    scale, unit = prefixed(float(np.max(found.m0_m, initial=1e-9)), "m")
-    with styled():
+    scale, unit = with_prefix(float(np.max(found.m0_m, initial=1e-9)), "m")
+    with figure_style():
         figure = new_figure(_HEIGHT_IN)
         axes: Axes = figure.subplots(1, 1)
         model = model_branch(found, specimen_of(analysis.facts.bench))

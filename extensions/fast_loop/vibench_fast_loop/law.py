@@ -102,7 +102,7 @@ class _WeightedPlant(NamedTuple):
 
     step: Table
     volt: Vector
-    shown: Table
+    sensing: Table
     cost: Table
     unknown: Table
     noise: Table
@@ -121,14 +121,14 @@ def _weigh(plant: SampledPlant) -> _WeightedPlant:
     pushed = step @ into * plant.timing.step_s
     unknown = np.outer(pushed, pushed) * PUSH_N**2 + np.outer(volt, volt) * VOLT**2
     noise = np.diag(np.square(NOISE))
-    return _WeightedPlant(step, volt, plant.shown * scale, cost, unknown, noise)
+    return _WeightedPlant(step, volt, plant.sensing * scale, cost, unknown, noise)
 
 
 def _expected_cost(problem: _WeightedPlant, law: LinearLaw) -> float:
     """Return the mean cost per sample under noise; infinite if the loop is unstable."""
-    answer = np.hstack([law.direct @ problem.shown, law.output])[0]
+    answer = np.hstack([law.direct @ problem.sensing, law.output])[0]
     own = len(problem.step)
-    closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
+    closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.sensing, law.step])])
     closed[:own, :own] = problem.step
     closed[:own] += np.outer(problem.volt, answer)
     if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
@@ -197,10 +197,10 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
     """Return the matrices of the sections of a step; the state is plant, law memory, and voltage."""
     own, memory = plant.size, len(law.step)
-    answer = np.hstack([law.direct @ plant.shown, law.output])
+    answer = np.hstack([law.direct @ plant.sensing, law.output])
     (first, of_first), *others = plant.stretches(parts)
     begin = np.zeros((own + memory + 1, own + memory + 1))
-    begin[:own, :own], begin[own:-1, :own], begin[own:-1, own:-1] = first, law.inlet @ plant.shown, law.step
+    begin[:own, :own], begin[own:-1, :own], begin[own:-1, own:-1] = first, law.inlet @ plant.sensing, law.step
     begin[:own, :-1] += np.outer(of_first, answer)
     begin[-1, :-1] = answer[0]
     joined = [begin]

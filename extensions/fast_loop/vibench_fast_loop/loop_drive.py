@@ -68,12 +68,12 @@ class LoopDrive:
             self._silence(QUICK_S)
         else:
             self._play(phase.play, phase.duration_s if phase.state is RunState.RAMPING_UP else None)
-        yield from self._talking(phase.duration_s)
+        yield from self._split_duration(phase.duration_s)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
         """Ramp down, timed by the clock of the controller."""
         self._silence(ramp_s)
-        yield from self._talking(ramp_s)
+        yield from self._split_duration(ramp_s)
 
     def cut(self) -> None:
         """Silence the output without a ramp."""
@@ -102,7 +102,7 @@ class LoopDrive:
             self._program = next_program
             self._controller.play(next_program)  # this discards the blocks of the previous program
 
-    def _talking(self, duration_s: float) -> Iterator[float]:
+    def _split_duration(self, duration_s: float) -> Iterator[float]:
         longest_s = TALK * self._controller.facts.watchdog_s
         while duration_s > _ROUNDING_S:
             piece_s = min(duration_s, longest_s)

@@ -123,7 +123,7 @@ class SampledPlant:
         return second @ first, second @ volt + more
 
     @cached_property
-    def shown(self) -> Table:
+    def sensing(self) -> Table:
         """Matrix for base acceleration and m0 velocity, as means since the last sample, shape (2, n)."""
         rows = np.zeros((SHOWN, self.size))
         rows[0, [TABLE_V, 9]] = self.timing.rate_hz, -self.timing.rate_hz
@@ -138,7 +138,7 @@ class SampledPlant:
         # The list of delayed voltages ends with the oldest voltage; the new voltage precedes the list.
         columns = [*range(11, self.size)][::-1]
         for place, (begin_s, end_s) in enumerate(((start_s, change_s), (change_s, stop_s))):
-            moved, gain = _driven(*self.equations, end_s - begin_s)
+            moved, gain = _discretise(*self.equations, end_s - begin_s)
             matrix[:9], newest[:9] = moved @ matrix[:9], moved @ newest[:9]
             if place < len(columns):
                 matrix[:9, columns[place]] += gain
@@ -147,7 +147,7 @@ class SampledPlant:
         return matrix, newest
 
 
-def _driven(rates: Table, volts: Vector, length_s: float) -> tuple[Table, Vector]:
+def _discretise(rates: Table, volts: Vector, length_s: float) -> tuple[Table, Vector]:
     joint = np.zeros((len(volts) + 1, len(volts) + 1))
     joint[:-1, :-1], joint[:-1, -1] = rates * length_s, volts * length_s
     moved = expm(joint)

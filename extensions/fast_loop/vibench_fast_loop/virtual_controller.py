@@ -66,7 +66,7 @@ class VirtualController:
         self._reason = ""
         self._blocks: list[LoopBlock] = []
         self._program: LoopProgram | None = None
-        self._now = self._new()
+        self._now = self._controller()
         self.cables = LoopCables(self)
         """Connection of the controller to the simulated world."""
 
@@ -76,7 +76,7 @@ class VirtualController:
         return self._state is not LoopState.SILENT
 
     @contextmanager
-    def answering(self) -> Iterator[Structure]:
+    def hold_state(self) -> Iterator[Structure]:
         """Yield the state with which samples are processed; the host cannot change it meanwhile.
 
         The state is a `Controller` of native/structures.hpp.
@@ -131,7 +131,7 @@ class VirtualController:
         began = not self.is_on or before is None
         omega = 2 * np.pi * program.frequency_hz / self.facts.rate_hz
         if began:
-            self._now = self._new()
+            self._now = self._controller()
             self._now["omega"] = omega
         now = self._now
         before_v, after_v = now["reference"].copy()
@@ -150,7 +150,7 @@ class VirtualController:
         self._program, self._state, self._reason = program, LoopState.PLAYING, ""
         now["is_on"] = 1
 
-    def _new(self) -> Structure:
+    def _controller(self) -> Structure:
         rate_hz = self.facts.rate_hz
         return native_engine().new(
             "Controller",
@@ -218,7 +218,7 @@ class LoopCables:
         native_engine().fill(cables, shaker=shaker.structure.ctypes.data, drive=drive, base=base, m0=m0)
         done, end = 0, _LoopEnd.COMPLETE
         while end is not _LoopEnd.MOTION_LOST and done < drive.size:
-            with self._loop.answering() as loop:
+            with self._loop.hold_state() as loop:
                 cables["controller"] = loop.ctypes.data
                 end = _LoopEnd(native_engine().call("close_loop", cables))
                 done = int(cables["begin"])

@@ -38,7 +38,7 @@ class Progress:
     done: int
     of: int
     """Total amount of work of the job, in the unit of ``done``; 0 if unknown."""
-    left_s: float | None = None
+    remaining_s: float | None = None
     """Expected remaining time of the job [s]; None if unknown."""
     note: str = ""
 
@@ -160,7 +160,7 @@ class Pool:
             self._take(worker)
             if worker.job is not None and monotonic() > worker.job.end_s:
                 reason = f"the job took more than {worker.job.longest_s / 60:.0f} minutes and was stopped"
-                self._lose(worker, TimeoutError(reason))
+                self._drop_worker(worker, TimeoutError(reason))
         self._hand_out()
 
     def close(self) -> None:
@@ -191,14 +191,14 @@ class Pool:
                 kind, value = worker.messages.get_nowait()
                 job = worker.job
                 if kind == "end":
-                    self._lose(worker, value)
+                    self._drop_worker(worker, value)
                     return
                 if kind != "part":
                     worker.job = None
                 if job is not None:
                     _call_back(job, kind, value)
 
-    def _lose(self, worker: "Worker", error: BaseException) -> None:
+    def _drop_worker(self, worker: "Worker", error: BaseException) -> None:
         if worker in self.workers:  # unless a callback has closed the pool
             self.workers.remove(worker)
             worker.end()
@@ -289,12 +289,12 @@ def _serve(connection: Any) -> None:
                 dropped.set()
                 continue
             dropped = Event()
-            done = executor.submit(_pack_answer, work, partial(_tell, connection), dropped.is_set)
+            done = executor.submit(_pack_answer, work, partial(_send_part, connection), dropped.is_set)
             done.add_done_callback(partial(_send_answer, connection))
     os._exit(0)  # the parent process has ended
 
 
-def _tell(connection: Any, part: object) -> None:
+def _send_part(connection: Any, part: object) -> None:
     connection.send(("part", part))
 
 

@@ -6,7 +6,7 @@ from time import monotonic
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, validated
+from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, validate
 from vibench.acquisition.campaign import (
     CampaignEventKind,
     ExistingRecordings,
@@ -68,7 +68,7 @@ def test_a_stop_ends_a_cooling_pause(bench, tmp_path):
     def idle_and_stop(duration_s):
         idle(duration_s)
         if bench.idled_s > 5.0:
-            switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+            switch.ask(StopRequest.of(Cause.OPERATOR, "enough"))
 
     bench.idle = idle_and_stop
     point_results = run_campaign(bench, campaign("one", "two", rest_s=REST_S), tmp_path, switch=switch)
@@ -120,4 +120,4 @@ def test_an_invalid_cooling_pause_is_refused():
     longest = timedelta(days=1).total_seconds()
     for given in (-1.0, longest + 1):
         with pytest.raises(ConfigurationError, match="rest_s"):
-            validated({"name": "c", "rest_s": given}, Campaign, "c.toml")
+            validate({"name": "c", "rest_s": given}, Campaign, "c.toml")

@@ -147,7 +147,7 @@ def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, fold
     if not has_journal:
         journal.unlink()
     switch = StopSwitch()
-    switch.ask(StopRequest.by(Cause.OPERATOR, "not today"))
+    switch.ask(StopRequest.of(Cause.OPERATOR, "not today"))
     assert run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, switch=switch) == ()
     if has_journal:
         assert [each.state for each in read_journal(journal)] == [JournalPointState.DONE] * 3
@@ -398,7 +398,7 @@ def run_until_disk_refuses(bench, folder, stop):
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_path, has_journal):
-    run_until_disk_refuses(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
+    run_until_disk_refuses(bench, tmp_path, StopRequest.of(Cause.OPERATOR, "enough"))
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
     assert (tmp_path / "two.h5.part").exists()

@@ -2,11 +2,11 @@
 
 import pytest
 
-from vibench.acquisition import RecordingError, run_campaign, validated
+from vibench.acquisition import RecordingError, run_campaign, validate
 from vibench.acquisition.campaign import ExistingRecordings, estimate_campaign
 from vibench.acquisition.plan import Campaign
 
-CAMPAIGN = validated(
+CAMPAIGN = validate(
     {
         "name": "c",
         "sweeps": [

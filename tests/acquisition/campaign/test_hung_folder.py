@@ -26,7 +26,7 @@ def test_a_hanging_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch)
         if stand.run.state is not RunState.RECORDING:
             return
         if status.is_fifo():
-            switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+            switch.ask(StopRequest.of(Cause.OPERATOR, "enough"))
         else:
             # Replace the file in one step: the status writer may run between an unlink and a mkfifo.
             os.mkfifo(fifo)

@@ -17,7 +17,7 @@ from vibench.acquisition import (
     open_recording,
     run_campaign,
     shipped,
-    validated,
+    validate,
 )
 from vibench.acquisition.campaign import (
     CampaignEventKind,
@@ -49,7 +49,7 @@ def scan(**others):
     excitation = {"kind": "dwell", "amplitude_vpp": 0.3, "frequency_hz": 150, "settle_s": 0.2}
     plan = {"ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": {**excitation, "duration_s": 0.3}}
     content = {"name": "c", "scan": points, "measurements": [{"name": "dwell", **plan}], **others}
-    return validated(content, Campaign, "c.toml")
+    return validate(content, Campaign, "c.toml")
 
 
 @pytest.fixture
@@ -118,7 +118,7 @@ def test_a_scan_stopped_at_its_third_point_resumes_there(coarse, tmp_path, journ
 
     def stop_at_third_point(progress):
         if progress.name == "dwell-side":
-            switch.ask(StopRequest.by(Cause.OPERATOR, "stopped"))
+            switch.ask(StopRequest.of(Cause.OPERATOR, "stopped"))
 
     with ReconnectingBench(coarse) as kept:
         first = run_campaign(kept.bench, scan(), tmp_path, on_progress=stop_at_third_point, switch=switch)
@@ -214,7 +214,7 @@ def test_a_scan_without_a_move_command_waits_for_the_operator(coarse, tmp_path):
                 assert switch.is_holding
                 assert not DRIVES_ON
                 if event.facts["point"] == "side":
-                    switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+                    switch.ask(StopRequest.of(Cause.OPERATOR, "enough"))
                     return
                 virtual.aim(Role(f"{PLACES[event.facts['point']]}_velocity"))
                 switch.resume()

@@ -137,7 +137,7 @@ class TestFurtherMeasurements:
 
         def stop_at_two(progress):
             if progress.name == "two":
-                stop.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+                stop.ask(StopRequest.of(Cause.OPERATOR, "enough"))
 
         run_campaign(
             bench, campaign("one", "two"), tmp_path, after=after, on_progress=stop_at_two, switch=stop
@@ -192,7 +192,7 @@ class TestResuming:
             bench,
             campaign("one", "two"),
             tmp_path,
-            on_result=lambda point_result: stop.ask(StopRequest.by(Cause.OPERATOR, "enough")),
+            on_result=lambda point_result: stop.ask(StopRequest.of(Cause.OPERATOR, "enough")),
             switch=stop,
         )
         assert [point_result.name for point_result in point_results] == ["one"]

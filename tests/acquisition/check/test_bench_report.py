@@ -132,7 +132,7 @@ class StopWhenOutputIsOn(StopSwitch):
     @property
     def request(self):
         if self.generator.execute(b"OUTP1?").data == b"1\n":
-            self.ask(StopRequest.by(Cause.TERMINATED, "SIGTERM"))
+            self.ask(StopRequest.of(Cause.TERMINATED, "SIGTERM"))
         return super().request
 
 
@@ -152,7 +152,7 @@ class StallWhenOutputIsOn(StopWhenOutputIsOn):
     """Requests a stop like the drive guard of a stalled run."""
 
     def ask(self, request):
-        super().ask(StopRequest.by(Cause.FAULT, "the run read no samples for 5 s"))
+        super().ask(StopRequest.of(Cause.FAULT, "the run read no samples for 5 s"))
 
 
 def test_a_stalled_check_counts_as_failed_and_not_as_stopped(bench_of, rig, tmp_path):

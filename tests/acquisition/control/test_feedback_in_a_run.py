@@ -71,7 +71,7 @@ def test_a_stop_in_any_state_silences_a_feedback_run(bench, tmp_path, state, cau
     run = run_of(bench, tmp_path)
     for progress in run:
         if progress.state is state:
-            run.switch.ask(StopRequest.by(cause, "enough"))
+            run.switch.ask(StopRequest.of(cause, "enough"))
     assert run.state is RunState.STOPPED
     assert not bench.world.is_on
     assert bench.recorder.ending == (RecordingState.STOPPED, "enough")

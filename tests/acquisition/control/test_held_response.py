@@ -5,7 +5,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import HeldResponse, Measurement, RunState
-from vibench.acquisition.recording import Held, HeldResponseNote, feedback_note
+from vibench.acquisition.recording import HeldResponseNote, Hold, feedback_note
 from vibench.acquisition.rig import specimen_of
 
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
@@ -38,7 +38,7 @@ def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, hold_res
         dynamic = dynamic - omega**2 * specimen.mass_matrix
         pushed = [specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0], 0, 0]
         against = abs(np.linalg.solve(dynamic, pushed)[0] - 1)
-        assert each.level is Held.WITHIN
+        assert each.level is Hold.WITHIN
         assert each.response_m == pytest.approx(1e-6, rel=0.02)
         assert each.base_m_per_s2 == pytest.approx(1e-6 / against * omega**2, rel=0.03)
 
@@ -50,4 +50,4 @@ def test_an_unstable_branch_is_recorded_and_flagged(rig, hold_response):
     hardening = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=hard)})
     plan = HeldResponse(amplitude_vpp=4, frequencies_hz=(103,), response_m=6e-6, longest_wait_s=8)
     (found,) = hold_response(hardening, plan)
-    assert found.level is Held.OUTSIDE
+    assert found.level is Hold.OUTSIDE

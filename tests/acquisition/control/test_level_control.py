@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 
 from vibench.acquisition.control.control_action import LevelControl, MeasuredLevel, measured_level
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.recording import Held
+from vibench.acquisition.recording import Hold
 
 CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0, least_vpp=2e-3)
 
@@ -19,7 +19,7 @@ def test_level_control_converges_whenever_the_level_is_reachable(gain, start_vpp
         next_vpp = CONTROL.next_vpp(setting_vpp, measured, 10.0)
         assert max(next_vpp / setting_vpp, setting_vpp / next_vpp) <= 1.25 * (1 + 1e-12)
         setting_vpp = next_vpp
-    assert MeasuredLevel(gain * setting_vpp, 0.0).held(10.0, 0.025) is Held.WITHIN
+    assert MeasuredLevel(gain * setting_vpp, 0.0).hold_state(10.0, 0.025) is Hold.WITHIN
     assert setting_vpp <= 5.0
 
 

@@ -10,7 +10,7 @@ from vibench.acquisition.control.resonance_controller import _phase_error
 from vibench.acquisition.control.settling_controller import SettledState
 from vibench.acquisition.control.steadiness import Judgement, Periods
 from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.recording import Held, Steadiness
+from vibench.acquisition.recording import Hold, Steadiness
 
 
 def error_deg(frequency_hz, natural_hz, damping):
@@ -84,7 +84,7 @@ def uncertainty_deg(response, **plan):
     judgement = Judgement(Steadiness.PERIODIC, 1, 0.0, 0.0, 0.0, 0.0)
     base = MeasuredLevel(1.0, 0.0)
     harmonics = tuple(response[:, 1:].mean(axis=0))
-    found = SettledState(95.0, 95.0, 1.0, 1.0, judgement, base, Held.WITHIN, harmonics)
+    found = SettledState(95.0, 95.0, 1.0, 1.0, judgement, base, Hold.WITHIN, harmonics)
     tracking = ResonanceTracking(
         amplitude_vpp=1, start_hz=95, low_hz=90, high_hz=99, accelerations_m_per_s2=(1,), **plan
     )

@@ -72,7 +72,7 @@ class PanelLoad(MessageLog):
 
 
 @dataclass
-class Plugged:
+class PluggedIn:
     """A generator connected to the bus."""
 
     instrument: AFG1022
@@ -96,14 +96,14 @@ class Plugged:
 class Bus:
     """Connects generators to the bus."""
 
-    plugged: list[Plugged] = field(default_factory=list)
+    plugged: list[PluggedIn] = field(default_factory=list)
 
-    def plug_in(self, quirks: Quirks | None = None, listener: type[MessageLog] = MessageLog) -> Plugged:
+    def plug_in(self, quirks: Quirks | None = None, listener: type[MessageLog] = MessageLog) -> PluggedIn:
         instrument = AFG1022(lambda: 0.0, serial=next(_SERIALS), quirks=quirks or Quirks())
         log = listener(instrument)
         usb = UsbTmcInstrument(log)
         plug_in(usb)
-        self.plugged.append(Plugged(instrument, usb, log))
+        self.plugged.append(PluggedIn(instrument, usb, log))
         return self.plugged[-1]
 
 
@@ -116,15 +116,15 @@ def bus() -> Iterator[Bus]:
 
 
 @pytest.fixture
-def plugged(bus: Bus) -> Plugged:
+def plugged(bus: Bus) -> PluggedIn:
     return bus.plug_in()
 
 
 @pytest.fixture
-def panel_load(bus: Bus) -> Plugged:
+def panel_load(bus: Bus) -> PluggedIn:
     return bus.plug_in(listener=PanelLoad)
 
 
 @pytest.fixture
-def impostor(bus: Bus) -> Plugged:
+def impostor(bus: Bus) -> PluggedIn:
     return bus.plug_in(listener=Impostor)

@@ -51,13 +51,13 @@ def digitizer(rig, virtual):
         yield opened
 
 
-def opened_output(digitizer, **changes):
+def open_output(digitizer, **changes):
     return DaqmxOutput.open("Dev1/ao0", CONFIG.model_copy(update=changes), digitizer)
 
 
 @pytest.fixture
 def output(digitizer):
-    opened = opened_output(digitizer)
+    opened = open_output(digitizer)
     yield opened
     opened.close()
 
@@ -139,7 +139,7 @@ def test_stopping_and_closing_are_allowed_at_any_time_and_free_the_output(digiti
     output.close()
     with pytest.raises(InstrumentError, match=r"closed"):
         output.write(np.zeros(10))
-    opened_output(digitizer).close()
+    open_output(digitizer).close()
 
 
 def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
@@ -158,13 +158,13 @@ def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
 def test_opening_zeroes_an_output_that_another_program_left_high(digitizer, virtual):
     virtual.world.play("Dev1/ao0", np.full(51_200, 1.0), 51_200.0)
     digitizer.start()
-    opened_output(digitizer).close()
+    open_output(digitizer).close()
     assert np.max(np.abs(digitizer.read(2560).volts[0][-640:])) < NOISE_V
 
 
 def test_an_output_in_use_is_reported_as_busy_to_a_second_program(digitizer, output):
     with pytest.raises(InstrumentBusy, match=r"Dev1/ao0"):
-        opened_output(digitizer)
+        open_output(digitizer)
 
 
 def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(digitizer):
@@ -187,7 +187,7 @@ def test_an_unsupported_output_setting_is_refused_in_one_sentence(digitizer, phy
     with pytest.raises(kind, match=said) as failure:
         DaqmxOutput.open(physical, CONFIG.model_copy(update=changes), digitizer)
     assert "\n" not in str(failure.value)
-    opened_output(digitizer).close()  # no device stays reserved
+    open_output(digitizer).close()  # no device stays reserved
 
 
 def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output, virtual):

@@ -169,7 +169,7 @@ def test_unread_samples_of_a_sound_card_are_kept_for_the_buffer_time_only(card_r
     card = _Card(rig, (0, 1, 2, 3), 0)
     heard, fine = np.zeros((4800, 4), dtype=np.float32), SimpleNamespace(input_overflow=False)
     for _ in range(40 * round(rig.daq.buffer_s)):
-        card._hear(heard, 4800, None, fine)
+        card._take_block(heard, 4800, None, fine)
     assert card.failure
     assert sum(block.shape[1] for block in card.blocks) <= (rig.daq.buffer_s + 0.2) * RATE_HZ
     card.stream.close()

@@ -96,7 +96,7 @@ class TestRuns:
         # The quantity that is closest to its limit has one of these units.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
         assert re.fullmatch(
-            r"Without a viewer: aborted after [\d.]+ s; after [\d.]+ s if the window hangs", plan.lines[5]
+            r"Without a viewer: aborted after [\d.]+ s, or after [\d.]+ s if the window hangs", plan.lines[5]
         )
         assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
         assert not (tmp_path / "new").exists()

@@ -216,7 +216,7 @@ def test_a_hold_that_the_drive_cannot_keep_is_refused(shipped_rig, tmp_path):
     engine, refusals = Engine(Supervision.UNATTENDED), []
     handler = RequestHandler(engine, JobQueue(engine))
     engine.open(shipped_rig.model_copy(update={"generator": generator}))
-    tell = engine.published.tell
+    tell = engine.published.note_progress
 
     def hold(progress, bench):
         tell(progress, bench)
@@ -225,7 +225,7 @@ def test_a_hold_that_the_drive_cannot_keep_is_refused(shipped_rig, tmp_path):
                 handler.carry_out(VERBS["stop"], {"level": StopLevel.HOLD})
             refusals.append(refused)
 
-    engine.published.tell = hold
+    engine.published.note_progress = hold
     request = CampaignRequest(campaign=campaign("m", duration_s=1.0), folder=tmp_path, check=CheckRule.WAIVED)
     (point,) = engine.measure(request)
     assert refusals

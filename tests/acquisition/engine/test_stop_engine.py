@@ -38,7 +38,7 @@ def driving(tmp_path, monkeypatch):
     engine = Engine(Supervision.UNATTENDED)
     run = Progress(RunState.RECORDING, None, Block(0, np.zeros((1, 100))), 0.1, 10.0, 1.5, 260.0)
     engine.published.begin(campaign("point"), tmp_path)
-    engine.published.tell(CampaignProgress("point", 1, 1, tmp_path / "point.h5", run), BENCH)
+    engine.published.note_progress(CampaignProgress("point", 1, 1, tmp_path / "point.h5", run), BENCH)
     with serving(RequestHandler(engine, JobQueue(engine)), "night"):
         DRIVES_ON.begin(engine)
         yield engine

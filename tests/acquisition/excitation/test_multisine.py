@@ -16,7 +16,7 @@ BAND = np.arange(20, 801)
 OVERSAMPLING = 16
 
 
-def played_amplitudes(values):
+def amplitudes_of(values):
     """Return line amplitudes of a zero-order-hold output, from a finely sampled staircase."""
     held = np.repeat(values, OVERSAMPLING)
     spectrum = 2 * np.abs(np.fft.rfft(held)) / len(held)
@@ -35,7 +35,7 @@ def _staircase_droop(harmonics):
 
 def test_the_played_spectrum_is_flat_in_the_band_and_empty_elsewhere():
     (values,) = flat_periods(BAND, realisations=1, seed=3)
-    spectrum = played_amplitudes(values)[: MEMORY_POINTS // 2]
+    spectrum = amplitudes_of(values)[: MEMORY_POINTS // 2]
     inside = spectrum[BAND]
     outside = np.delete(spectrum, BAND)
     assert np.ptp(inside) / np.mean(inside) < 1e-10

@@ -4,12 +4,12 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, run_campaign
 from vibench.acquisition.campaign import ExistingRecordings, list_recordings
-from vibench.acquisition.host.chosen import chosen
+from vibench.acquisition.host.chosen import member
 
 
 def test_an_enum_member_and_its_value_as_text_are_equivalent():
-    assert chosen(ExistingRecordings, "resume") is ExistingRecordings.RESUME
-    assert chosen(ExistingRecordings, ExistingRecordings.RESUME) is ExistingRecordings.RESUME
+    assert member(ExistingRecordings, "resume") is ExistingRecordings.RESUME
+    assert member(ExistingRecordings, ExistingRecordings.RESUME) is ExistingRecordings.RESUME
 
 
 @pytest.mark.parametrize(

@@ -2,21 +2,21 @@
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, all_shipped, load_campaign, named, shipped_folder
+from vibench.acquisition import ConfigurationError, all_shipped, file_path, load_campaign, shipped_folder
 
 
 def test_a_bare_name_loads_a_shipped_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in ("campaigns", "hardware_configs", "hardware_configs/faults", "studies"):
         for path in all_shipped(folder):
-            assert named(path.stem, folder) == path
+            assert file_path(path.stem, folder) == path
     assert load_campaign("quick").name == "quick"
 
 
 def test_a_user_file_takes_precedence_over_a_shipped_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "quick").write_text("", encoding="utf-8")
-    assert named("quick", "campaigns").resolve() == tmp_path / "quick"
+    assert file_path("quick", "campaigns").resolve() == tmp_path / "quick"
 
 
 @pytest.mark.parametrize("given", ["quick.toml", "campaigns/quick"])
@@ -37,7 +37,7 @@ def test_an_unknown_file_name_is_refused_with_a_list_of_known_names(tmp_path, mo
 def test_a_folder_does_not_hide_a_shipped_file_of_the_same_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "virtual_rig").mkdir()  # as in the folder of a checkout
-    assert named("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
+    assert file_path("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
     (tmp_path / "mine").mkdir()
     with pytest.raises(ConfigurationError, match="'mine' is a folder, not a file nor one that"):
         load_campaign("mine")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, load_campaign, shipped, validated
+from vibench.acquisition import ConfigurationError, load_campaign, shipped, validate
 from vibench.acquisition.plan import Campaign
 
 NOISE = {"kind": "white_noise", "amplitude_vpp": 0.1, "band_start_hz": 20, "band_stop_hz": 800}
@@ -13,9 +13,9 @@ def point(name, body="m0", **others):
     return {"name": name, "body": body, "x_m": 0.0, "y_m": 0.0, "z_m": 0.01, **others}
 
 
-def scanned(*points, **others):
+def scan(*points, **others):
     content = {"measurements": [{"name": "noise", "excitation": NOISE}], **others}
-    return validated({"name": "scan", "scan": list(points), **content}, Campaign, "scan.toml")
+    return validate({"name": "scan", "scan": list(points), **content}, Campaign, "scan.toml")
 
 
 def test_every_measurement_is_planned_at_each_scan_point():
@@ -25,7 +25,7 @@ def test_every_measurement_is_planned_at_each_scan_point():
         "continue_from_previous": "frequency_hz",
         "measurement": {"excitation": DWELL},
     }
-    campaign = scanned(point("top", "m1", node=7), point("foot"), sweeps=[sweep])
+    campaign = scan(point("top", "m1", node=7), point("foot"), sweeps=[sweep])
     assert campaign.recording_names() == (
         "noise-top",
         "line-150hz-top",
@@ -62,11 +62,11 @@ def test_the_shipped_scan_visits_all_three_masses():
 )
 def test_an_invalid_scan_point_is_refused_with_one_sentence(points, sentence):
     with pytest.raises(ConfigurationError, match=sentence):
-        scanned(*points)
+        scan(*points)
 
 
 def test_a_scan_with_feedback_is_refused_because_feedback_needs_m0():
     held = {"kind": "held_dwell", "frequency_hz": 150, "duration_s": 1, "amplitude_vpp": 1}
     held["base_level"] = {"acceleration_m_per_s2": 5}
     with pytest.raises(ConfigurationError, match="held_dwell needs the motion of m0"):
-        scanned(point("top"), measurements=[{"name": "dwell", "excitation": held}])
+        scan(point("top"), measurements=[{"name": "dwell", "excitation": held}])

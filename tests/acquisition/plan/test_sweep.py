@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, load_campaign, toml_text, validated
+from vibench.acquisition import ConfigurationError, load_campaign, toml_text, validate
 from vibench.acquisition.plan import Campaign, RunState, phases, predicted_loads, require_within_limits
 from vibench.acquisition.rig import BaseQuantity
 
@@ -12,7 +12,7 @@ SWEEP = {"kind": "sine_sweep", "start_hz": 300, "stop_hz": 200, "duration_s": 5}
 
 def campaign(**sweep):
     sweep.setdefault("measurement", {"ramp_s": 0.3, "excitation": DWELL})
-    return validated({"name": "c", "sweeps": [{"name": "line", **sweep}]}, Campaign, "c.toml")
+    return validate({"name": "c", "sweeps": [{"name": "line", **sweep}]}, Campaign, "c.toml")
 
 
 def names(plan):
@@ -105,7 +105,7 @@ class TestChains:
         assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
 
     def test_a_limited_lead_in_keeps_the_nearest_points(self):
-        def made(points, **bound):
+        def pick(points, **bound):
             return campaign(
                 amplitude_vpp=[0.5],
                 frequency_hz={"start": 200, "step": 1, "stop": 199 + points},
@@ -113,12 +113,12 @@ class TestChains:
                 **bound,
             )
 
-        last = made(40, lead_points=3).points()[-1].measurement.excitation
+        last = pick(40, lead_points=3).points()[-1].measurement.excitation
         assert [tone.frequency_hz for tone in last.lead_in] == [236, 237, 238]
-        whole_s, bounded_s = ([made(n, **b).duration_s for n in (20, 40)] for b in ({}, {"lead_points": 3}))
+        whole_s, bounded_s = ([pick(n, **b).duration_s for n in (20, 40)] for b in ({}, {"lead_points": 3}))
         assert bounded_s[1] - 2 * bounded_s[0] == pytest.approx(0.5 * 6)
         assert whole_s[1] - 2 * whole_s[0] == pytest.approx(0.5 * 20 * 20)
-        assert len(made(1200, lead_points=2).points()) == 1200
+        assert len(pick(1200, lead_points=2).points()) == 1200
 
     def test_an_up_and_down_sweep_is_one_chain(self):
         plan = campaign(
@@ -203,4 +203,4 @@ def test_an_invalid_sweep_is_refused_with_the_allowed_values(sweep, said):
 
 def test_a_campaign_without_points_is_refused():
     with pytest.raises(ConfigurationError, match=r"at least one of \[\[measurements\]\] and \[\[sweeps\]\]"):
-        validated({"name": "c"}, Campaign, "c.toml")
+        validate({"name": "c"}, Campaign, "c.toml")

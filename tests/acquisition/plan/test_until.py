@@ -37,7 +37,7 @@ def plan(kind, until):
 @pytest.mark.parametrize("name", sorted(NOISE | SINE))
 def test_until_accepts_only_results_of_its_kind_of_excitation(kind, name):
     if name in ALLOWED.get(kind, set()):
-        assert plan(kind, {name: "1 %"}).until.wishes == {name: 0.01}
+        assert plan(kind, {name: "1 %"}).until.required_bounds == {name: 0.01}
         return
     with pytest.raises(ValidationError, match=f"until contains {name}, which {kind} does not support"):
         plan(kind, {name: "1 %"})

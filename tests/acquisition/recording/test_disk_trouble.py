@@ -11,14 +11,14 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
     recover,
-    troubled_disks,
+    trouble_disks,
 )
 
 
 @pytest.fixture
 def trouble():
     trouble = DiskTrouble()
-    with troubled_disks(trouble):
+    with trouble_disks(trouble):
         yield trouble
 
 
@@ -30,10 +30,10 @@ def test_a_simulated_full_disk_refuses_at_once_and_notifies_the_rig():
         before = len(told)
         for refusals in range(3):
             with pytest.raises(OSError, match="No space left"):
-                trouble.meet()
+                trouble.apply()
             assert len(told) - before == refusals
         heal()
-        trouble.meet()
+        trouble.apply()
 
 
 def append_until_committed(writer, make_block, first, samples):
@@ -81,9 +81,9 @@ def test_a_commit_succeeds_after_two_refusals(trouble):
     trouble.fill(2)
     for _ in range(2):
         with pytest.raises(OSError, match="No space") as refusal:
-            trouble.meet()
+            trouble.apply()
         assert refusal.value.errno == errno.ENOSPC
-    trouble.meet()
+    trouble.apply()
 
 
 def test_a_slow_disk_delays_the_writer_and_not_the_reader(tmp_path, make_header, make_block, trouble):
@@ -102,18 +102,18 @@ def test_a_slow_disk_delays_the_writer_and_not_the_reader(tmp_path, make_header,
 def test_a_simulated_slow_disk_is_slow(trouble):
     heal = trouble.slow_down(0.1)
     began_s = time.monotonic()
-    trouble.meet()
+    trouble.apply()
     assert time.monotonic() - began_s >= 0.1
     heal()
     began_s = time.monotonic()
-    trouble.meet()
+    trouble.apply()
     assert time.monotonic() - began_s < 0.1
 
 
 def test_simulated_disk_faults_end_with_the_rig(tmp_path, make_header):
-    with troubled_disks(DiskTrouble()) as _:
+    with trouble_disks(DiskTrouble()) as _:
         pass
     trouble = DiskTrouble()
-    with troubled_disks(trouble):
+    with trouble_disks(trouble):
         trouble.fill()
     create_recording(tmp_path / "a.h5", make_header()).finish(RecordingState.COMPLETE)

@@ -6,7 +6,7 @@ from vibench.acquisition.errors import RecordingError
 from vibench.acquisition.recording import (
     DwellNote,
     ExcursionNote,
-    Held,
+    Hold,
     JumpNote,
     JumpSearchEnd,
     LevelNote,
@@ -82,7 +82,7 @@ def test_a_feedback_note_of_an_older_recording_round_trips(kind, text, form):
 
 def test_the_text_of_a_feedback_note_is_parsed_to_values():
     assert read("achieved", STEP).segment is SegmentLabel.STEP
-    assert read("achieved", STEP).level is Held.WITHIN
+    assert read("achieved", STEP).level is Hold.WITHIN
     assert read("settled", SETTLED).motion is Steadiness.UNSETTLED
     assert read("jump", JUMP).how is JumpSearchEnd.STEEP
     assert read("jump", JUMP).pass_number == 2
@@ -106,5 +106,5 @@ def test_a_note_of_an_unknown_version_is_refused_with_that_version(more):
 
 
 def test_numbers_in_feedback_notes_have_six_digits():
-    note = ExcursionNote(from_hz=254.8123456, to_hz=258.8, worst=-0.2124261234, level=Held.OUTSIDE)
+    note = ExcursionNote(from_hz=254.8123456, to_hz=258.8, worst=-0.2124261234, level=Hold.OUTSIDE)
     assert (note.from_hz, note.worst) == (254.812, -0.212426)

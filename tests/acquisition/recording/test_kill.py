@@ -52,13 +52,13 @@ class Killed:
         return self.folder / "a.h5"
 
     @property
-    def promised(self):
+    def safe_samples(self):
         """Number of samples that were handed over a second before the kill."""
         before_s = self.killed_s - PROMISE_S
         return max((samples for time_s, samples in self.acknowledged if time_s <= before_s), default=0)
 
     @property
-    def handed_over(self):
+    def sent_samples(self):
         return max((samples for _, samples in self.acknowledged), default=0) + 2 * child.BLOCK
 
 
@@ -154,20 +154,20 @@ def require_truth(recording):
         np.testing.assert_array_equal(recording.read_counts(role), child.truth(0, recording.samples, row))
 
 
-def require_kept(killed):
+def require_intact(killed):
     """Open and recover a killed recording: every sample is true, and at most the last second is missing."""
     committed, state = None, RecordingState.COMPLETE
     if killed.part.exists():
         with open_recording(killed.part) as recording:
             committed, state = recording.samples, recording.state
-            assert killed.promised <= committed <= killed.handed_over
+            assert killed.safe_samples <= committed <= killed.sent_samples
             require_truth(recording)
         recover(killed.part)
     assert [each.name for each in killed.folder.iterdir()] == ["a.h5"]
     with open_recording(killed.final) as recording:
         assert recording.state is state
         assert committed in (None, recording.samples)
-        assert recording.samples >= killed.promised
+        assert recording.samples >= killed.safe_samples
         if state is RecordingState.INTERRUPTED:
             assert recording.events[-1].kind == "interrupted"
         else:
@@ -189,7 +189,7 @@ def kill_in_phases(folder, moments, seed):
                     continue  # the kill came too late: the recording had finished
                 names = frozenset(each.name.removeprefix("a.h5") or ".h5" for each in killed.folder.iterdir())
                 left[phase, names] += 1
-                require_kept(killed)
+                require_intact(killed)
                 killed.final.unlink()
                 if sum(number for (each, _), number in left.items() if each == phase) == wanted:
                     break

@@ -208,7 +208,7 @@ def test_events_and_segments_have_sample_positions(tmp_path, make_header, make_b
 def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.begin_segment("one")
-        with pytest.raises(RecordingError, match="'one' is still open"):
+        with pytest.raises(RecordingError, match="'one' is open"):
             writer.begin_segment("two")
         writer.end_segment()
         with pytest.raises(RecordingError, match="No segment is open"):

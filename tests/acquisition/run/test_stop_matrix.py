@@ -83,7 +83,7 @@ STOPS = {
     "SIGINT": Stop(send(signal.SIGINT), "SIGINT", BLOCK_S + RAMP_S),
     "SIGTERM": Stop(send(signal.SIGTERM), "SIGTERM", ABORT_S),
     "viewer gone": Stop(
-        lambda run: run.switch.ask(StopRequest.by(Cause.VIEWER_GONE, "nobody looks")), "nobody looks", ABORT_S
+        lambda run: run.switch.ask(StopRequest.of(Cause.VIEWER_GONE, "nobody looks")), "nobody looks", ABORT_S
     ),
     "program left": Stop(lambda run: run.close(), "abandoned", ABORT_S),
 }

@@ -64,7 +64,7 @@ def streamed(request, tmp_path_factory):
         )
 
 
-def delayed(volts, samples):
+def delay(volts, samples):
     """Return the signal delayed by a fraction of a sample and held for one sample."""
     cycles = np.fft.rfftfreq(volts.size)
     shown = np.fft.rfft(volts) * np.exp(-2j * np.pi * cycles * samples) * np.sinc(cycles)
@@ -90,7 +90,7 @@ def test_the_recording_matches_the_preview_within_converter_noise(streamed):
     whole = np.concatenate([silence, expected, silence])
     heard = streamed.drive_v[begin - silence.size :]
     # The recording ends with the ramp; samples still in the delay of the output are missing.
-    left = (heard - delayed(whole, DELAY)[: heard.size])[: -GROUP_DELAY_SAMPLES - 1]
+    left = (heard - delay(whole, DELAY)[: heard.size])[: -GROUP_DELAY_SAMPLES - 1]
     # The remaining 5e-5 of the signal are the ripple of the converter's filter.
     assert np.sqrt(np.mean(left**2)) < 1.25 * NOISE_V
     assert np.max(np.abs(left)) < 10 * NOISE_V
@@ -137,7 +137,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     level = np.repeat([step.play.level for step in steps], counts)
     expected = 0.5 * TERMINAL * level * np.sin(2 * np.pi * np.concatenate([[0.0], cycles[:-1]]))
     inside = slice(swept.start + 200, swept.stop - 200)
-    left = drive[inside] - delayed(expected, DELAY)[inside]
+    left = drive[inside] - delay(expected, DELAY)[inside]
     assert np.sqrt(np.mean(left**2)) < 2 * NOISE_V
     assert np.max(np.abs(left)) < 1e-3
 

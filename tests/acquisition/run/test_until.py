@@ -135,7 +135,7 @@ def test_a_stop_ends_a_recording_with_until(rig, tmp_path):
 
     def stop_after_two_seconds(progress):
         if progress.elapsed_s > 2:
-            switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+            switch.ask(StopRequest.of(Cause.OPERATOR, "enough"))
 
     with open_bench(rig) as bench:
         outcome = run_measurement(

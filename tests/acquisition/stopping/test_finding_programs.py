@@ -198,7 +198,7 @@ def test_a_user_can_stop_a_program_of_root_in_their_folder(state_of_other_user):
     assert switch.request.reason == "smoke"
 
 
-def test_a_stop_by_root_waits_while_the_program_of_a_user_ramps_down(of_nobody, monkeypatch):
+def test_a_stop_by_root_waits_while_the_program_of_a_user_ramps_down(state_of_other_user, monkeypatch):
     """The program updates the stop's file as a sign of life, and may not do that to a file of root."""
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     stop = stop_path(str(engines_folder()), 7, "start", "ramp")
@@ -226,7 +226,7 @@ def test_a_stop_by_root_waits_while_the_program_of_a_user_ramps_down(of_nobody, 
     assert heard == ["smoke"]
 
 
-def test_an_unreadable_folder_is_not_treated_as_empty(of_nobody):
+def test_an_unreadable_folder_is_not_treated_as_empty(state_of_other_user):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
     with pytest.raises(AcquisitionError, match="the state folder cannot be searched"):

@@ -12,7 +12,7 @@ from vibench.analysis import (
     Simulation,
     compare_recording,
 )
-from vibench.analysis.results.compared_recording import kept_result
+from vibench.analysis.results.compared_recording import stored_result
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def test_a_transmission_curve_keeps_its_bounds_between_processes(comparison):
 
 
 def test_a_comparison_keeps_the_whole_result_for_reports(comparison):
-    result, failures = kept_result(comparison)
+    result, failures = stored_result(comparison)
     assert result.analysis.facts.name == comparison.name == "streamed"
     assert failures == ()
 

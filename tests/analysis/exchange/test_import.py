@@ -25,7 +25,7 @@ from vibench.analysis.exchange import (
     excerpt,
     export_samples,
     import_recording,
-    opened_source,
+    open_source,
 )
 from vibench.sim.hdf5_files.door import allow_external_data
 
@@ -172,7 +172,7 @@ def test_a_tdms_file_is_imported_with_rate_and_values(tmp_path):
                     nptdms.ChannelObject("Measured", "Laser", piece[1], about),
                 ]
             )
-    with opened_source(tmp_path / "a.tdms") as source:
+    with open_source(tmp_path / "a.tdms") as source:
         assert [(each.name, each.unit) for each in source.channels] == [
             ("Measured/Base", "V"),
             ("Measured/Laser", "V"),
@@ -289,7 +289,7 @@ def test_single_precision_big_endian_binary_samples_are_read(known, known_values
     lines[14] = b"         2" + numbers[10:]
     lines[19] = known_values["m0_velocity"][:51_200].astype(">f4").tobytes() + b"\n    -1\n"
     path.write_bytes(b"\n".join(lines))
-    with opened_source(path) as source:
+    with open_source(path) as source:
         read = source.read(source.channels[0], 3, 51_200)
     np.testing.assert_array_equal(read, known_values["m0_velocity"][3:51_200].astype(np.float32))
 
@@ -310,7 +310,7 @@ def test_trailing_bytes_after_binary_samples_are_ignored(known, known_values, tm
 def test_units_may_contain_non_ascii_characters(known, tmp_path, unit):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.1), Format.UFF, tmp_path / "a.uff")
     path.write_bytes(path.read_bytes().replace(b"m s-1", unit))
-    with opened_source(path) as source:
+    with open_source(path) as source:
         assert source.channels[0].unit == "m/s²"
 
 
@@ -319,7 +319,7 @@ def test_binary_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
     raw = path.read_bytes()
     at = raw.rindex(b"    -1\n") - 8 * 100
     path.write_bytes(raw[:at] + b"\n    -1\n" + raw[at + 8 :])
-    with opened_source(path) as source:
+    with open_source(path) as source:
         (only,) = source.channels
         read = source.read(only, 51_099, 51_102)
     assert read[1] == np.frombuffer(b"\n    -1\n", "<f8")[0]
@@ -575,7 +575,7 @@ def hdf5_bytes(kept):
 )
 def test_file_errors_name_the_file_and_are_stated_once(known, tmp_path, name, content, said):
     (tmp_path / name).write_bytes(uff_bytes(known, **content) if isinstance(content, dict) else content)
-    with pytest.raises(UnusableData, match=said) as refused, opened_source(tmp_path / name) as source:
+    with pytest.raises(UnusableData, match=said) as refused, open_source(tmp_path / name) as source:
         source.read(source.channels[0], 0, source.channels[0].samples)
     assert str(refused.value).startswith(name)
     assert str(refused.value).count("again") == 1
@@ -588,7 +588,7 @@ def test_a_unit_in_hdf5_may_be_a_fixed_or_variable_length_string(tmp_path, text,
         file["v"] = signals()[0]
         kind = h5py.string_dtype("utf-8", len(text) if is_fixed else None)
         file["v"].attrs.create("units", text, dtype=kind)
-    with opened_source(tmp_path / "a.h5") as source:
+    with open_source(tmp_path / "a.h5") as source:
         assert source.channels[0].unit == "m/s\u00b2"
 
 
@@ -608,7 +608,7 @@ def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0\0\0")
     with (
         pytest.raises(UnusableData, match=r"zero bytes|lines contains numbers only"),
-        opened_source(tmp_path / "a.csv"),
+        open_source(tmp_path / "a.csv"),
     ):
         pass
 
@@ -619,7 +619,7 @@ def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
 def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
     text = "F\u00fchrung am Fu\u00df\nZeit [s];Fu\u00dfpunkt (\u00b5m)\n0,0;1,5\n0,5;-2\n1,0;3\n"
     (tmp_path / "a.csv").write_bytes(text.encode(encoding))
-    with opened_source(tmp_path / "a.csv") as source:
+    with open_source(tmp_path / "a.csv") as source:
         _, column = source.channels
         assert (column.label, column.unit, column.sample_rate_hz) == ("Fu\u00dfpunkt", "\u00b5m", 2.0)
         assert source.read(column, 0, 3).tolist() == [1.5, -2.0, 3.0]
@@ -643,14 +643,14 @@ def test_a_csv_heading_may_be_in_any_common_encoding(tmp_path, encoding):
 )
 def test_a_file_with_a_wrong_suffix_gives_a_one_sentence_error(tmp_path, name, content, said):
     (tmp_path / name).write_bytes(content)
-    with pytest.raises((InvalidRequest, UnusableData), match=said), opened_source(tmp_path / name):
+    with pytest.raises((InvalidRequest, UnusableData), match=said), open_source(tmp_path / name):
         pass
 
 
 def test_an_invalid_tdms_file_gives_a_one_sentence_error(tmp_path):
     pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     (tmp_path / "a.tdms").write_bytes(b"nothing of the kind")
-    with pytest.raises(UnusableData, match="is not a TDMS file"), opened_source(tmp_path / "a.tdms"):
+    with pytest.raises(UnusableData, match="is not a TDMS file"), open_source(tmp_path / "a.tdms"):
         pass
 
 
@@ -660,7 +660,7 @@ def test_non_numeric_objects_in_hdf5_are_not_offered_as_channels(tmp_path):
         file.create_dataset("pickled", data=np.void(b"\x80\x04K\x01."))
         file.create_dataset("text", data=["a", "b"], dtype=h5py.string_dtype())
         file.create_dataset("complex", data=np.ones(9, dtype=complex))
-    with opened_source(tmp_path / "a.h5") as source:
+    with open_source(tmp_path / "a.h5") as source:
         assert [each.name for each in source.channels] == ["/v"]
 
 
@@ -669,8 +669,8 @@ def test_external_links_are_read_only_if_allowed(tmp_path):
         file["v"] = signals()[0]
         file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
     with pytest.raises(UnusableData, match=r"/elsewhere refers to another file \(b.h5\).*--allow-external"):
-        opened_source(tmp_path / "a.h5").__enter__()
-    with allow_external_data(), opened_source(tmp_path / "a.h5") as source:
+        open_source(tmp_path / "a.h5").__enter__()
+    with allow_external_data(), open_source(tmp_path / "a.h5") as source:
         assert [each.name for each in source.channels] == ["/v"]
 
 
@@ -735,7 +735,7 @@ def test_matlab_and_text_exports_can_be_imported(known, known_values, tmp_path, 
 def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
     field = {"data": signals()[0], "units": "V"}
     savemat(tmp_path / "a.mat", {"run": {"vib": field}, "table": signals().T, "name": "text", "n": 3.0})
-    with opened_source(tmp_path / "a.mat") as source:
+    with open_source(tmp_path / "a.mat") as source:
         assert {each.name: each.unit for each in source.channels} == {
             "run.vib.data": "V",
             "table#1": "",
@@ -758,7 +758,7 @@ def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
 )
 def test_common_formats_of_text_columns_are_read(tmp_path, text, label, rate_hz):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
-    with opened_source(tmp_path / "a.csv") as source:
+    with open_source(tmp_path / "a.csv") as source:
         _, column = source.channels
         assert source.read(column, 0, 3).tolist() == [1.5, -2.0, 1e-3]
     assert (column.label, column.unit) == (label, "m/s" if label else "")
@@ -801,7 +801,7 @@ def test_a_corrupted_file_never_crashes_the_import(known, tmp_path, suffix):
     for _ in range(80):
         path.write_bytes(corrupt(raw, dice))
         try:
-            with opened_source(path) as source:
+            with open_source(path) as source:
                 for channel in source.channels:
                     assert source.read(channel, 0, channel.samples).shape == (channel.samples,)
         except AnalysisError:
@@ -833,7 +833,7 @@ def test_a_text_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
     numbers = b"\n".join(b"%20.11E" % each for each in range(42))
     path.write_bytes(b"\n".join(lines[: place + 12]) + b"\n" + numbers + b"\n    -1\n")
     refused = pytest.raises(UnusableData, match=r"states 2508876 numbers, but contains at most \d+")
-    with refused, opened_source(path):
+    with refused, open_source(path):
         pass
 
 
@@ -848,5 +848,5 @@ def test_a_text_frequency_response_in_a_universal_file_is_ignored(known, tmp_pat
     response[8] = b"%10d" % 18 + response[8][10:]
     numbers = [b"".join(b"%20.11E" % each for each in row) for row in ((1, 0, 2, 0), (3, 0))]
     path.write_bytes(before + b"\n".join([b"    -1", *response, *numbers, b"    -1", b""]))
-    with opened_source(path) as source:
+    with open_source(path) as source:
         assert [each.name for each in source.channels] == ["1"]

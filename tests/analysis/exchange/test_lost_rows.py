@@ -6,10 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_recording, validated
+from vibench.acquisition import open_recording, validate
 from vibench.analysis import InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.exchange import ImportMapping, import_recording, opened_source
+from vibench.analysis.exchange import ImportMapping, import_recording, open_source
 from vibench.analysis.recordings.checks import Verdict
 
 SAMPLES, DWELL_SAMPLES = 6000, 20_000
@@ -55,7 +55,7 @@ def meaning(rate_hz=None, **more):
         "channels": [{"source": key, "role": role} for key, role in roles.items()],
         **more,
     }
-    return validated(content, ImportMapping, "test")
+    return validate(content, ImportMapping, "test")
 
 
 def formatted_times(places, rate_hz, form):
@@ -84,7 +84,7 @@ def test_every_missing_row_is_counted_as_lost(tmp_path, kind, share, seed):
     places = kept_rows(kind, min(share, 0.3) if kind == "every third" else share, rng)
     times, unit = formatted_times(places, rate_hz, form)
     path = csv_file(tmp_path / "mine.csv", times, places, rate_hz, unit)
-    with opened_source(path) as source:
+    with open_source(path) as source:
         rates_hz = {sum(each.rates_hz) / 2 for each in source.channels if each.label == "base"}
     (found_hz,) = rates_hz
     assert found_hz == pytest.approx(rate_hz, rel=1e-4)

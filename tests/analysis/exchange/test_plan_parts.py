@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.acquisition import validated
+from vibench.acquisition import validate
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping
 from vibench.analysis.exchange._import_recording import place_parts
@@ -34,7 +34,7 @@ def mapping_of(excitation, **more):
         "channels": [{"source": "1", "role": "m0_velocity"}],
         **more,
     }
-    return validated(content, ImportMapping, "test")
+    return validate(content, ImportMapping, "test")
 
 
 def ranges(parts):

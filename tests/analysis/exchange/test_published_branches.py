@@ -19,7 +19,7 @@ UNSTABLE = ("14_9", "15_6", "16_5", "17_2")
 @pytest.fixture(scope="module")
 def cycles():
     benchmark = runpy.run_path(str(ROOT / "benchmarks" / "published_branches.py"))
-    found = benchmark["held_cycles"](FOLDER, load_toml(FOLDER / "mapping.toml", ImportMapping))
+    found = benchmark["read_cycles"](FOLDER, load_toml(FOLDER / "mapping.toml", ImportMapping))
     return {each.name.removeprefix("CBC_"): each for each in found}
 
 

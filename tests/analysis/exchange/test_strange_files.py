@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from vibench.acquisition import open_recording, validated
+from vibench.acquisition import open_recording, validate
 from vibench.analysis.errors import InvalidRequest, UnusableData
 from vibench.analysis.exchange import ImportMapping, import_recording
 
@@ -34,7 +34,7 @@ def read_import(path, names=("u", "a", "v"), **more):
         "measurement": {"name": "m", "excitation": plan},
         "channels": [{"source": name, "role": role, **more} for name, role in zip(names, roles, strict=True)],
     }
-    made = import_recording(path, validated(content, ImportMapping, "test"), path.with_name("made.h5"))
+    made = import_recording(path, validate(content, ImportMapping, "test"), path.with_name("made.h5"))
     with open_recording(made) as recording:
         return np.stack([recording.read(role) for role in roles])
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from vibench.acquisition import open_recording, validated
+from vibench.acquisition import open_recording, validate
 from vibench.analysis import InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.exchange import ImportMapping, import_recording
@@ -126,7 +126,7 @@ def mapping(kind, rate_hz):
         "measurement": {"name": "m", "excitation": plan},
         "channels": [{"source": first, "role": "drive_voltage"}, {"source": second, "role": "m0_velocity"}],
     }
-    return validated(content, ImportMapping, "test")
+    return validate(content, ImportMapping, "test")
 
 
 def expected_outcome(kind, fault):
@@ -205,7 +205,7 @@ def test_any_evenly_increasing_column_can_be_the_time_axis(tmp_path, fault, seed
         content = mapping("csv", RATE_HZ * 1.05 if fault == "rate" else RATE_HZ).model_dump()
         if heading is None:
             content["channels"][0]["source"], content["channels"][1]["source"] = "2", "3"
-        meaning = validated(content, ImportMapping, "test")
+        meaning = validate(content, ImportMapping, "test")
         if fault in {"restart", "drift", "rate"}:
             with pytest.raises(InvalidRequest):
                 import_recording(path, meaning, path.with_suffix(".h5"))
@@ -251,7 +251,7 @@ def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix,
     content = mapping("h5", RATE_HZ).model_dump()
     names = ("/run/a", "/run/b") if suffix == ".h5" else ("run.a.y", "run.b.y")
     content["channels"][0]["source"], content["channels"][1]["source"] = names
-    made = import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "made.h5")
+    made = import_recording(path, validate(content, ImportMapping, "test"), tmp_path / "made.h5")
     with open_recording(made) as recording:
         drive, response = (recording.read(role) for role in recording.roles)
         (delay_s,) = (each.delay_s for each in recording.channels if each.role == "m0_velocity")
@@ -261,14 +261,14 @@ def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix,
     np.testing.assert_allclose(response[sampled], 2 * motion(sampled / RATE_HZ - delay_s), atol=1e-4)
     content["sample_rate_hz"] = RATE_HZ * 1.05
     with pytest.raises(InvalidRequest, match="samples/s"):
-        import_recording(path, validated(content, ImportMapping, "test"), tmp_path / "wrong.h5")
+        import_recording(path, validate(content, ImportMapping, "test"), tmp_path / "wrong.h5")
 
 
 def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):
     path = write("csv", tmp_path, "drift", np.random.default_rng(0))
     content = {**mapping("csv", RATE_HZ).model_dump(), "time": "even"}
     with open_recording(
-        import_recording(path, validated(content, ImportMapping, "t"), tmp_path / "a.h5")
+        import_recording(path, validate(content, ImportMapping, "t"), tmp_path / "a.h5")
     ) as made:
         (remark,) = made.bench["imported"]["time"]
     assert remark.startswith("the mapping's 5120 samples/s replace the times of the file")
@@ -289,7 +289,7 @@ def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more=""):
     }
     if more:
         content["channels"][2]["full_scale"] = float(more)
-    return validated(content, ImportMapping, "test")
+    return validate(content, ImportMapping, "test")
 
 
 @pytest.mark.parametrize(
@@ -443,7 +443,7 @@ def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
         meaning = mapping("h5", RATE_HZ).model_dump()
         meaning["channels"][0]["source"], meaning["channels"][1]["source"] = "a", "b"
         with pytest.raises(UnusableData, match="several variables of the same name"):
-            import_recording(path, validated(meaning, ImportMapping, "test"), tmp_path / "made.h5")
+            import_recording(path, validate(meaning, ImportMapping, "test"), tmp_path / "made.h5")
 
 
 @pytest.mark.thorough
@@ -460,7 +460,7 @@ def test_an_imported_dwell_with_a_burst_is_not_periodic(tmp_path, at_s, length_s
     base = 3.0 * np.cos(phase + 0.4) + 1e-4 * rng.standard_normal(times.size)
     content = dwell_at(tmp_path / "a.csv", np.cos(phase), base, velocity).model_dump()
     content["measurement"]["excitation"]["duration_s"] = 11.0
-    meaning = validated(content, ImportMapping, "test")
+    meaning = validate(content, ImportMapping, "test")
     with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
         verdict = analyse(recording).motion.verdict
     assert (verdict.kind == "periodic") == (share == 0), verdict.why

@@ -15,7 +15,7 @@ from vibench.analysis.exchange import (
     excerpt,
     export_functions,
     export_samples,
-    opened_source,
+    open_source,
 )
 from vibench.analysis.results.spectral_functions import spectral_functions
 from vibench.analysis.spectra.spectra import spectral_density
@@ -173,7 +173,7 @@ def test_an_import_ignores_spectra(known, tmp_path):
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     mixed, _ = export_samples(excerpt(known), Format.UFF, tmp_path / "b.uff")
     mixed.write_bytes(path.read_bytes() + mixed.read_bytes())
-    with opened_source(mixed) as source:
+    with open_source(mixed) as source:
         assert [each.label for each in source.channels] == ["drive_voltage", "m0_velocity"]
 
 

@@ -22,7 +22,7 @@ from vibench.analysis.figures.bench_levels import bench_levels_figure
 from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns
 from vibench.analysis.figures.noise import excitation_figure, transmission_levels_figure
 from vibench.analysis.figures.stepped_sine import STEPPED_FREQUENCIES, stepped_sine_figure
-from vibench.analysis.figures.style import SIMULATED, prefixed
+from vibench.analysis.figures.style import SIMULATED, with_prefix
 from vibench.analysis.figures.sweep import regions_text, sweep_figure
 from vibench.analysis.figures.transmission import transmission_figure
 from vibench.analysis.recordings.checks import measurement_checks
@@ -222,7 +222,7 @@ def test_every_excitation_can_be_drawn_before_output(plan):
     [(5e-6, (1e6, "µm")), (0.02, (1e3, "mm")), (3.0, (1.0, "m")), (1e-12, (1e9, "nm"))],
 )
 def test_unit_prefixes_give_values_between_1_and_1000(largest, expected):
-    factor, unit = prefixed(largest, "m")
+    factor, unit = with_prefix(largest, "m")
     assert factor == pytest.approx(expected[0])
     assert unit == expected[1]
 

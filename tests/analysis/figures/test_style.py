@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.analysis.figures.style import magnitude_axis, new_figure, styled
+from vibench.analysis.figures.style import figure_style, magnitude_axis, new_figure
 
 
 def _numbers(low, high):
     """Return each tick label of a magnitude axis with its lower and upper end [pixels]."""
-    with styled():
+    with figure_style():
         figure = new_figure(3.0)
         axes = figure.subplots()
         axes.plot([0, 1], [low, high])

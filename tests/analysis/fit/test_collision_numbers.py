@@ -6,7 +6,7 @@ import pytest
 
 from tests.analysis.hidden_motion import shaken_world as world
 from vibench.analysis import Simulation, analyse_files, update_model
-from vibench.analysis.fit.collision_numbers import tracked_numbers
+from vibench.analysis.fit.collision_numbers import track_recordings
 from vibench.analysis.fit.suspects import Assumption
 from vibench.analysis.hidden_motion import Hidden
 from vibench.sim import gong2025
@@ -17,7 +17,7 @@ TRUE = gong2025(gap_m=(35e-6, 55e-6))
 @pytest.fixture(scope="module")
 def collision_analysis(tmp_path_factory):
     """Analyse a dwell of a specimen with unequal gaps; the bench file states 45 um on both sides."""
-    recorded = world.shaken(
+    recorded = world.shake(
         tmp_path_factory.mktemp("unequal"), 258.0, 1.9, duration_s=2.6, seed=41, specimen=TRUE
     )
     return analyse_files([recorded.path], "unequal", Simulation.LEFT_OUT)
@@ -46,7 +46,7 @@ def test_unequal_gaps_are_found_although_described_as_equal(collision_analysis):
 def test_a_motion_that_contradicts_the_masses_gives_no_gap(collision_analysis):
     """The motion determines m1 and the springs only relative to m0 and m2, which must be correct."""
     m0, m1, m2 = TRUE.masses
-    found, why = tracked_numbers(collision_analysis, replace(TRUE, masses=(1.04 * m0, m1, m2)))
+    found, why = track_recordings(collision_analysis, replace(TRUE, masses=(1.04 * m0, m1, m2)))
     assert found is None
     assert "run:" not in why
     assert why.startswith("shaken: ")

@@ -32,7 +32,7 @@ STRETCH_S = (0.5, 1.5)
 @pytest.fixture(scope="module")
 def noisy_dwell(tmp_path_factory):
     """Record a chaotic dwell with sixty times the noise; the bench file states 45 um gaps."""
-    return world.shaken(
+    return world.shake(
         tmp_path_factory.mktemp("buried"), 260.0, 1.8, duration_s=1.6, seed=8, noise=60.0, specimen=TRUE
     )
 
@@ -63,7 +63,7 @@ def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dw
     with open_recording(noisy_dwell.path) as recording:
         rate_hz = recording.sample_rate_hz
         draws = stretch_draws(recording, TRUE, *(round(each * rate_hz) for each in STRETCH_S))
-        seen = chaos_statistics(draws.measured, rate_hz, 260.0)
+        seen = chaos_statistics(draws.recorded_motion, rate_hz, 260.0)
         found = np.array([chaos_statistics(draws.draw(TRUE, rng), rate_hz, 260.0) for _ in range(runs)])
     z = (seen - found.mean(axis=0)) / found.std(axis=0, ddof=1) / math.sqrt(1 + 1 / runs)
     z = z[above_sensor_noise(seen, draws.noise_rms, rate_hz)]

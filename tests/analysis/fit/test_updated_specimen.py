@@ -233,9 +233,9 @@ def test_a_fit_whose_simulation_disagrees_with_its_noise_gives_no_values(campaig
         overlay = SimpleNamespace(ensemble=(SimpleNamespace(agrees=agrees),))
         return replace(campaign, results=tuple(replace(each, overlay=overlay) for each in campaign.results))
 
-    assert fitted_model.checked(overlaid(agrees=True)) is fitted_model
-    refused = fitted_model.checked(overlaid(agrees=False))
-    assert not refused.fitted
+    assert fitted_model.confirm(overlaid(agrees=True)) is fitted_model
+    refused = fitted_model.confirm(overlaid(agrees=False))
+    assert not refused.is_fitted
     assert not refused.fits
     assert refused.specimen == gong2025()
     (said,) = refused.sentences

@@ -14,7 +14,7 @@ from vibench.analysis import (
     NotEnoughData,
     Window,
     analyse,
-    quantities_named,
+    parse_view,
 )
 from vibench.analysis.frequency_response.request import longest_segment
 from vibench.analysis.signals.window import effective_averages, hop_samples, taper
@@ -146,12 +146,12 @@ def test_a_resolution_too_fine_for_the_record_is_refused(streamed_file, asked, l
 
 def test_a_displacement_ratio_converts_to_the_named_quantities(streamed_file):
     found = response(streamed_file()).frequency_response
-    view = quantities_named("velocity/acceleration", MagnitudeScale.DECIBEL)
-    shown = view.shown(found)
+    view = parse_view("velocity/acceleration", MagnitudeScale.DECIBEL)
+    shown = view.apply(found)
     np.testing.assert_allclose(shown.value, found.value / (2j * np.pi * found.frequency_hz), rtol=1e-12)
     np.testing.assert_allclose(shown.magnitude, found.magnitude * view.factor(found.frequency_hz), rtol=1e-12)
-    np.testing.assert_allclose(view.drawn(shown.magnitude), shown.decibel)
+    np.testing.assert_allclose(view.place(shown.magnitude), shown.decibel)
     assert view.unit == "s"
-    np.testing.assert_allclose(quantities_named("velocity").shown(found).value, found.value)
+    np.testing.assert_allclose(parse_view("velocity").apply(found).value, found.value)
     with pytest.raises(InvalidRequest, match="such as velocity/acceleration"):
-        quantities_named("speed")
+        parse_view("speed")

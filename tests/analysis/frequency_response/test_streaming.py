@@ -36,10 +36,10 @@ class Endless:
         drive = np.random.default_rng(start).standard_normal(stop - start)
         return np.stack((drive, drive, np.cumsum(drive) / RATE))
 
-    def bridged(self, start, stop):
+    def bridge_flags(self, start, stop):
         return np.zeros(stop - start, dtype=bool)
 
-    def overloaded(self, start, stop):
+    def overload_flags(self, start, stop):
         return np.zeros(stop - start, dtype=bool)
 
 

@@ -33,7 +33,7 @@ def world_recording(tmp_path_factory):
     def make(kind, level_vpp, **how):
         key = (kind, level_vpp, repr(sorted(how.items())))
         if key not in made:
-            made[key] = world.shaken(tmp_path_factory.mktemp("shaken"), kind, level_vpp, **how)
+            made[key] = world.shake(tmp_path_factory.mktemp("shaken"), kind, level_vpp, **how)
         return made[key]
 
     return make

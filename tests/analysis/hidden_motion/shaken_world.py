@@ -60,7 +60,7 @@ def drive(kind, level_vpp, duration_s, seed):
 
 
 @dataclass(frozen=True)
-class Shaken:
+class ShakenRecording:
     """A recording and the true motion."""
 
     path: Path
@@ -145,7 +145,7 @@ def header(rig, rate_hz, samples):
     )
 
 
-def shaken(
+def shake(
     folder,
     kind,
     level_vpp,
@@ -185,4 +185,4 @@ def shaken(
     writer.end_segment()
     path = writer.finish(RecordingState.COMPLETE, "the plan was carried out")
     at_samples = np.where(rows >= 0, p[np.maximum(rows, 0)], 0.0)
-    return Shaken(path, moved, at_samples, met[:, 0], met.mean(axis=1))
+    return ShakenRecording(path, moved, at_samples, met[:, 0], met.mean(axis=1))

@@ -44,7 +44,7 @@ def matches(found, true, reach):
     return len(near), len(found) - len(near), np.array(near)
 
 
-def impacts_scored(motion, recorded, found, true):
+def score_impacts(motion, recorded, found, true):
     rate = motion.sample_rate_hz
     low, high = SCORED_FROM_S * rate, motion.first_sample + motion.tracked.p.size - 0.02 * rate
     found_at = found + motion.first_sample
@@ -83,7 +83,7 @@ def test_relative_motion_and_impacts_match_the_simulation(world_recording, kind,
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
     assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
-    (found, false, apart), true = impacts_scored(
+    (found, false, apart), true = score_impacts(
         motion, recorded, motion.tracked.collisions.samples, recorded.touches
     )
     assert true > 300
@@ -100,7 +100,7 @@ def test_a_motion_against_a_one_sided_stop_is_tracked_and_its_gap_identified(wor
     one_sided = gong2025(gap_m=(30e-6, np.inf))
     recorded = world_recording(180.0, 0.5, seed=11, specimen=one_sided)
     motion = estimate(recorded, specimen=one_sided)
-    assert motion.tracked.share_followed > 0.95
+    assert motion.tracked.tracked_share > 0.95
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
     found = {each.what: each for each in motion.parameters}
@@ -126,7 +126,7 @@ def test_chattering_is_tracked_without_a_contact_model(
     motion = estimate(recorded, specimen=one_sided)
     error, scored = errors_of(motion, recorded, motion.tracked.p)
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
-    (found, false, _), true = impacts_scored(
+    (found, false, _), true = score_impacts(
         motion, recorded, motion.tracked.collisions.samples, recorded.touches
     )
     assert true > 4 * 260 * 1.5
@@ -159,7 +159,7 @@ def test_motion_impacts_and_gaps_are_reported_without_a_contact_model(
     assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.95
     assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
     assert np.mean(np.abs(error[scored]) < 1.96 * motion.free.p_sd[scored]) > 0.93
-    (found, false, apart), true = impacts_scored(
+    (found, false, apart), true = score_impacts(
         motion, recorded, motion.free.impacts.samples, recorded.middles
     )
     assert found > 0.97 * true
@@ -285,7 +285,7 @@ def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_o
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = estimate(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
-    assert motion.tracked.share_followed < 0.3
+    assert motion.tracked.tracked_share < 0.3
     assert any("residual" in each.reason or "acquired" in each.reason for each in motion.tracked.not_followed)
     missing = sum(each.stop - each.first for each in motion.tracked.not_followed)
     assert missing == np.count_nonzero(np.isnan(motion.tracked.p))

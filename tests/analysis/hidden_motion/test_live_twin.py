@@ -69,7 +69,7 @@ def test_forecast_errors_match_their_stated_size(dwell):
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "level_vpp"), [(258.0, 1.6), ("noise", 8.0)])
 def test_a_gap_change_of_1_um_is_detected_within_a_second(live_world, dwell, kind, level_vpp):
-    running = live_world(kind, level_vpp, 7.0, seed=72, known=dwell[0].twin.known)
+    running = live_world(kind, level_vpp, 7.0, seed=72, known=dwell[0].twin.numbers)
     while running.samples < 3.03 * 51_200:
         assert running.go_on(BLOCK) == ()
     running.world.widen_gaps(1e-6)

@@ -5,7 +5,7 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.live._ring import Ring
 
 
-def numbered(first, count):
+def numbers(first, count):
     return np.stack([np.arange(first, first + count), -np.arange(first, first + count)]).astype(np.float32)
 
 
@@ -13,10 +13,10 @@ def numbered(first, count):
 def test_the_newest_samples_are_contiguous_for_any_block_size(length):
     ring = Ring(2, 100)
     for first in range(40, 1000, length):
-        ring.add(first, numbered(first, length))
+        ring.add(first, numbers(first, length))
         window = ring.newest(100)
         assert window.stop_sample == first + length == ring.next_sample
-        expected = numbered(window.first_sample, window.values.shape[1])
+        expected = numbers(window.first_sample, window.values.shape[1])
         assert np.array_equal(window.values, expected)
 
 
@@ -30,28 +30,28 @@ def test_a_ring_buffer_returns_only_received_samples():
 
 def test_repeated_samples_are_stored_once_in_a_ring_buffer():
     ring = Ring(2, 50)
-    ring.add(0, numbered(0, 20))
-    ring.add(10, numbered(10, 20))
-    ring.add(0, numbered(0, 30))
-    assert np.array_equal(ring.newest(50).values, numbered(0, 30))
+    ring.add(0, numbers(0, 20))
+    ring.add(10, numbers(10, 20))
+    ring.add(0, numbers(0, 30))
+    assert np.array_equal(ring.newest(50).values, numbers(0, 30))
 
 
 def test_lost_samples_are_nan_in_a_ring_buffer_and_older_samples_remain():
     ring = Ring(2, 50)
-    ring.add(0, numbered(0, 20))
-    ring.add(30, numbered(30, 5))
+    ring.add(0, numbers(0, 20))
+    ring.add(30, numbers(30, 5))
     values = ring.newest(50).values
     assert values.shape == (2, 35)
     assert np.isnan(values[:, 20:30]).all()
-    assert np.array_equal(values[:, :20], numbered(0, 20))
-    assert np.array_equal(values[:, 30:], numbered(30, 5))
+    assert np.array_equal(values[:, :20], numbers(0, 20))
+    assert np.array_equal(values[:, 30:], numbers(30, 5))
 
 
 def test_a_ring_buffer_returns_the_samples_after_a_position():
     ring = Ring(2, 50)
-    ring.add(0, numbered(0, 45))
-    assert np.array_equal(ring.since(40).values, numbered(40, 5))
-    assert ring.since(45).values.shape == (2, 0)
+    ring.add(0, numbers(0, 45))
+    assert np.array_equal(ring.samples_since(40).values, numbers(40, 5))
+    assert ring.samples_since(45).values.shape == (2, 0)
 
 
 def test_a_ring_buffer_without_channels_or_samples_is_refused():

@@ -11,7 +11,7 @@ from vibench.analysis.overlay.simulated_channels import (
     advance,
     lowest_frequency_hz,
     recorded_base_motion,
-    shaken,
+    shake_specimen,
 )
 from vibench.analysis.recordings.facts import plan_of
 from vibench.sim import Accuracy, Sampled, gong2025, integrate
@@ -61,7 +61,7 @@ def test_the_lowest_played_frequency_sets_the_lower_band_edge(plan, lowest_hz):
 def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
     base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
     base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
-    velocity, impacts = shaken(gong2025(), base, RATE, Accuracy.STANDARD)
+    velocity, impacts = shake_specimen(gong2025(), base, RATE, Accuracy.STANDARD)
     whole = integrate(gong2025(), Sampled(base, RATE), (base.size - 1) / RATE, sample_rate_hz=RATE)
     assert impacts[-1] == whole.impacts.count == 0
     np.testing.assert_allclose(velocity, whole.states[:, 3], atol=1e-9 * np.max(np.abs(velocity)))
@@ -69,11 +69,11 @@ def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
 
 def test_impacts_keep_their_times_across_pieces(dwell_motions):
     motion = dwell_motions["strong"][0].displacement_m
-    first = shaken(gong2025(), motion, RATE, Accuracy.STANDARD)[1]
+    first = shake_specimen(gong2025(), motion, RATE, Accuracy.STANDARD)[1]
     # Ten seconds at rest before the motion shift the same impacts into a later piece.
-    later = shaken(gong2025(), np.concatenate((np.zeros(round(10 * RATE)), motion)), RATE, Accuracy.STANDARD)[
-        1
-    ]
+    later = shake_specimen(
+        gong2025(), np.concatenate((np.zeros(round(10 * RATE)), motion)), RATE, Accuracy.STANDARD
+    )[1]
     # Times of the first twenty impacts from the cumulative counts.
     early = np.arange(1, 21)
     times = [np.searchsorted(counts, early) / RATE for counts in (first, later)]

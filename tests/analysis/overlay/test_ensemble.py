@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from vibench.analysis.overlay.draws import Draw, DrawSource, SimulatedRun, drawn
+from vibench.analysis.overlay.draws import Draw, DrawSource, SimulatedRun, all_draws
 from vibench.analysis.overlay.driven_rig import Driven
 from vibench.analysis.overlay.ensemble import (
     Ending,
@@ -175,5 +175,5 @@ def test_draws_stop_at_clear_agreement_unless_more_are_requested(requested, shif
 
     run = SimulatedRun(gong2025(), Driven.GENERATOR, Accuracy.STANDARD, None)
     source = DrawSource(run, requested, 1000, lambda number: number)
-    found = drawn(source, estimate, [Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)))])
+    found = all_draws(source, estimate, [Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)))])
     assert (found.run.draws, len(found.quantities), found.response) == (made, made, 0)

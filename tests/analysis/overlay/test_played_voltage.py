@@ -28,7 +28,7 @@ def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_r
     for _ in range(12):
         played = TONE_V + played_rms * rng.standard_normal(TIME_S.size)
         volts = played + own_rms * rng.standard_normal(TIME_S.size)
-        drawn = PlayedVoltage(volts, own_rms).drawn(rng)
+        drawn = PlayedVoltage(volts, own_rms).random_voltage(rng)
         wanted.append(level(played))
         found.append(level(drawn))
         recorded.append(level(volts))
@@ -42,7 +42,7 @@ def test_draws_keep_the_recorded_drive_within_its_uncertainty():
     rng = np.random.default_rng(6)
     volts = TONE_V + 1e-4 * rng.standard_normal(TIME_S.size)
     voltage = PlayedVoltage(volts, 1e-4)
-    one, other = voltage.drawn(rng), voltage.drawn(rng)
+    one, other = voltage.random_voltage(rng), voltage.random_voltage(rng)
     tone = np.exp(-2j * np.pi * 180.0 * TIME_S[BAND])
     kept = np.mean(one[BAND] * tone) / np.mean(volts[BAND] * tone)
     assert kept == pytest.approx(1.0, abs=3e-4)
@@ -53,8 +53,8 @@ def test_draws_keep_the_recorded_drive_within_its_uncertainty():
 def test_short_or_noise_free_voltages_drive_the_twin_unchanged(samples):
     volts = TONE_V[20_000 : 20_000 + samples]
     rng = np.random.default_rng(7)
-    np.testing.assert_array_equal(PlayedVoltage(volts, 0.0).drawn(rng), volts)
-    assert PlayedVoltage(volts, 1e-9).drawn(rng).shape == volts.shape
+    np.testing.assert_array_equal(PlayedVoltage(volts, 0.0).random_voltage(rng), volts)
+    assert PlayedVoltage(volts, 1e-9).random_voltage(rng).shape == volts.shape
 
 
 def test_the_noise_of_a_channel_matches_all_its_quiet_blocks():

@@ -9,7 +9,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
-from vibench.acquisition.recording import BridgedChannel, Dropout, bridged, found_dropouts
+from vibench.acquisition.recording import BridgedChannel, Dropout, bridge, find_dropouts
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.recordings.checks import Verdict, measurement_checks
@@ -48,9 +48,9 @@ def test_a_drop_out_is_found_and_bridged(seed):
     for at in begins:
         level = float(rng.choice((-1, 1)) * rng.uniform(0.3, 1.0))
         dark = with_drop_out(dark, at, int(rng.integers(1, 100)), level)
-    found = found_dropouts(dark, RATE_HZ)
+    found = find_dropouts(dark, RATE_HZ)
     assert [bool(each.first <= at < each.stop) for each, at in zip(found, begins, strict=True)] == [True] * 6
-    assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
+    assert np.max(np.abs(bridge(dark, found) - velocity)) < 0.02 * np.std(velocity)
 
 
 @pytest.mark.parametrize("noise", [3e-6, 2e-3, 1e-2])
@@ -61,7 +61,7 @@ def test_drop_outs_at_a_constant_value_are_found_in_any_noise(noise, level):
     begins = np.arange(2_000, 48_000, 4_000)
     for at, samples in zip(begins, np.linspace(10, 190, begins.size).astype(int), strict=True):
         dark = with_drop_out(dark, at, samples, 0.0 if level == "zero" else dark[at - 1])
-    found = found_dropouts(dark, RATE_HZ)
+    found = find_dropouts(dark, RATE_HZ)
     assert [each.first <= at < each.stop for each, at in zip(found, begins, strict=True)] == [True] * 12
 
 
@@ -71,7 +71,7 @@ def test_a_coarsely_quantised_channel_with_impacts_has_no_drop_outs(quantum, noi
     velocity = motion(12, noise=noise)
     for at in range(1_000, 50_000, 2_500):
         velocity[at:] += 0.05 * (-1) ** (at // 2_500)
-    assert found_dropouts(np.round(velocity / quantum) * quantum, RATE_HZ) == ()
+    assert find_dropouts(np.round(velocity / quantum) * quantum, RATE_HZ) == ()
 
 
 @pytest.mark.thorough
@@ -85,38 +85,38 @@ def test_a_sweep_with_zero_drop_outs_gives_no_wrong_result(number, tmp_path):
 def test_two_close_drop_outs_are_both_bridged():
     velocity = motion(3)
     dark = with_drop_out(with_drop_out(velocity, 20_000, 12, 0.8), 20_250, 20, -0.6)
-    found = found_dropouts(dark, RATE_HZ)
+    found = find_dropouts(dark, RATE_HZ)
     assert len(found) == 2
-    assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
+    assert np.max(np.abs(bridge(dark, found) - velocity)) < 0.02 * np.std(velocity)
 
 
 def test_drop_outs_with_too_little_motion_between_them_are_not_bridged():
     dark = motion(10)[:1_500]
     many = tuple(Dropout(at, at + 40) for at in range(20, 1_440, 60))
-    assert np.array_equal(bridged(dark, many), dark)
+    assert np.array_equal(bridge(dark, many), dark)
 
 
 def test_a_clipped_peak_is_not_a_drop_out():
     velocity = 1.2 * np.sin(2 * np.pi * 5 * np.arange(51_200) / RATE_HZ)
     velocity = np.clip(velocity, -1.0, 1.0) + 3e-6 * np.random.default_rng(0).standard_normal(51_200)
-    assert found_dropouts(velocity, RATE_HZ) == ()
+    assert find_dropouts(velocity, RATE_HZ) == ()
     fast = 1.02 * np.sin(2 * np.pi * 20 * np.arange(51_200) / RATE_HZ)
     fast = np.clip(fast, -1.0, 1.0) + 3e-6 * np.random.default_rng(0).standard_normal(51_200)
-    assert found_dropouts(fast, RATE_HZ) == ()
+    assert find_dropouts(fast, RATE_HZ) == ()
 
 
 @pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
 def test_a_lasting_velocity_step_of_an_impact_is_not_a_drop_out(step):
     velocity = motion(4)
     velocity[20_000:] += step
-    assert found_dropouts(velocity, RATE_HZ) == ()
+    assert find_dropouts(velocity, RATE_HZ) == ()
 
 
 def test_ringing_after_an_impact_is_not_a_drop_out():
     velocity = motion(5)
     after = np.arange(velocity.size - 20_000) / RATE_HZ
     velocity[20_000:] += 0.5 * np.exp(-after / 0.01) * np.sin(2 * np.pi * 4_000 * after)
-    assert found_dropouts(velocity, RATE_HZ) == ()
+    assert find_dropouts(velocity, RATE_HZ) == ()
 
 
 @pytest.mark.parametrize(
@@ -125,15 +125,15 @@ def test_ringing_after_an_impact_is_not_a_drop_out():
     ids=["silent", "lost", "short", "coarse"],
 )
 def test_ambiguous_signals_give_no_drop_outs(velocity):
-    assert found_dropouts(velocity, RATE_HZ) == ()
+    assert find_dropouts(velocity, RATE_HZ) == ()
 
 
 def test_long_drop_outs_are_not_bridged():
-    assert found_dropouts(with_drop_out(motion(8), 20_000, 2_000, 0.0), RATE_HZ) == ()
+    assert find_dropouts(with_drop_out(motion(8), 20_000, 2_000, 0.0), RATE_HZ) == ()
 
 
 def test_drop_outs_are_not_searched_below_20_khz():
-    assert found_dropouts(with_drop_out(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
+    assert find_dropouts(with_drop_out(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
 
 
 def measure(rig, plan, path, dropouts_per_s, seed=5, **how):

@@ -108,7 +108,7 @@ def test_a_clipped_acceleration_marks_all_affected_samples(dwell_motions, tmp_pa
         overloads=(Overload("m0_acceleration", 16_000, 16_002),),
     )
     with open_recording(path) as recording:
-        marks = RecordedChannels(recording).overloaded(0, recording.samples)
+        marks = RecordedChannels(recording).overload_flags(0, recording.samples)
     assert np.flatnonzero(marks)[[0, -1]].tolist() == [16_000 - RATE, 16_002 + RATE]
 
 

@@ -53,7 +53,7 @@ def test_the_accuracy_page_lists_shares_of_start_dependent_motions(benchmark, pa
     page = page_of(benchmark)
     (lottery,) = benchmark.lotteries
     rows = [line for line in page.splitlines() if line.startswith(f"| {lottery.lottery.name}")]
-    assert len(rows) == len(lottery.answered.ensemble.motions)
+    assert len(rows) == len(lottery.prediction.ensemble.motions)
     assert all("yes" in row or "**no**" in row for row in rows)
     without = page_of(replace(benchmark, lotteries=()))
     assert "Sensitive dependence" not in without

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reading_reports import Page as Read
 from vibench.analysis.report import Agreement, Card, Fold, Page, ReportTable, write_page
-from vibench.analysis.report._page import LONGEST_CAPTION, MOST_OPEN_CARDS, divided_caption
+from vibench.analysis.report._page import LONGEST_CAPTION, MOST_OPEN_CARDS, split_caption
 
 HOSTILE = '<script>alert("x")</script>'
 
@@ -57,7 +57,7 @@ def test_reports_have_dark_and_print_styles_and_closed_folds_are_not_printed(tmp
     ],
 )
 def test_long_captions_are_folded_after_three_lines(caption, shown):
-    first, rest = divided_caption(SimpleNamespace(title="A title", caption=caption))
+    first, rest = split_caption(SimpleNamespace(title="A title", caption=caption))
     assert first == shown
     assert f"{first} {rest}".strip() == caption
     assert len(first) <= LONGEST_CAPTION

@@ -9,7 +9,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
-from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
+from vibench.acquisition.recording import Hold, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.figures.backbone import backbone_figure
@@ -40,7 +40,7 @@ STEP = SegmentNote(
     drive_hz=100.0,
     base_m_per_s2=1.0,
     base_u=0.01,
-    level=Held.WITHIN,
+    level=Hold.WITHIN,
     response_ii=2.0,
     motion=Steadiness.PERIODIC,
     period=1,
@@ -56,7 +56,7 @@ def test_only_bracketed_jumps_are_counted():
 
 def test_recorded_steps_are_counted_by_kind_of_motion():
     tripled = STEP.model_copy(update={"period": 3})
-    chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Held.OUTSIDE})
+    chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Hold.OUTSIDE})
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
     assert said == [
         "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",

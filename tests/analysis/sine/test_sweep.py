@@ -18,7 +18,7 @@ from vibench.analysis.signals.interpolation import Decimator
 from vibench.analysis.sine.collision_region import collisions
 from vibench.analysis.sine.sweep import SweepSums, drive_phase
 from vibench.analysis.sine.sweep_analysis import measured_sweep, played_check
-from vibench.analysis.tones.order_tracking import tracked_orders
+from vibench.analysis.tones.order_tracking import track_orders
 
 RATE = 8192.0
 
@@ -59,7 +59,7 @@ class RecordedSweep:
         """Return drive, base and response."""
         return self.data[:, start:stop]
 
-    def bridged(self, start, stop):
+    def bridge_flags(self, start, stop):
         """Return a mask of the bridged samples."""
         return np.isin(np.arange(start, stop), self.bridges)
 
@@ -170,7 +170,7 @@ def test_all_orders_are_separated_without_whole_periods_per_interval():
     _, phase = sweep(20)
     parts = {0.5: 0.2 - 0.1j, 1.0: 2.0 + 1j, 1.5: 0.05j, 2.0: -0.3 + 0j, 3.0: 0.1 + 0.2j}
     x = 0.7 + sum(np.real(a * np.exp(1j * k * phase)) for k, a in parts.items())
-    tracked = tracked_orders(x, phase, interval_samples=701)
+    tracked = track_orders(x, phase, interval_samples=701)
     for order, value in parts.items():
         np.testing.assert_allclose(tracked.order(order), value, atol=1e-9)
     assert np.max(tracked.residual_rms) < 1e-9
@@ -180,7 +180,7 @@ def test_the_stated_uncertainty_of_an_order_is_its_scatter():
     rng = np.random.default_rng(1)
     time, phase = sweep(60)
     x = np.cos(phase) + 0.3 * rng.standard_normal(time.size)
-    tracked = tracked_orders(x, phase, interval_samples=820)
+    tracked = track_orders(x, phase, interval_samples=820)
     for order in (0.5, 1.0, 3.0):
         scatter = np.std(tracked.order(order).real)
         assert np.mean(tracked.sd[tracked.orders.index(order)]) == pytest.approx(scatter, rel=0.1)
@@ -244,7 +244,7 @@ def test_a_resonance_swept_at_1_hz_per_s_shifts_as_theory_predicts(quality, shif
     natural = 2 * np.pi * 260
     system = signal.cont2discrete(([natural**2], [1, natural / quality, natural**2]), 1 / RATE, method="foh")
     x = signal.lfilter(np.ravel(system[0]), np.ravel(system[1]), np.sin(phase))
-    tracked = tracked_orders(x, phase, interval_samples=410)
+    tracked = track_orders(x, phase, interval_samples=410)
     frequency = 240 + (np.arange(tracked.residual_rms.size) + 0.5) * 410 / RATE
     size = np.abs(tracked.order(1.0))
     top = int(np.argmax(size[20:-20])) + 20
@@ -274,7 +274,7 @@ def test_an_invalid_sweep_analysis_is_refused():
     with pytest.raises(InvalidRequest, match="ascending"):
         SweepSums(RATE, low_hz=350, high_hz=150)
     with pytest.raises(InvalidRequest, match="longer intervals or fewer orders"):
-        tracked_orders(np.zeros(1000), np.arange(1000) * 0.1, interval_samples=100)
+        track_orders(np.zeros(1000), np.arange(1000) * 0.1, interval_samples=100)
     with pytest.raises(NotEnoughData, match="at least 10"):
         drive_phase(np.zeros(100), RATE, low_hz=150, high_hz=350)
     noise = np.random.default_rng(3).standard_normal(8192)

@@ -59,7 +59,7 @@ def test_a_flat_top_window_measures_a_sine_between_lines_within_0_01_db():
 
 def test_a_velocity_spectrum_converts_to_displacement():
     x = 2 * np.pi * 100 * np.cos(2 * np.pi * 100 * np.arange(4096) / RATE)
-    spectrum = amplitude_spectrum(x, RATE).converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    spectrum = amplitude_spectrum(x, RATE).convert(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     assert spectrum.amplitude[200] == pytest.approx(1, rel=1e-9)
     assert np.isnan(spectrum.value[0])
 

@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, SteppedSine, Until, WhiteNoise
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import expected_recorded_s, expected_uncertainty, recorded_s, within
+from vibench.analysis import expected_recorded_s, expected_uncertainty, fit_to, recorded_s
 from vibench.analysis.uncertainty.budget import WIDENING, Budget, Cause, Contribution
 from vibench.analysis.uncertainty.expected import time_to_wishes_s
 
@@ -60,7 +60,7 @@ def test_campaign_time_is_distributed_in_proportion_to_the_needed_times():
     first = plan(NOISE, Until(resonance_hz=reachable_uncertainty(50.0)), "first")
     second = plan(NOISE, Until(resonance_hz=reachable_uncertainty(100.0)), "second")
     campaign = Campaign(name="c", measurements=(first, second, plan(QUIET, None, "fixed")))
-    changed, shares = within(campaign, RIG, 1800.0)
+    changed, shares = fit_to(campaign, RIG, 1800.0)
     assert changed.duration_s == pytest.approx(1800.0, abs=15.0)  # whole realisations of 7 s including ramps
     assert shares[1].allotted_s == pytest.approx(2 * shares[0].allotted_s, abs=4.0)
     assert [each.needed_s for each in shares] == [pytest.approx(50.0), pytest.approx(100.0), None]
@@ -78,12 +78,12 @@ def test_campaign_time_is_distributed_in_proportion_to_the_needed_times():
 )
 def test_an_impossible_distribution_of_time_is_refused_in_one_sentence(until, time_s, said):
     with pytest.raises(ConfigurationError, match=said):
-        within(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
+        fit_to(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
 
 
 def test_stopping_early_widens_noise_and_chance_but_not_calibrations():
     parts = [Contribution(cause, 0.01, "x") for cause in (Cause.NOISE, Cause.CHANCE, Cause.VIBROMETER)]
-    budget = Budget("Response I", 2.0, "", (*parts, Contribution(Cause.NOISE, None, "y"))).widened()
+    budget = Budget("Response I", 2.0, "", (*parts, Contribution(Cause.NOISE, None, "y"))).widen()
     assert [each.relative for each in budget.contributions] == [0.01 * WIDENING, 0.01 * WIDENING, 0.01, None]
 
 

@@ -237,11 +237,11 @@ class HelicBoard:
             self.is_left.set()
 
     def _answer(self, client, host):
-        head = received(client, 6)
+        head = receive(client, 6)
         if head is None:
             return False
         magic, kind, sequence, length = struct.unpack("<2sBBH", head)
-        rest = received(client, length + 2)
+        rest = receive(client, length + 2)
         if rest is None or magic != MAGIC or rest[-2:] != crc(head[2:] + rest[:-2]):
             return False
         try:
@@ -342,7 +342,7 @@ def crc(body):
     return struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
 
 
-def received(client, count):
+def receive(client, count):
     parts = b""
     while len(parts) < count:
         part = client.recv(count - len(parts))

@@ -114,7 +114,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
 
     points, length = [correct_point(solver.first())], 1.0
     while len(points) < 80 and length > 1e-2:
-        one = correct_point(solver.next(tuple(points[-2:]), length, 1.0))
+        one = correct_point(solver.predict(tuple(points[-2:]), length, 1.0))
         if one is None:
             length /= 2
             here = measured_at(points[-1].unknowns)
@@ -152,7 +152,7 @@ def test_the_step_direction_ignores_points_closer_than_their_noise():
             for turn in turns
         ]
         tangent = np.array([-radius * np.sin(turns[-1]), radius * np.cos(turns[-1]), 0.5])
-        along = solver.next(points, 0.1, 1.0).along
+        along = solver.predict(points, 0.1, 1.0).along
         assert along @ tangent / np.linalg.norm(tangent) > 0.95
 
 

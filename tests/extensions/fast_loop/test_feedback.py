@@ -69,7 +69,7 @@ def test_the_sampled_plant_model_matches_the_compiled_simulation(latency_s):
     step, volt = model.step
     state, shown = np.zeros(model.size), []
     for each in volts:
-        shown.append(model.shown @ state)
+        shown.append(model.sensing @ state)
         state = step @ state + volt * each
     for row, expected in zip(np.transpose(shown)[:, 1:], seen[:, :-1], strict=True):
         assert np.abs(row - expected).max() < 4e-3 * np.abs(expected).max()
@@ -134,7 +134,7 @@ def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
         state, memory, total = np.zeros(model.size), np.zeros(2), 0.0
         omega = 2 * np.pi * LINEAR.natural_frequencies_hz[0]
         for push, more, noise in zip(pushes, unknown, heard, strict=True):
-            seen = model.shown @ state + noise
+            seen = model.sensing @ state + noise
             answer = (law.output @ memory + law.direct @ seen)[0]
             motion = (relative @ state) ** 2 + ((state[7] - state[8]) / omega) ** 2
             total += motion * (0.1 / RELATIVE_M) ** 2 + answer**2
@@ -176,7 +176,7 @@ def test_the_played_signal_moves_the_base_by_the_transfer_function():
     step, volt = model.step
     state, memory, shown, turns = np.zeros(model.size), np.zeros(len(law.step)), [], []
     for k in range(20_000):
-        seen = model.shown @ state
+        seen = model.sensing @ state
         played = np.cos(2 * np.pi * 130.0 * k / RATE_HZ)
         answer = (law.output @ memory + law.direct @ seen)[0] + played
         memory = law.step @ memory + law.inlet @ seen

@@ -45,7 +45,7 @@ def held_responses(index, draws, rng):
     state, memory = np.zeros((table.size, 2 * draws)), np.zeros((len(law.step), 2 * draws))
     shown = np.empty((count, 2, 2 * draws))
     for n in range(count):
-        shown[n] = table.shown @ state + noise[n]
+        shown[n] = table.sensing @ state + noise[n]
         answer = law.output @ memory + law.direct @ shown[n] + volts[n]
         memory = law.step @ memory + law.inlet @ shown[n]
         state = first @ state + of_first[:, None] * answer

@@ -74,12 +74,12 @@ class WiredController:
     def run(self, seconds):
         for _ in range(round(seconds * RATE_HZ)):
             self.base.shown[:], self.drive[:] = self.gain * self.played[-3], 0.0
-            with self.controller.answering() as controller:
+            with self.controller.hold_state() as controller:
                 self.cables["controller"] = controller.ctypes.data
                 self.cables["begin"], self.cables["stop"] = 0, 1
                 if native_engine().call("hear_loop", self.cables):
                     self.controller.attend(self.samples / RATE_HZ)
-            with self.controller.answering() as controller:
+            with self.controller.hold_state() as controller:
                 self.cables["controller"], self.cables["begin"] = controller.ctypes.data, 0
                 native_engine().call("play_loop", self.cables)
             self.played.append(float(self.drive[0]))

@@ -53,7 +53,7 @@ def full_window(window, record, tmp_path, qtbot):
     form = pages[TEST].form
     form.form.editors["excitation"].kind_choice.setCurrentText("held dwell")
     measurement = form.value
-    pages[TEST]._looked(preview_test(Previewed(measurement, rig)))
+    pages[TEST]._show_preview(preview_test(Previewed(measurement, rig)))
     lines = ("base held at 5 µm", "stroke 0.05 mm of 5 mm", "acceleration 12.5 m/s² of 60 m/s²")
     armed = ArmedPlan(
         campaign="held",
@@ -185,7 +185,7 @@ def test_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
     choose_units(full_window, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
-    assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
+    assert tuple(UNITS.chosen_units.values()) == tuple(OTHERS.values())
     again.background.close()
 
 

@@ -19,8 +19,8 @@ def test_blocking_work_is_logged_with_the_visible_page(qapp, qtbot):
     qtbot.waitUntil(lambda: monitor.longest_s > 0 or monitor.busiest_s > 0)
     monitor.begin()
     work_for(1.6 * BOUND_S)
-    qtbot.waitUntil(lambda: bool(monitor.noted))
-    (wait,) = monitor.noted
+    qtbot.waitUntil(lambda: bool(monitor.long_waits))
+    (wait,) = monitor.long_waits
     assert wait.about == "Files page"
     assert wait.busy_s == pytest.approx(1.6 * BOUND_S, abs=0.04)
     assert wait.own_s > BOUND_S

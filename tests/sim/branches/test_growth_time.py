@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import FrequencyPath, integrate, periodic_orbit
-from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shot_branches
+from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shoot_branches
 from vibench.sim.specimen.drive import Harmonic
 from vibench.sim.specimen.power_law import PowerLaw
 from vibench.sim.specimen.specimen import gong2025, state_scales
@@ -17,7 +17,7 @@ PERIODS = 12
 @pytest.mark.thorough
 def test_distance_from_an_unstable_motion_grows_by_factor_e_per_growth_time():
     specimen = replace(gong2025(), contact=PowerLaw(100e-6, ((3, 0.1 * gong2025().stiffnesses[1] * 100e-6),)))
-    found = next(shot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
+    found = next(shoot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
     branch = found.branch
     at = int(np.argmax(np.abs(branch.multipliers[:, 0])))
     drive = Harmonic(float(branch.frequencies_hz[at]), 3e-6)

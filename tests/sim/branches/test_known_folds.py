@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from vibench.sim import AmplitudePath, BifurcationKind, FrequencyPath, PowerLaw, gong2025
-from vibench.sim.branches import MotionSearch, shot_branches
+from vibench.sim.branches import MotionSearch, shoot_branches
 
 FEW = MotionSearch(places=2, starts=1)
 
@@ -18,7 +18,7 @@ def hardening():
 
 
 def folds(specimen, path, low, high):
-    found = next(shot_branches(specimen, path, low, high, FEW))
+    found = next(shoot_branches(specimen, path, low, high, FEW))
     return [each for each in found.branch.events if each.kind is BifurcationKind.FOLD]
 
 
@@ -48,7 +48,7 @@ def test_a_branch_over_the_drive_level_folds_at_the_ends_of_its_unstable_part(fr
 @pytest.mark.thorough
 def test_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
     specimen, path = gong2025(), AmplitudePath(97.95)
-    found = list(shot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))
+    found = list(shoot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))
     levels = [
         1e6 * each.amplitude_m
         for one in found

@@ -17,7 +17,7 @@ from vibench.sim import (
     integrate,
     steady_response,
 )
-from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
+from vibench.sim.branches import BranchOrigin, MotionSearch, shoot_branches
 from vibench.sim.periodic.branch import OrbitShape
 from vibench.sim.periodic.shooting import PeriodMap
 from vibench.sim.specimen.specimen import state_scales
@@ -39,7 +39,7 @@ def error(specimen, drive, found, k):
 @pytest.fixture(scope="module")
 def near_the_first_resonance():
     """Branches of the paper's specimen around its first resonance, from 88 to 101 Hz at 5 um."""
-    return list(shot_branches(gong2025(), LEVEL, 88.0, 101.0, MotionSearch(places=3, starts=12)))
+    return list(shoot_branches(gong2025(), LEVEL, 88.0, 101.0, MotionSearch(places=3, starts=12)))
 
 
 class PiecewiseLinear:
@@ -96,7 +96,7 @@ class PiecewiseLinear:
 @pytest.mark.thorough
 def test_a_branch_with_linear_stops_matches_the_piecewise_exact_solution():
     specimen, amplitude = gong2025(contact="linear_gap"), 20e-6
-    found = next(shot_branches(specimen, FrequencyPath((amplitude,)), 128.0, 140.0, FEW))
+    found = next(shoot_branches(specimen, FrequencyPath((amplitude,)), 128.0, 140.0, FEW))
     assert found.shape is OrbitShape.MIRRORED
     branch = found.branch
     checked = 0
@@ -177,7 +177,7 @@ def test_the_linear_motion_at_a_grazing_point_equals_the_gap():
     free = gong2025(contact="linear")
     linear = steady_response(free, Harmonic(60.0, 1e-6), "reference", 20.0, 1.0)
     at_gap = specimen.gap_m / linear.relative_i
-    found = next(shot_branches(specimen, AmplitudePath(60.0), 0.9 * at_gap, 1.1 * at_gap, FEW))
+    found = next(shoot_branches(specimen, AmplitudePath(60.0), 0.9 * at_gap, 1.1 * at_gap, FEW))
     grazing = next(e for e in found.branch.events if e.kind is BifurcationKind.GRAZING)
     assert grazing.amplitude_m == pytest.approx(at_gap, rel=1e-5)
 
@@ -185,7 +185,7 @@ def test_the_linear_motion_at_a_grazing_point_equals_the_gap():
 @pytest.mark.slow
 def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
     specimen = gong2025(contact="rigid:0.8")
-    found = list(shot_branches(specimen, FrequencyPath((20e-6,)), 110.0, 150.0, FEW))
+    found = list(shoot_branches(specimen, FrequencyPath((20e-6,)), 110.0, 150.0, FEW))
     assert found
     for each in found:
         branch = each.branch
@@ -199,7 +199,7 @@ def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
 def test_each_branch_point_uses_the_recorded_level_at_its_frequency():
     specimen = gong2025()
     path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))
-    found = next(shot_branches(specimen, path, 126.0, 138.0, FEW))
+    found = next(shoot_branches(specimen, path, 126.0, 138.0, FEW))
     branch = found.branch
     assert branch.amplitudes_m == pytest.approx([path.drive(f)[1] for f in branch.frequencies_hz])
     assert np.ptp(branch.amplitudes_m) > 1e-6

@@ -108,7 +108,7 @@ def call_on_cubics(engine, draws):
         len(times),
         10_000,
     )
-    sizes = [(view, int(view)) for view in lent_sizes(drive)]
+    sizes = [(view, int(view)) for view in size_views(drive)]
     tolerance = float(draws.choice([3e-7, 3e-7, *STRANGE]))
     for structure in draws.choice([0, 1, 2, 3], draws.integers(4)):
         corrupt((scene, drive, state, record)[structure], draws)
@@ -145,23 +145,23 @@ def follow(engine, tables, state, tolerance, draws):
         return -1
 
 
-def lent_sizes(structure):
+def size_views(structure):
     """Yield views of the sizes of all arrays that a structure refers to."""
     for name in structure.dtype.names:
         if structure.dtype[name].names == ("at", "size"):
             yield structure[name]["size"]
         elif structure.dtype[name].names:
-            yield from lent_sizes(structure[name])
+            yield from size_views(structure[name])
 
 
 def call_corrupted(engine, draws):
     """Call every function with a possibly broken structure; yield the codes."""
     for function, structure, _ in calls(engine, draws):
-        sizes = [(view, int(view)) for view in lent_sizes(structure)]
+        sizes = [(view, int(view)) for view in size_views(structure)]
         for _ in range(draws.integers(3)):
             corrupt(structure, draws)
         if function == "close_loop":
-            sizes += [(view, int(view)) for view in lent_sizes(structure.lent["shaker"])]
+            sizes += [(view, int(view)) for view in size_views(structure.lent["shaker"])]
             corrupt(structure.lent["shaker"], draws)
         if function.endswith("_loop") and draws.random() < 0.3:
             corrupt(structure.lent["controller"], draws)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.sim.maps._refinement import AUDITED, Seen, plan_refinement
+from vibench.sim.maps._refinement import AUDITED, ComparedCells, plan_refinement
 from vibench.sim.maps._results import Audit, audit_of
 from vibench.sim.scene.shares import Count, Share, shares_of
 
@@ -20,7 +20,7 @@ def refine(codes, coarse=8, lost=None, sizes=None):
     sizes = np.full(codes.shape, np.nan) if sizes is None else sizes
     for step in range(10_000):
         # Unknown cells hold the code 99, so that using one would be detected.
-        seen = Seen(known, np.where(known, codes, 99), np.where(known, sizes, np.nan), 0.1)
+        seen = ComparedCells(known, np.where(known, codes, 99), np.where(known, sizes, np.nan), 0.1)
         plan = plan_refinement(seen, coarse, 1)
         if not len(plan.missing):
             return known, plan
@@ -29,7 +29,7 @@ def refine(codes, coarse=8, lost=None, sizes=None):
     raise AssertionError("it never ends")
 
 
-def filled_codes(codes, known, plan):
+def fill_codes(codes, known, plan):
     found = np.where(known, codes, -1).reshape(-1)
     audited = set(plan.audited.tolist())
     for filling in plan.fillings:
@@ -63,7 +63,7 @@ def test_every_map_cell_is_computed_or_filled_in_once():
 def test_map_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
     known, plan = refine(codes, coarse)
-    is_wrong = filled_codes(codes, known, plan) != codes
+    is_wrong = fill_codes(codes, known, plan) != codes
     # Only a few cells at the rim of the disc may be missed between lattice points.
     assert is_wrong.sum() <= 4
 
@@ -73,7 +73,7 @@ def test_a_thin_region_of_a_map_is_refined_completely_once_found():
     columns = np.arange(65)
     codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
     known, plan = refine(codes, 16)
-    assert np.array_equal(filled_codes(codes, known, plan), codes)
+    assert np.array_equal(fill_codes(codes, known, plan), codes)
     assert known.mean() < 0.3
 
 
@@ -112,7 +112,7 @@ def test_the_audit_of_a_map_finds_wrongly_filled_cells():
 
 def test_unaudited_filled_cells_widen_the_share_intervals():
     unaudited = Audit(filled=30, audited=0, wrong=0, gained=(0.0, 0.0), lost=(0.0, 0.0))
-    shares = unaudited.corrected((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
+    shares = unaudited.corrected_shares((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
     assert [each.share for each in shares] == [0.9, 0.1]
     assert [each.low for each in shares] == pytest.approx([0.55, 0.0])
     assert [each.high for each in shares] == pytest.approx([1.0, 0.45])
@@ -131,9 +131,9 @@ def test_share_intervals_of_a_map_hold_for_rare_kinds_of_motion(rare):
         codes = disc((193, 193), (96, 96), 60)
         codes[(codes == 0) & (rng.random(codes.shape) < rare)] = 2
         known, plan = refine(codes, 16)
-        filled = filled_codes(codes, known, plan).reshape(-1)
+        filled = fill_codes(codes, known, plan).reshape(-1)
         counts = [Count(int(np.count_nonzero(filled == code)), is_final=True) for code in range(3)]
-        shares = audit_of(codes[:, None, :], plan).corrected(shares_of(counts), codes.size)
+        shares = audit_of(codes[:, None, :], plan).corrected_shares(shares_of(counts), codes.size)
         true = np.bincount(codes.reshape(-1)) / codes.size
         held += all(share.low <= each <= share.high for share, each in zip(shares, true, strict=True))
         assert sum(share.share for share in shares) == pytest.approx(1.0)

@@ -24,7 +24,7 @@ def adaptive():
 def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     full = solve_map(PLAN.model_copy(update={"refinement": "full"}))
     is_computed = adaptive.state == PointState.DONE
-    assert 0 < adaptive.computed < full.computed == PLAN.grid.size
+    assert 0 < adaptive.points < full.points == PLAN.grid.size
     for name in ("motion", "period", "response_i", "impact_rate", "contact_energy"):
         np.testing.assert_array_equal(adaptive.values(name)[is_computed], full.values(name)[is_computed])
     whole = full.values("motion") * 64 + np.nan_to_num(full.values("period"))

@@ -9,7 +9,7 @@ from vibench.sim.periodic.continuation import ArcEnd, ArcSteps, trace
 class Circle:
     """The circle u^2 + lambda^2 = 1."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         return np.array([u**2 + parameter**2 - 1.0]), np.array([[2.0 * u, 2.0 * parameter]])
 
@@ -17,7 +17,7 @@ class Circle:
 class Snap:
     """The curve lambda = u^3 - u, with folds at u = -+1/sqrt(3), lambda = +-2/(3 sqrt(3))."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         return np.array([parameter - u**3 + u]), np.array([[1.0 - 3.0 * u**2, 1.0]])
 
@@ -25,7 +25,7 @@ class Snap:
 class Kink:
     """The curve lambda = -|u|, which turns back in a kink at u = 0."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         return np.array([parameter + abs(u)]), np.array([[1.0 if u >= 0.0 else -1.0, 1.0]])
 
@@ -33,7 +33,7 @@ class Kink:
 class LoopBesideALine:
     """A flat ellipse with sharp folds at its ends, and a straight branch next to it."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         loop, line = (u / 0.02) ** 2 + parameter**2 - 1.0, (u - 0.03) / 0.02
         slopes = [2.0 * u / 0.02**2 * line + loop / 0.02, 2.0 * parameter * line]
@@ -43,7 +43,7 @@ class LoopBesideALine:
 class Edge:
     """The line lambda = u, defined up to u = 1/2 only."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         return np.array([parameter - u if u < 0.5 else math.nan]), np.array([[-1.0, 1.0]])
 
@@ -51,7 +51,7 @@ class Edge:
 class Sawtooth:
     """The line u = 0 up to lambda = 0, then teeth narrower than a step of the continuation."""
 
-    def linearised(self, point):
+    def linearise(self, point):
         u, parameter = point
         turn = max(parameter, 0.0) / 3e-6
         rises = turn % 2.0 < 1.0

@@ -141,10 +141,10 @@ def test_the_jacobian_and_both_slopes_are_the_derivatives_of_the_residual(spring
     structure = two_masses(0.03)
     problem = BalanceProblem(structure, spring, harmonics_up_to(7, HarmonicSet.ALL))
     unknowns = np.random.default_rng(5).normal(size=problem.size)
-    _, jacobian, by_omega, by_amplitude = problem.linearised(unknowns, 0.9, 0.2)
+    _, jacobian, by_omega, by_amplitude = problem.linearise(unknowns, 0.9, 0.2)
 
     def residual(unknowns, omega, amplitude):
-        return problem.linearised(unknowns, omega, amplitude)[0]
+        return problem.linearise(unknowns, omega, amplitude)[0]
 
     step, size = 1e-6, np.abs(jacobian).max()
     columns = [

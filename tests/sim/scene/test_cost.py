@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, Target, gong2025, plan_scene, solve_scene
-from vibench.sim.scene.cost import FEWEST, CostLedger, Expected, learn_cost, pilot_cost_s
+from vibench.sim.scene.cost import FEWEST, CostLedger, ExpectedTime, learn_cost, pilot_cost_s
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration
 
 SCENES = 12
@@ -68,7 +68,7 @@ def test_a_scene_plan_states_cost_uncertainty_and_source(ledger):
 
 
 def test_an_estimate_with_a_large_uncertainty_is_stated_as_a_range():
-    assert "core: between 0.001 and 9 s, from too few such runs on this" in str(Expected(0.1, 86.0, 0))
+    assert "core: between 0.001 and 9 s, from too few such runs on this" in str(ExpectedTime(0.1, 86.0, 0))
 
 
 def test_computing_times_of_larger_budgets_are_learnt_separately(ledger):

@@ -17,7 +17,7 @@ def test_perturbation_growth_is_the_product_of_growth_over_parts(frequency_hz, a
     whole = FollowedRun(gong2025(), drive, Accuracy.STANDARD.tolerance, np.zeros(6))
     whole.follow_tangent()
     for number in range(1, SLICES + 1):
-        piece = whole.apart()
+        piece = whole.copy()
         piece.follow_tangent()
         grown = whole.follow(number * SLICE_S).growth
         assert grown == pytest.approx(piece.follow(number * SLICE_S).growth, abs=LOST_E)

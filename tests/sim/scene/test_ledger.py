@@ -14,7 +14,7 @@ def ledger(tmp_path):
 
 
 def test_a_cost_estimate_without_experience_keeps_its_wide_factor(ledger):
-    expected = ledger.expected(KIND, 2.0)
+    expected = ledger.expected_time(KIND, 2.0)
     assert (expected.time_s, expected.runs) == (2.0, 0)
     assert expected.factor >= 10.0
     assert "too few such runs" in str(expected)
@@ -27,7 +27,7 @@ def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
     for run in range(600):
         planned_s = 10.0 ** random.uniform(-4.0, 1.0)
         taken_s = 0.13 * planned_s * math.exp(scatter * random.standard_normal())
-        expected = ledger.expected(KIND, planned_s)
+        expected = ledger.expected_time(KIND, planned_s)
         if run >= 30:
             held.append(expected.time_s / expected.factor <= taken_s <= expected.time_s * expected.factor)
         ledger.learn(KIND, planned_s, taken_s)
@@ -39,15 +39,15 @@ def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
 def test_cost_estimates_follow_a_slower_machine(ledger):
     for taken_s in [1.0] * 100 + [3.0] * 100:
         ledger.learn(KIND, 1.0, taken_s)
-    assert ledger.expected(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
+    assert ledger.expected_time(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
 
 
 def test_costs_of_a_new_kind_of_run_are_taken_from_the_nearest_kind(ledger):
     for _ in range(FEWEST):
         ledger.learn("event driven/hertz/standard", 1.0, 0.5)
         ledger.learn("polynomial/power/standard", 1.0, 4.0)
-    assert ledger.expected("event driven/hertz/quick", 1.0).time_s == pytest.approx(0.5)
-    assert ledger.expected("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
+    assert ledger.expected_time("event driven/hertz/quick", 1.0).time_s == pytest.approx(0.5)
+    assert ledger.expected_time("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
 
 
 def test_learnt_costs_are_stored_for_the_next_process(ledger, tmp_path):
@@ -55,7 +55,7 @@ def test_learnt_costs_are_stored_for_the_next_process(ledger, tmp_path):
         ledger.learn(KIND, 1.0, taken_s)
     ledger.save()
     again = CostLedger(tmp_path / "costs" / "here.json")
-    assert again.expected(KIND, 3.0) == ledger.expected(KIND, 3.0)
+    assert again.expected_time(KIND, 3.0) == ledger.expected_time(KIND, 3.0)
     assert [path.name for path in (tmp_path / "costs").iterdir()] == ["here.json"]
 
 
@@ -66,7 +66,7 @@ def test_learnt_costs_are_stored_for_the_next_process(ledger, tmp_path):
 def test_a_damaged_cost_file_is_ignored(tmp_path, text):
     path = tmp_path / "here.json"
     path.write_text(text)
-    assert CostLedger(path).expected("a", 1.0).runs == 0
+    assert CostLedger(path).expected_time("a", 1.0).runs == 0
 
 
 def test_costs_are_learnt_even_if_their_folder_is_not_writable(tmp_path):
@@ -75,14 +75,14 @@ def test_costs_are_learnt_even_if_their_folder_is_not_writable(tmp_path):
     for _ in range(FEWEST):
         ledger.learn(KIND, 1.0, 1.0)
     ledger.save()
-    assert ledger.expected(KIND, 1.0).runs == FEWEST
+    assert ledger.expected_time(KIND, 1.0).runs == FEWEST
 
 
 def test_invalid_computing_times_are_not_learnt(ledger):
     for _ in range(FEWEST):
         ledger.learn(KIND, 1.0, 0.0)
         ledger.learn(KIND, 0.0, 1.0)
-    assert ledger.expected(KIND, 1.0).runs == 0
+    assert ledger.expected_time(KIND, 1.0).runs == 0
 
 
 def test_costs_of_unused_kinds_of_run_follow_a_slower_machine(ledger):
@@ -92,11 +92,11 @@ def test_costs_of_unused_kinds_of_run_follow_a_slower_machine(ledger):
         ledger.learn(kinds[run % 6], 1.0, math.exp(0.2 * random.standard_normal()))
     for run in range(MEMORY):
         ledger.learn(kinds[run % 3], 1.0, 2.0 * math.exp(0.2 * random.standard_normal()))
-    assert 1.2 < ledger.expected(kinds[5], 1.0).time_s < 2.6
+    assert 1.2 < ledger.expected_time(kinds[5], 1.0).time_s < 2.6
 
 
 def test_one_outlier_changes_a_cost_estimate_little(ledger):
     for _ in range(10):
         ledger.learn(KIND, 1.0, 1.0)
     ledger.learn(KIND, 1.0, 100.0)
-    assert ledger.expected(KIND, 1.0).time_s < 1.1
+    assert ledger.expected_time(KIND, 1.0).time_s < 1.1

@@ -42,13 +42,13 @@ def test_the_linear_relative_displacement_reaches_its_bound_if_all_parts_are_in_
 
 def test_the_transient_has_decayed_at_the_stated_time():
     motion = linear_motion(gong2025(), DRIVE, START)
-    when_s = motion.died_away_s(1e-6)
+    when_s = motion.decay_time_s(1e-6)
     later = np.linspace(when_s, when_s + 0.05, 500)
     steady = motion.steady[0] * np.exp(2j * np.pi * DRIVE.frequency_hz * later + 1j * DRIVE.phase_rad)
     left = np.array([motion.state(time_s)[0] for time_s in later]) - steady.real
     assert np.abs(left).max() < 1e-6 * abs(motion.steady_x)
-    assert motion.share_left(when_s) <= 1e-6 * (1.0 + 1e-9)
-    assert motion.share_left(0.5 * when_s) > 1e-5
+    assert motion.transient_share(when_s) <= 1e-6 * (1.0 + 1e-9)
+    assert motion.transient_share(0.5 * when_s) > 1e-5
 
 
 def test_contact_is_excluded_only_if_a_bound_proves_it():

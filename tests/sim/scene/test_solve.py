@@ -110,12 +110,12 @@ def test_no_part_of_chaos_is_skipped(integrated_s):
 def test_perturbations_are_computed_where_chaos_is_uncertain(monkeypatch):
     carried, follow = [], FollowedRun.follow
 
-    def noted(run, *options, **more):
+    def note(run, *options, **more):
         stretch = follow(run, *options, **more)
         carried.append((stretch.start_s, not np.isnan(stretch.growth)))
         return stretch
 
-    monkeypatch.setattr(FollowedRun, "follow", noted)
+    monkeypatch.setattr(FollowedRun, "follow", note)
     length = FixedDuration(14.0, 5.0)
     chaos = solve_scene(replace(CHAOS, duration=length, budget_s=0.0))
     in_window = [has for start_s, has in carried if start_s >= 9.0 - 1e-9][:10]

@@ -50,7 +50,7 @@ def test_the_closed_form_without_contact_equals_the_integration(seed):
     linear = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
     volts = 0.02 * specimen.gap_m / abs(linear.per_volt[0, P])
     base, m0, impacts = simulate(specimen, frequency_hz, volts)
-    moved = linear.under(volts, specimen.gap_m)[0]
+    moved = linear.response(volts, specimen.gap_m)[0]
     s = 2j * math.pi * frequency_hz
     assert impacts == 0
     assert base == pytest.approx(s**2 * moved[BASE], rel=3e-3)
@@ -66,7 +66,7 @@ def test_the_closed_form_predicts_the_loaded_base_better_than_a_bare_table():
         volts = rng.uniform(2.0, 8.0) * specimen.gap_m / abs(with_it.per_volt[0, P])
         base, _, impacts = simulate(specimen, frequency_hz, volts)
         assert impacts > 0
-        modelled = [abs(each.under(volts, specimen.gap_m)[0, BASE]) for each in (with_it, bare)]
+        modelled = [abs(each.response(volts, specimen.gap_m)[0, BASE]) for each in (with_it, bare)]
         off_db.append(20 * np.log10((2 * math.pi * frequency_hz) ** 2 * np.array(modelled) / abs(base)))
     to_first_order, without = np.sqrt(np.mean(np.square(off_db), axis=0))
     assert to_first_order < 0.6 * without
@@ -90,9 +90,9 @@ def test_the_lever_ratio_predicts_the_response_with_a_changed_middle_spring(stif
     other = Specimen(specimen.masses, (k0, stiffer * k1, k2), specimen.dampings, 45e-6, specimen.contact)
     motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
     moved = linear_motion(AMPLIFIER, TABLE, other, frequency_hz).per_volt
-    assert motion.stuck + motion.lever * moved[:, [P]] == pytest.approx(moved, rel=1e-8)
+    assert motion.stuck_motion + motion.lever * moved[:, [P]] == pytest.approx(moved, rel=1e-8)
     if stiffer > 1e6:
-        assert motion.stuck[:, M0] == pytest.approx(moved[:, M0], rel=1e-4)
+        assert motion.stuck_motion[:, M0] == pytest.approx(moved[:, M0], rel=1e-4)
 
 
 @given(st.floats(20.0, 600.0), st.floats(1e-7, 2e-3))
@@ -104,14 +104,14 @@ def test_the_computed_voltage_gives_the_requested_base_motion(frequency_hz, base
     if abs(per_base) * base_m <= specimen.gap_m:
         assert abs(motion.per_volt[0, BASE]) * volts[0] == pytest.approx(base_m, rel=1e-9)
     elif abs(motion.per_volt[0, P]) * volts[0] > specimen.gap_m:
-        assert abs(motion.under(volts, specimen.gap_m)[0, BASE]) == pytest.approx(base_m, rel=1e-6)
+        assert abs(motion.response(volts, specimen.gap_m)[0, BASE]) == pytest.approx(base_m, rel=1e-6)
 
 
 @given(st.floats(20.0, 600.0), st.floats(1e-3, 10.0))
 def test_the_closed_form_limits_the_relative_displacement_to_the_gap(frequency_hz, volts):
     specimen = gong2025()
     motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
-    moved = motion.under(volts, specimen.gap_m)[0]
+    moved = motion.response(volts, specimen.gap_m)[0]
     free = volts * motion.per_volt[0]
     if abs(free[P]) <= specimen.gap_m:
         assert moved == pytest.approx(free)

@@ -243,7 +243,7 @@ def test_one_simulation_call_equals_a_series_of_blocks():
     for first in range(0, len(drive), block):
         parts.append(stepwise.move(drive[first : first + block]).m0_velocity)
         begun.append(stepwise.impacts)
-    assert motion.begun.tolist() == begun
+    assert motion.contacts.tolist() == begun
     assert begun[-1] == whole.impacts > 0
     assert np.array_equal(motion.m0_velocity, np.concatenate(parts))
 

@@ -127,7 +127,7 @@ def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
             running.kill()
 
     executor = ClusterExecutor(address, patience_s=SHORT_S)
-    with FileStore.created(path, long_study) as store, pytest.raises(ClusterLost, match=r"is lost.*resume"):
+    with FileStore.create(path, long_study) as store, pytest.raises(ClusterLost, match=r"is lost.*resume"):
         run_study(long_study, executor, store, watch)
     executor.close()
     kept = np.count_nonzero(open_study(path).arrays[STATE])

@@ -29,7 +29,7 @@ def test_the_cost_of_a_measured_point_is_not_estimated_again():
 def test_unmeasured_cost_estimates_are_scaled_by_the_error_of_measured_ones():
     costs = line_of([1.0, 1.0, 1.0, 2.0])
     is_missing = np.array([False, True, True, True])
-    assert costs.left_s(is_missing) == pytest.approx(4.0)
+    assert costs.remaining_s(is_missing) == pytest.approx(4.0)
     list(costs.learn(0, 10.0))
     # Point 1 as its measured neighbour (10 s); points 2 and 3 as planned, times ten.
-    assert costs.left_s(is_missing) == pytest.approx(10.0 + 10.0 + 20.0)
+    assert costs.remaining_s(is_missing) == pytest.approx(10.0 + 10.0 + 20.0)

@@ -209,5 +209,5 @@ def test_the_progress_of_a_study_counts_every_point_once_and_ends_with_no_time_l
     counts = [each.done for each in seen]
     assert counts == sorted(set(counts))
     assert counts[-1] == seen[-1].of == study.grid.size
-    assert seen[-1].left_s == 0.0
+    assert seen[-1].remaining_s == 0.0
     assert seen[-1].note == ""

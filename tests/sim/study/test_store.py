@@ -191,7 +191,7 @@ def test_a_file_of_another_study_is_refused_with_the_differences(small, tmp_path
 @pytest.mark.thorough
 def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     path = tmp_path / "a.h5"
-    with FileStore.created(path, small):
+    with FileStore.create(path, small):
         with pytest.raises(StudyError, match="is being written by another run"):
             FileStore(path, small)
         with h5py.File(path, "r") as file:

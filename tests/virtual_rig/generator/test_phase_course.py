@@ -26,7 +26,7 @@ def test_a_day_at_25_mhz_loses_less_than_a_millionth_of_a_cycle(frequency_uhz, t
 @given(first=FREQUENCIES, second=FREQUENCIES, time_s=TIMES)
 def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
     before = SteadyPhase(first, 0.3)
-    after = SteadyPhase.through(second, before.phase(time_s), time_s)
+    after = SteadyPhase.with_phase(second, before.phase(time_s), time_s)
     # 25 million cycles within a second have an error of 4e-9 cycles in double precision.
     assert turn(before.phase(time_s), after.phase(time_s)) < 2e-8
 

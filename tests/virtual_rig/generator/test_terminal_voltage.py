@@ -143,16 +143,16 @@ MODES = {
 
 @pytest.mark.parametrize("mode", MODES.values(), ids=MODES)
 def test_rendered_samples_do_not_depend_on_the_block_size(mode):
-    def rendered(sizes):
+    def render_in(sizes):
         rig = Rig(Terminal(seed=3, clock_error_ppm=20))
         rig.upload(np.random.default_rng(3).integers(0, 16384, 500))
         rig.send(mode)
         rig.send("OUTP ON")
         return np.concatenate([rig.render(size) for size in sizes])
 
-    whole = rendered([9000])
+    whole = render_in([9000])
     assert whole.std() > 0
-    assert np.array_equal(whole, rendered([1, 999, 4096, 3, 3901]))
+    assert np.array_equal(whole, render_in([1, 999, 4096, 3, 3901]))
 
 
 @given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))

@@ -29,7 +29,7 @@ def ignore_discovery_warnings(test):
     return test
 
 
-class Plugged:
+class PluggedIn:
     """A generator on the bus, and a pyvisa session with it."""
 
     def __init__(self, serial="C010101", quirks=None):
@@ -48,7 +48,7 @@ class Plugged:
 
 @pytest.fixture
 def plugged():
-    one = Plugged()
+    one = PluggedIn()
     yield one
     one.close()
 
@@ -131,7 +131,7 @@ def test_a_reconnected_cable_works_with_the_open_session(plugged):
 
 @ignore_discovery_warnings
 def test_several_generators_on_one_bus_are_independent(plugged):
-    other = Plugged(serial="C020202")
+    other = PluggedIn(serial="C020202")
     try:
         plugged.instrument.write("FREQ 111")
         other.instrument.write("FREQ 222")

@@ -19,7 +19,7 @@ def test_the_integral_of_the_played_signal_matches_the_queued_signal(rate_hz, vo
     output, step = AnalogueOutput(), 0
     output.queue(np.array(volts), rate_hz, 0)
     played = []
-    while output.unplayed(step) or not played:
+    while output.queued_samples(step) or not played:
         block = blocks[len(played) % len(blocks)]
         played.append(output.render(step, block))
         step += block
@@ -45,9 +45,9 @@ def test_a_signal_queued_in_parts_plays_without_a_gap():
 def test_an_analogue_output_counts_its_unplayed_steps():
     output = AnalogueOutput()
     output.queue(np.ones(4), GRID_RATE_HZ / 2, 0)
-    assert [output.unplayed(step) for step in (0, 1, 2, 7, 8, 9)] == [4, 4, 3, 1, 0, 0]
+    assert [output.queued_samples(step) for step in (0, 1, 2, 7, 8, 9)] == [4, 4, 3, 1, 0, 0]
     output.drop()
-    assert output.unplayed(2) == 0
+    assert output.queued_samples(2) == 0
     assert np.all(output.render(2, 4) == 0)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition import ConfigurationError, LimitExceeded, validated
+from vibench.acquisition import ConfigurationError, LimitExceeded, validate
 from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
 from vibench.acquisition.rig import Rig, amplifier_of, highest_carried_hz, load_rig, shaker_of, specimen_of
 from vibench.acquisition.rig._configuration import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
@@ -20,7 +20,7 @@ def rig_with(sample_rate_hz, **virtual):
     content = RIG.model_dump(mode="json", exclude_none=True)
     content["daq"]["sample_rate_hz"] = sample_rate_hz
     content["virtual"] |= virtual
-    return validated(content, Rig, "rig.toml")
+    return validate(content, Rig, "rig.toml")
 
 
 def new_plant(grid):

@@ -123,19 +123,19 @@ def test_an_input_beyond_its_range_clips_and_reports_one_overload():
     volts = sampler.read(5000)
     assert np.max(volts) == 5.0 - volts_per_count(5.0)
     assert np.min(volts) == -5.0
-    assert sampler.overloaded().tolist() == [True]
+    assert sampler.overload_flags().tolist() == [True]
     within = World(QUIET, Tone(100.0, 1.0)).sample(INPUTS, 51_200.0)
     within.read(5000)
-    assert within.overloaded().tolist() == [False] * 4
+    assert within.overload_flags().tolist() == [False] * 4
 
 
 def test_reading_the_overloads_clears_them():
     world = World(QUIET, Silence())
     sampler = world.sample((Input("cDAQ1Mod1/ai2", 5.0, Coupling.DC, 0.002),), 51_200.0)
     sampler.read(100)
-    assert sampler.overloaded()[0]
+    assert sampler.overload_flags()[0]
     world.disconnect("cDAQ1Mod1/ai2")
-    assert not sampler.overloaded()[0]
+    assert not sampler.overload_flags()[0]
 
 
 def test_conversions_at_different_rates_agree_at_equal_times():
@@ -271,7 +271,7 @@ def test_closing_a_conversion_twice_is_allowed():
     assert world.time_s == pytest.approx(0.1, abs=STEP_S)
 
 
-class Broken:
+class BrokenTerminal:
     """A terminal whose voltage is NaN after half a second."""
 
     def render(self, start_s, interval_s, count):
@@ -279,7 +279,7 @@ class Broken:
 
 
 def test_a_failed_simulation_is_reported_and_stops_the_rig():
-    world = World(RIG, Broken())
+    world = World(RIG, BrokenTerminal())
     conversion = world.sample(INPUTS, 51200.0)
     assert np.all(np.isfinite(conversion.read(20000)))
     for _ in range(2):

@@ -25,7 +25,7 @@ from vibench.sim.operating_system.this import (
 )
 
 from ..errors import AcquisitionError, InstrumentBusy
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..instruments import (
     AnalogOutput,
     Block,
@@ -161,7 +161,7 @@ class RigPower:
         self._closing = ExitStack()
 
     @property
-    def connected(self) -> Rig:
+    def reachable_rig(self) -> Rig:
         """Rig with the addresses at which its instruments can be reached now."""
         if self._virtual is None:
             return self.rig
@@ -289,13 +289,13 @@ class Bench:
         return _kind(self.rig, self.digitizer)
 
     @contextmanager
-    def aimed(self, role: Role) -> Iterator["Bench"]:
+    def beam_on(self, role: Role) -> Iterator["Bench"]:
         """Yield the bench with the beam on the mass of ``role``; later, a virtual rig moves it back to m0.
 
         Raises ConfigurationError when the vibrometer of this rig cannot measure there.
         """
         aimed = copy(self)
-        aimed.rig = self.rig.aimed(role)
+        aimed.rig = self.rig.with_beam_on(role)
         aimed.digitizer = cast("Digitizer", _AimedDigitizer(self.digitizer, role))
         self._power.aim(role)
         try:
@@ -352,7 +352,7 @@ def open_bench(
     """
     rig = config if isinstance(config, Rig) else load_rig(config)
     has_sensors = rig.virtual is None and not rig.plays_back
-    if has_sensors and chosen(CalibrationRule, calibration) is CalibrationRule.ENFORCED:
+    if has_sensors and member(CalibrationRule, calibration) is CalibrationRule.ENFORCED:
         check_calibrations(rig, datetime.now(UTC).astimezone().date())
     closing = ExitStack()
     try:
@@ -364,7 +364,7 @@ def open_bench(
 
 def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
-    connected = power.connected
+    connected = power.reachable_rig
     # Open the generator first, which silences it: a killed program may have left it on, the converter busy.
     generator = generator_driver(connected.generator).open(connected.generator)
     with ExitStack() as silencing:

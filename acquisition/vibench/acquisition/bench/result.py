@@ -158,7 +158,7 @@ def rig_digest(rig: Rig) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def ago(age: timedelta) -> str:
+def age(age: timedelta) -> str:
     """Return an age as text: ``"3 hours"``, ``"2 days"``."""
     if age < 2 * _HOUR:
         return f"{max(age.total_seconds(), 0.0) / 60:.0f} minutes"

@@ -99,14 +99,14 @@ class Attempts:
             path = next_attempt(self._journal.path.parent, point.name)
             self._pause.require()
             self._journal.start(point.name, path.name)
-            self._tell(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
+            self._note(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
-                with self._beam.moved(self._bench, point.name, point.measurement) as bench:
+                with self._beam.beam_at(self._bench, point.name, point.measurement) as bench:
                     outcome = run_measurement(
                         bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
                     )
             except AcquisitionError as error:
-                self._failed(point, path, error)
+                self._fail_attempt(point, path, error)
                 if not (left and self._is_retryable(reason_code_of(error))):
                     raise
                 self._prepare_retry(point, path, error)
@@ -116,14 +116,14 @@ class Attempts:
                 self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
                 raise
             else:
-                point_result = self._ended(point, outcome)
+                point_result = self._end_attempt(point, outcome)
                 if not (
                     left
                     and point_result.reason_code is ReasonCode.OVER_RANGE
                     and self._is_retryable(point_result.reason_code)
                 ):
                     return point_result
-                self._tell(
+                self._note(
                     CampaignEventKind.RETRY,
                     f"{point.name} is tried again: {point_result.reason}",
                     point,
@@ -134,7 +134,7 @@ class Attempts:
                     return point_result
         raise AssertionError("the last attempt returns or raises")
 
-    def _ended(self, point: Point, outcome: Outcome) -> PointResult:
+    def _end_attempt(self, point: Point, outcome: Outcome) -> PointResult:
         if outcome.state is not RunState.FINISHED:
             self._journal.end(
                 point.name,
@@ -143,7 +143,7 @@ class Attempts:
                 outcome.reason,
                 _seal_of(outcome.path),
             )
-            self._tell(
+            self._note(
                 CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path
             )
             return PointResult(
@@ -153,10 +153,10 @@ class Attempts:
         reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
         reason = f"{outcome.reason}; {over}" if over else outcome.reason
         self._journal.end(point.name, JournalPointState.DONE, reason_code, reason, _seal_of(outcome.path))
-        self._tell(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
+        self._note(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
         return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, reason_code)
 
-    def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
+    def _fail_attempt(self, point: Point, path: Path, error: AcquisitionError) -> None:
         reason_code = reason_code_of(error)
         try:
             self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
@@ -179,18 +179,18 @@ class Attempts:
         if isinstance(error, InstrumentError):
             if self._reopen is None:
                 raise error
-            self._bench = self._reopened_bench(self._reopen, error)
-            self._tell(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
+            self._bench = self._reopen_bench(self._reopen, error)
+            self._note(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
             self._bench.idle(LOOK_EVERY_S)  # repeating at once seldom works
-        self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
+        self._note(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
         self.pause_before(point.name)
         if self._switch.request is not None:
             raise failed
 
-    def _reopened_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
+    def _reopen_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
         began, idled_s = monotonic(), 0.0
         while True:
             try:
@@ -208,7 +208,7 @@ class Attempts:
                 require_same_bench(self._journal.bench, BenchIdentity.of(bench))
                 return bench
 
-    def _tell(self, kind: CampaignEventKind, text: str, point: Point, path: Path) -> None:
+    def _note(self, kind: CampaignEventKind, text: str, point: Point, path: Path) -> None:
         self._say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
 
 

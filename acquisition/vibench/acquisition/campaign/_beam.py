@@ -20,7 +20,7 @@ def rig_at(rig: Rig, measurement: Measurement) -> Rig:
 
     Raises ConfigurationError when the vibrometer of the rig cannot measure there.
     """
-    return rig if measurement.point is None else rig.aimed(measurement.point.role)
+    return rig if measurement.point is None else rig.with_beam_on(measurement.point.role)
 
 
 class BeamMover:
@@ -47,7 +47,7 @@ class BeamMover:
         self._at = point
 
     @contextmanager
-    def moved(self, bench: Bench, name: str, measurement: Measurement) -> Iterator[Bench]:
+    def beam_at(self, bench: Bench, name: str, measurement: Measurement) -> Iterator[Bench]:
         """Yield the bench with the beam at the point of a measurement, which is recorded as ``name``.
 
         Raises AcquisitionError when the command fails, because the beam may then be anywhere.
@@ -56,7 +56,7 @@ class BeamMover:
         if point is None:
             yield bench
             return
-        with bench.aimed(point.role) as aimed:
+        with bench.beam_on(point.role) as aimed:
             if self._command is not None and point != self._at:
                 self._at = None
                 failure = self._command.run({"recording": name, **point.model_dump()}, MOVE_LONGEST_S)

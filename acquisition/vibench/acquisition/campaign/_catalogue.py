@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RecordingError
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..plan import present_word
 from ..recording import (
     JOURNAL_SUFFIX,
@@ -196,7 +196,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     if not folder.is_dir():
         raise RecordingError(f"{folder} is not a folder; give the folder that contains the recordings.")
     try:
-        with closing(_open_catalogue(folder, chosen(Refresh, refresh))) as connection:
+        with closing(_open_catalogue(folder, member(Refresh, refresh))) as connection:
             _update(folder, connection)
             return _entries(connection)
     except (sqlite3.OperationalError, OSError):  # the disk is full or read-only

@@ -28,7 +28,7 @@ from ..errors import (
 )
 from ..host.beside import ClosedOnLeaving
 from ..plan import Campaign, Measurement, Point
-from ..recording import JOURNAL_SUFFIX, Recording, closed_on_error, opened, opened_to_look
+from ..recording import JOURNAL_SUFFIX, Recording, close_on_error, open_database, open_read_only
 from ..run.ending import Progress
 from ._bench_identity import BenchIdentity
 
@@ -154,7 +154,7 @@ class DonePoint:
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedPoint:
     """Argument of the ``after`` callback: the point that was just measured, and all points done."""
 
     point: DonePoint
@@ -162,7 +162,7 @@ class Finished:
     """All completed points in the order of the campaign, including ``point``; the same after a resume."""
 
 
-After = Callable[[Finished, Recording], Iterable[Measurement]]
+After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
 """Called after every point with the open recording; returns measurements to make next, or none."""
 
 
@@ -233,7 +233,7 @@ def journal_exists(path: Path) -> bool:
     """Return whether ``path`` is a journal; a database without any committed transaction is not."""
     if not path.is_file():
         return False
-    with sentences(path), closing(opened_to_look(path)) as connection:
+    with sentences(path), closing(open_read_only(path)) as connection:
         return (
             connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone() is not None
         )
@@ -241,7 +241,7 @@ def journal_exists(path: Path) -> bool:
 
 def connect(path: Path) -> sqlite3.Connection:
     """Return a database connection for writing, whose commits survive a kill and a power cut."""
-    with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
+    with sentences(path), close_on_error(open_database(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
@@ -322,7 +322,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
         raise RecordingError(f"{path} {what}; give the path of a campaign's journal.")
-    with sentences(path), closing(opened_to_look(path)) as connection:
+    with sentences(path), closing(open_read_only(path)) as connection:
         require_version(path, connection)
         return points_of(connection)
 
@@ -373,7 +373,7 @@ class Journal(ClosedOnLeaving):
         """Create a journal with the whole plan, in one transaction, before anything else happens."""
         points = campaign.points()
         journal = cls(path, connect(path))
-        with closed_on_error(journal._connection), journal._transaction() as connection:
+        with close_on_error(journal._connection), journal._transaction() as connection:
             for statement in filter(str.strip, SCHEMA.split(";")):
                 connection.execute(statement)
             facts = {
@@ -393,7 +393,7 @@ class Journal(ClosedOnLeaving):
 
         Raises RecordingError when the file is not a journal, or is of a newer version.
         """
-        with closed_on_error(connect(path)) as connection:
+        with close_on_error(connect(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
                 # Add the columns that a journal of version 1 lacks, in one transaction.

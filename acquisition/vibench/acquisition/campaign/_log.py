@@ -23,7 +23,7 @@ from ..errors import ConfigurationError, RecordingError
 from ..host.beside import Beside, ClosedOnLeaving
 from ..host.printable import printable
 from ..host.toml_file import FrozenModel
-from ..plan import measured_s
+from ..plan import measuring_s
 from ._journal import CampaignProgress, JournalPoint, JournalPointState
 
 
@@ -129,7 +129,9 @@ class StatusLine(ClosedOnLeaving):
         self._path = path
         self._campaign = campaign
         self._counts = Counter(done=sum(point.state is JournalPointState.DONE for point in points))
-        left_s = [measured_s(each.measurement) for each in points if each.state is not JournalPointState.DONE]
+        left_s = [
+            measuring_s(each.measurement) for each in points if each.state is not JournalPointState.DONE
+        ]
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
@@ -168,7 +170,7 @@ class StatusLine(ClosedOnLeaving):
         self._written = monotonic()
         counts = ", ".join(f"{number} {word}" for word, number in self._counts.items())
         utc = datetime.now(UTC).isoformat(timespec="seconds")
-        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._left()} left)"
+        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._remaining_time()} left)"
         self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
@@ -176,7 +178,7 @@ class StatusLine(ClosedOnLeaving):
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 
-    def _left(self) -> timedelta:
+    def _remaining_time(self) -> timedelta:
         """Return the planned remaining time, scaled by real over planned time of this session [s]."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
@@ -216,7 +218,7 @@ class MailMessenger:
         """Send one mail; return a clause that states whether it was sent."""
         settings = self._settings
         try:
-            with self._connected() as server:
+            with self._connect() as server:
                 if settings.security is Security.STARTTLS:
                     server.starttls(context=ssl.create_default_context())
                 if settings.user:
@@ -234,7 +236,7 @@ class MailMessenger:
         message.set_content("".join(f"{printable(f'{key}: {value}')}\n" for key, value in notice.items()))
         return message
 
-    def _connected(self) -> smtplib.SMTP:
+    def _connect(self) -> smtplib.SMTP:
         settings = self._settings
         if settings.security is Security.TLS:
             context = ssl.create_default_context()

@@ -11,7 +11,7 @@ from typing import assert_never
 
 from ..bench.bench import Bench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
-from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
+from ..plan import Campaign, Measurement, Point, distinct_drives, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
@@ -62,7 +62,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
                     journal.end(point.name, *ended)
 
 
-def found_recordings(
+def find_recordings(
     points: Sequence[Point], folder: Path, depth: SealDepth, stop: StopSwitch | None = None
 ) -> dict[str, KeptRecording]:
     """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
@@ -72,11 +72,11 @@ def found_recordings(
     campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
 
-    def looked_for(point: Point) -> KeptRecording | None:
+    def find_attempt(point: Point) -> KeptRecording | None:
         now = depth if stop is None or stop.request is None else SealDepth.QUICK
         return complete_attempt(folder, point.name, point.measurement, now)
 
-    found = {each.name: looked_for(each) for each in points}
+    found = {each.name: find_attempt(each) for each in points}
     return {name: kept for name, kept in found.items() if kept is not None}
 
 
@@ -151,7 +151,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
     complaints: dict[str, None] = {}
     for point in points:
         rig_at(bench.rig, point.measurement)
-    for point in played_alike(points):
+    for point in distinct_drives(points):
         try:
             require_within_limits(point.measurement, bench.rig)
             drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
@@ -204,11 +204,11 @@ def open_journal(
             require_new(campaign, campaign.points(), folder)
             return Journal.begin(path, campaign, identity)
         case ExistingRecordings.RESUME if journal_exists(path):
-            return _resumed_journal(path, campaign, identity, folder, changed, stop)
+            return _resume_journal(path, campaign, identity, folder, changed, stop)
         case ExistingRecordings.RESUME:
             for point in campaign.points():
                 _recover(attempts_in(folder, point.name), point.measurement)
-            found = found_recordings(campaign.points(), folder, SealDepth.WHOLE, stop)
+            found = find_recordings(campaign.points(), folder, SealDepth.WHOLE, stop)
             if changed is ChangedBench.REFUSE:
                 for point in campaign.points():
                     kept = found.get(point.name)
@@ -252,7 +252,7 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def _resumed_journal(
+def _resume_journal(
     path: Path,
     campaign: Campaign,
     now: BenchIdentity,
@@ -309,7 +309,7 @@ def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> 
 def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> tuple[PlannedRecording, ...]:
     path = journal_path(folder, campaign.name)
     if not journal_exists(path):
-        kept = found_recordings(points, folder, SealDepth.QUICK)
+        kept = find_recordings(points, folder, SealDepth.QUICK)
         found = {name: each.path for name, each in kept.items() if each.is_complete}
         wanted = [(each.name, each.measurement) for each in points]
     else:

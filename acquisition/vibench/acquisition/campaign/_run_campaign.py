@@ -13,9 +13,9 @@ from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
 from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
 from ..excitation.plan import AbstractFeedback
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..instruments import Knob
-from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measured_s, require_played
+from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measuring_s, require_played
 from ..recording import open_recording, sole_use
 from ..rig import Confirm, KnobSheet, Rig, channels_of, load_rig
 from ..run.ending import Progress
@@ -30,7 +30,7 @@ from ._journal import (
     ChangedBench,
     DonePoint,
     ExistingRecordings,
-    Finished,
+    FinishedPoint,
     Journal,
     JournalPoint,
     JournalPointState,
@@ -96,35 +96,35 @@ class CampaignRunner:
         )
         text = f"{campaign.name}: {self._count} points, {done} already done"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
-        self._name_damaged()
+        self._report_damage()
         try:
             while self._coming and self._may_begin(self._coming[0]):
                 point = self._coming.popleft()
                 number = len(self._results) + 1
 
-                def tell(
+                def report_progress(
                     path: Path, progress: Progress, name: str = point.name, number: int = number
                 ) -> None:
                     on_progress(CampaignProgress(name, number, self._count, path, progress))
 
-                point_result = self._made(point, tell)
+                point_result = self._measure(point, report_progress)
                 self._results.append(point_result)
                 on_result(point_result)
                 self._follow_up(point, point_result)
                 if point_result.outcome is PointOutcome.STOPPED:
                     break
         except AcquisitionError as error:
-            self._ended(f"{campaign.name} ended: {error}", str(reason_code_of(error)))
+            self._report_end(f"{campaign.name} ended: {error}", str(reason_code_of(error)))
             raise
         except BaseException as error:
-            self._ended(f"{campaign.name} ended: {type(error).__name__}", "stopped")
+            self._report_end(f"{campaign.name} ended: {type(error).__name__}", "stopped")
             raise
         is_stopped = any(each.outcome is PointOutcome.STOPPED for each in self._results)
         reason_code = "stopped" if self._coming or is_stopped else "carried_out"
-        self._ended(f"{campaign.name} {self._closing()}", reason_code)
+        self._report_end(f"{campaign.name} {self._closing()}", reason_code)
         return tuple(self._results)
 
-    def _name_damaged(self) -> None:
+    def _report_damage(self) -> None:
         for point in self._coming:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
                 text = f"{point.name} is measured again: {point.reason}"
@@ -138,7 +138,7 @@ class CampaignRunner:
             self._attempts.ask_for_beam(point.measurement)
         return self._stop.request is None
 
-    def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
+    def _measure(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
         if point.state is JournalPointState.DONE:
             path = self._folder / point.file
             return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.reason_code)
@@ -166,7 +166,7 @@ class CampaignRunner:
         )
         this = next(each for each in done if each.name == point.name)
         with open_recording(point_result.path) as recording:
-            follow_ups = tuple(self._after(Finished(this, done), recording))
+            follow_ups = tuple(self._after(FinishedPoint(this, done), recording))
         further = tuple(Point(name, each) for each in follow_ups for name in _names(each))
         self._journal.follow_up(point.name, further)
         if not further:
@@ -185,7 +185,7 @@ class CampaignRunner:
         failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
         return f"is finished, {failed} points failed" if failed else "is finished"
 
-    def _ended(self, text: str, reason_code: str) -> None:
+    def _report_end(self, text: str, reason_code: str) -> None:
         counts = {
             each.value: sum(point_result.outcome is each for point_result in self._results)
             for each in PointOutcome
@@ -259,9 +259,9 @@ def run_campaign(
     AcquisitionError
         The error of a failed run, when ``after_failure`` is ``stop`` or an instrument is lost.
     """
-    existing = chosen(ExistingRecordings, existing)
-    after_failure = chosen(AfterFailure, after_failure)
-    changed_bench = chosen(ChangedBench, changed_bench)
+    existing = member(ExistingRecordings, existing)
+    after_failure = member(AfterFailure, after_failure)
+    changed_bench = member(ChangedBench, changed_bench)
     points = campaign.points()
     require_all_within_limits(points, bench)
     if existing is ExistingRecordings.REFUSE:
@@ -340,7 +340,7 @@ class ReconnectingBench:
         if before is not None:
             self._last_check = before.last_check
             sheet = before.confirmations
-            self._confirm = lambda knobs: _confirmed_before(sheet, knobs)
+            self._confirm = lambda knobs: _require_confirmed(sheet, knobs)
             with suppress(AcquisitionError):  # only a lost instrument cannot be silenced
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
@@ -377,7 +377,7 @@ class ReconnectingBench:
             self._power.__exit__(kind, error, trace)
 
 
-def _confirmed_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
+def _require_confirmed(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
     missing = [f"{knob.instrument} {knob.setting}" for knob in knobs if knob not in sheet.knobs]
     if missing:
         raise CheckFailed(
@@ -442,7 +442,7 @@ def estimate_campaign(
     missing = [each.measurement for each in planned if not each.is_complete]
     for each in missing:
         each.excitation.require_holdable(rig)
-    durations_s = [measured_s(each) for each in missing]
+    durations_s = [measuring_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
     rest_s = campaign.rest_s * max(0, len(missing) - 1)
     disk = next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())

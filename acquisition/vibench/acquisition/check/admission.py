@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..bench.bench import Bench, BenchKind
-from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, finding_of, rig_digest
+from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, age, finding_of, rig_digest
 from ..errors import CheckFailed, RecordingError
 from ..rig import Rig
 from ..stopping.stop import StopSwitch
@@ -59,7 +59,7 @@ def last_check(rig_name: str) -> CheckResult | None:
     return _read(archive_path(rig_name))
 
 
-def last_passed(rig: Rig) -> CheckResult | None:
+def last_passed_check(rig: Rig) -> CheckResult | None:
     """Return the last check without FAIL of a rig in its current configuration; None if there is none."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
@@ -115,7 +115,7 @@ def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, .
     Both checks used the same sine level, because the configuration is the same.
     """
     before = {finding.name: finding for finding in last.findings}
-    since = f"since {ago(at - last.checked)}"
+    since = f"since {age(at - last.checked)}"
     found = [
         _change(finding, before[finding.name], since) for finding in now.findings if finding.name in before
     ]
@@ -181,7 +181,7 @@ def check_bench(
         Do not compare with the last passed check; changes since then are accepted.
     """
     report, at = bench_report(bench, folder, switch), clock()
-    last = None if new_reference else last_passed(bench.rig)
+    last = None if new_reference else last_passed_check(bench.rig)
     if last is not None:
         report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
     result = CheckResult.of(bench.rig, report, at)
@@ -223,12 +223,12 @@ def require_fresh(
         case CheckRule.NOW:
             return _require_passed(check_bench(bench, folder, clock, switch))
         case CheckRule.FRESH:
-            return _fresh(bench, folder, clock, switch)
+            return _valid_check(bench, folder, clock, switch)
         case _:
             assert_never(rule)
 
 
-def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
+def _valid_check(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
     last = last_check(bench.rig.name)
     complaint = why_not(last, bench.rig, clock())
     if last is not None and complaint is None:

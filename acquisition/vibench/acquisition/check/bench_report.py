@@ -69,7 +69,7 @@ def bench_report(
             f"the bench {bench.rig.name!r} plays back a recording, so there is nothing to check. Measure "
             "with the plan of that recording"
         )
-    findings = [*_identities(bench), *_calibrations(bench), _room(bench, folder)]
+    findings = [*_identities(bench), *_calibrations(bench), _disk_finding(bench, folder)]
     if amplitude_vpp is None:
         amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
     drive = drive_for(bench, _small_sine(amplitude_vpp))
@@ -82,7 +82,7 @@ def bench_report(
         bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # the output relay may be stuck
         findings.append(_latency(bench))
     if bench.output is not None:
-        findings.append(_idle(bench.output))
+        findings.append(_idle_finding(bench.output))
     for channel, row in zip(bench.channels, quiet, strict=True):
         findings += [_noise(channel, row), _offset(channel, row)]
     findings += LoopCheck(bench, amplitude_vpp, during, after).findings()
@@ -194,7 +194,7 @@ def _calibrations(bench: Bench) -> list[Finding]:
     ]
 
 
-def _room(bench: Bench, folder: Path) -> Finding:
+def _disk_finding(bench: Bench, folder: Path) -> Finding:
     bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
     there = next(each for each in (folder, *folder.resolve().parents) if each.exists())
     hours = shutil.disk_usage(there).free / bytes_per_s / _SECONDS_PER_HOUR
@@ -208,7 +208,7 @@ def _room(bench: Bench, folder: Path) -> Finding:
     )
 
 
-def _idle(output: AnalogOutput) -> Finding:
+def _idle_finding(output: AnalogOutput) -> Finding:
     is_zero = output.idle is IdleOutput.ZERO
     advice = "if the program crashes, the output holds its last value: keep the gain knob within reach"
     return Finding(

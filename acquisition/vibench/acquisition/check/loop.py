@@ -10,7 +10,7 @@ import numpy as np
 from ..bench.bench import Bench
 from ..bench.result import Bounds, Finding, Verdict, finding_of
 from ..instruments import Samples
-from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
+from ..plan import CHECK_FREQUENCY_HZ, check_phasors, nearest_expected
 from ..rig import RESPONSE_ROLES, BaseQuantity, ComplexArray, RigModel, Role
 
 _PPM = 1e6
@@ -135,7 +135,7 @@ class LoopCheck:
         self._amplifier_modelled = np.atleast_1d(
             RigModel(bench.rig).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)
         )
-        self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
+        self._base_modelled = check_phasors(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
         """Return the findings on all recorded channels from the sine."""
@@ -153,7 +153,7 @@ class LoopCheck:
             found.append(self._sign(Role.BASE_ACCELERATION, self._base_modelled))
         for role in RESPONSE_ROLES:
             if self._detects(Role.DRIVE_VOLTAGE) and self._detects(role):
-                modelled = expected_under_check(self._rig, self._terminal_v, BaseQuantity(role.value))
+                modelled = check_phasors(self._rig, self._terminal_v, BaseQuantity(role.value))
                 found.append(self._sign(role, modelled, M0_PHASE_DEG))
         return found
 

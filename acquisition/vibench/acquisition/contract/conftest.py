@@ -19,7 +19,7 @@ SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
-def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
+def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
     """Return the instrument plug-ins that a hardware configuration names, by kind."""
     return {each: set[str]() for each in PlugInKind} | {
         PlugInKind.GENERATOR: {rig.generator.driver},
@@ -34,13 +34,13 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     """Return the given bench, or the first shipped virtual bench; None if it does not name the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
-        return rig if name in named_in(rig)[kind] else None
+        return rig if name in plug_ins_of(rig)[kind] else None
     for path in all_shipped("hardware_configs"):
         try:
             rig = load_rig(path)
         except ConfigurationError:  # the bench needs a package that is not installed
             continue
-        if rig.virtual is not None and name in named_in(rig)[kind]:
+        if rig.virtual is not None and name in plug_ins_of(rig)[kind]:
             return rig
     return None
 
@@ -59,11 +59,11 @@ def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | N
     except ConfigurationError as error:
         raise pytest.UsageError(str(error)) from None
     if not any(found.values()):
-        raise pytest.UsageError(unnamed(name, given, kinds))
+        raise pytest.UsageError(no_bench_text(name, given, kinds))
     return found
 
 
-def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
+def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
     """Return the error text for an instrument that no bench names."""
     who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
     kinds_in_words = " or ".join(each.value for each in kinds)
@@ -86,7 +86,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
         pytest.skip(f"{name} is not a plug-in of the kind {kind.value}")
     found = rigs[kind]
     if found is None:
-        raise ConfigurationError(unnamed(name, request.config.getoption("--vibench-bench"), [kind]))
+        raise ConfigurationError(no_bench_text(name, request.config.getoption("--vibench-bench"), [kind]))
     return found
 
 

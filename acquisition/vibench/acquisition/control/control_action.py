@@ -10,7 +10,7 @@ import numpy as np
 from ..excitation.feedback import BaseLevel
 from ..instruments import Block, Samples
 from ..plan import Phase
-from ..recording import FeedbackNote, Held
+from ..recording import FeedbackNote, Hold
 from .steadiness import Phasors
 
 
@@ -71,9 +71,9 @@ class MeasuredLevel:
     amplitude: float
     uncertainty: float
 
-    def held(self, target: float, tolerance: float) -> Held:
+    def hold_state(self, target: float, tolerance: float) -> Hold:
         """Return whether the amplitude deviates from ``target`` by at most this fraction of ``target``."""
-        return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
+        return Hold.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Hold.OUTSIDE
 
 
 def measured_level(base: Phasors) -> MeasuredLevel:

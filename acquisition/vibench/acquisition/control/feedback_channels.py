@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import ConfigurationError, LimitExceeded
 from ..instruments import Samples
 from ..plan import needed_vpp
-from ..recording import bridged, coupling_cut_hz, found_dropouts, undecided_from
+from ..recording import bridge, coupling_cut_hz, find_dropouts, first_undecided
 from ..rig import RESPONSE_ROLES, Channel, OnTable, Rig, Role
 from .control_action import PhaseSamples
 from .steadiness import Phasors, Stroboscope
@@ -46,7 +46,7 @@ class FeedbackChannels:
         """
         response = samples.volts[self.response] * self.response_units_per_volt
         if self.response_derivatives == 0:
-            response = bridged(response, found_dropouts(response, self.sample_rate_hz))
+            response = bridge(response, find_dropouts(response, self.sample_rate_hz))
         return (
             samples.volts[self.drive] * self.drive_units_per_volt,
             samples.volts[self.base] * self.base_units_per_volt,
@@ -132,9 +132,9 @@ class BridgedRows:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)
         response = self._rows[-1]
-        dropouts = found_dropouts(response, self._rate_hz)
-        self._rows[-1] = bridged(response, dropouts)
-        begin, stop = self._next - self._first, undecided_from(response, self._rate_hz, dropouts)
+        dropouts = find_dropouts(response, self._rate_hz)
+        self._rows[-1] = bridge(response, dropouts)
+        begin, stop = self._next - self._first, first_undecided(response, self._rate_hz, dropouts)
         stop = max(begin, stop)
         handed_on = self._rows[:, begin:stop].copy()
         surplus = min(begin, max(0, stop - round(_REMEMBERED_S * self._rate_hz)))

@@ -81,7 +81,7 @@ class _JumpSearch:
             case JumpSide.AFTER:
                 self.after = point
 
-    def left(self, place: int, point: SettledPoint) -> None:
+    def shorten(self, place: int, point: SettledPoint) -> None:
         """Shorten the branch: the motion left it at index ``place``, where ``point`` was measured."""
         del self.branch[place:]
         self.after = point
@@ -162,16 +162,16 @@ class JumpLocator:
                 return _Return.NOT_FOUND
             end = len(search.branch)
             steps = range(max(place + 1, end - 1), end) if pace is _Pace.GLIDE else range(place + 1, end)
-            left = yield from self._left(search.branch, steps)
+            left = yield from self._find_departure(search.branch, steps)
             if left is None:
                 return _Return.BACK
             if self._is_late():
                 return _Return.NOT_FOUND
         assert left is not None, "both attempts left the branch"
-        search.left(*left)
+        search.shorten(*left)
         return _Return.LEFT
 
-    def _left(
+    def _find_departure(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
         """Go forward. Return index and state where the motion has left the branch; None if it stays."""
@@ -197,13 +197,13 @@ class JumpLocator:
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
         """Stop the motion at the branch's first frequency; return 0 if it restarts on the branch, or None."""
         yield from decay_motion(self._controller.loop)
-        found = yield from self._controller.settled()
+        found = yield from self._controller.settle()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
     def _move_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
         yield from glide(self._controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
-        return (yield from self._controller.settled())
+        return (yield from self._controller.settle())
 
     def _search_at(self, frequency_hz: float) -> Controller[SettledPoint]:
         found = yield from self._move_to(frequency_hz)
@@ -287,7 +287,7 @@ class Pass:
     def _step_to(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
         controller = self._controller
         yield from glide(controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz)
-        found = yield from controller.settled()
+        found = yield from controller.settle()
         segment = Segment(
             SegmentLabel.STEP,
             {

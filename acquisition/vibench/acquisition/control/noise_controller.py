@@ -77,7 +77,7 @@ class Equaliser:
             )
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
 
-    def hear(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
+    def update(self, drive: Samples, base: Samples, response: Samples) -> MeasuredDensities:
         """Update the gains from the signals of a realisation; return its power spectral densities.
 
         Raises LimitExceeded when the base moves far less than the model predicts.
@@ -151,7 +151,7 @@ def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
             yield ControlAction(Phase(RunState.SETTLING, play, plan.settle_s))
         state, segment = (RunState.SETTLING, None) if kept < 0 else (RunState.RECORDING, segments[kept])
         samples = yield ControlAction(Phase(state, play, plan.periods / plan.repetition_hz, segment))
-        densities = equaliser.hear(*loop.channels.rows(samples))
+        densities = equaliser.update(*loop.channels.rows(samples))
         off_db = equaliser.off_db(densities, level_db)
         yield ControlAction(None, (_note(plan, equaliser, densities, off_db, kept),))
         equaliser.require_below_abort(densities)

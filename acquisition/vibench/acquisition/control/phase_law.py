@@ -87,7 +87,7 @@ class PhaseLaw:
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
         self._looks.append((frequency_hz, error_rad, seen.base.amplitude))
-        kept = self._kept(frequency_hz)
+        kept = self._transient(frequency_hz)
         self._grown *= (seen.base.amplitude / self._grown) ** (1.0 - kept)
         motion = moved * seen.base.amplitude
         left = abs(motion - self._motion) * kept / (1.0 - kept) / max(abs(motion), 1e-300)
@@ -97,12 +97,12 @@ class PhaseLaw:
 
     def next_hz(self, frequency_hz: float, base: float) -> float:
         """Return the next frequency within the plan's range [Hz]; ``base`` is the next base level [m/s2]."""
-        foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
+        foreseen_hz = self._bend_hz * (1.0 - self._transient(frequency_hz)) * log(base / self._grown)
         widest_hz = self._plan.widest_step_hz
         step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
-    def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
+    def learn(self, found: SettledState, error_rad: float) -> LearntMode:
         """Return the mode with the half-width that best explains the phase drift of all looks, and its bend.
 
         If no half-width near the earlier one explains the drift, the specimen changed to another motion. The
@@ -114,7 +114,7 @@ class PhaseLaw:
         frequency_hz, error, base = np.array(self._looks).T
         turned = 2 * pi * self._turns / frequency_hz.mean()
 
-        def unexplained(width_hz: float) -> float:
+        def residual(width_hz: float) -> float:
             """Return the mean square of the phase drift that one half-width leaves unexplained [rad2]."""
             levels, level = [], log(self._last.base_m_per_s2)
             for each in np.log(base):
@@ -126,7 +126,7 @@ class PhaseLaw:
             return float(np.mean(drift**2))
 
         wider = _WIDER if self._plan.is_fundamental else _MUCH_WIDER
-        left = np.array([unexplained(self._mode.half_width_hz * exp(each)) for each in wider])
+        left = np.array([residual(self._mode.half_width_hz * exp(each)) for each in wider])
         best = int(np.argmin(left + (_SURE_RAD * wider) ** 2 / (len(base) - 1)))
         if left[best] > _EXPLAINED_RAD**2:
             return replace(self._mode, bend_hz=0.0, steeper_hz=0.0)
@@ -147,7 +147,7 @@ class PhaseLaw:
         drifted_hz = (error_rad - before_rad) * frequency_hz / (2 * pi * self._turns)
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
-    def _kept(self, frequency_hz: float) -> float:
+    def _transient(self, frequency_hz: float) -> float:
         """Return the fraction of a decaying transient that remains after one look (measurement)."""
         return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)
 
@@ -204,15 +204,15 @@ class PhaseSearch:
         last = self.tries[-1]
         if len(self.tries) == 1:
             step_hz = 0.5 * self.widest_step_hz
-            return self._bounded(last.frequency_hz + (step_hz if last.error_deg > 0 else -step_hz))
+            return self._clip(last.frequency_hz + (step_hz if last.error_deg > 0 else -step_hz))
         below = [each for each in self.tries if each.error_deg > 0]
         above = [each for each in self.tries if each.error_deg <= 0]
         if below and above:
             low = max(below, key=lambda each: each.frequency_hz)
             high = min(above, key=lambda each: each.frequency_hz)
             if low.frequency_hz < high.frequency_hz:
-                return _between(low, high)
-        return self._bounded(self._outwards(last))
+                return _secant(low, high)
+        return self._clip(self._outwards(last))
 
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
         """Return the resonance: the zero of a line fitted to the phases measured near it.
@@ -250,11 +250,11 @@ class PhaseSearch:
         step_hz = -last.error_deg / slope if slope < 0 else (widest_hz if last.error_deg > 0 else -widest_hz)
         return last.frequency_hz + min(max(step_hz, -widest_hz), widest_hz)
 
-    def _bounded(self, frequency_hz: float) -> float:
+    def _clip(self, frequency_hz: float) -> float:
         return min(max(frequency_hz, self.low_hz), self.high_hz)
 
 
-def _between(low: PhaseError, high: PhaseError) -> float:
+def _secant(low: PhaseError, high: PhaseError) -> float:
     """Return the secant's zero, kept away from both ends of the bracket so that the bracket shrinks."""
     share = low.error_deg / (low.error_deg - high.error_deg)
     edge = 0.05

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..excitation.feedback import BaseLevel
 from ..excitation.resonance_tracking import ResonanceTracking
 from ..plan import LOOK_PERIODS, RunState, needed_vpp
-from ..recording import Held, LockResult, ResonanceNote, Steadiness
+from ..recording import Hold, LockResult, ResonanceNote, Steadiness
 from ..rig import OnTable
 from .control_action import Controller
 from .feedback_channels import require_answer
@@ -134,18 +134,18 @@ def _go_on(
     segment = plan.segment(number, loop.setting.frequency_hz)
     found = yield from record_and_judge(controller, segment, plan.record_s, periods / loop.drive_hz)
     error = _phase_error(loop.periods, found, plan)
-    is_steady = found.held is Held.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
+    is_steady = found.held is Hold.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
     is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
     is_met = is_met and _is_there(plan, found)
     lock = LockResult.LOCKED if is_met else LockResult.LOST
-    mode = law.learnt(found, radians(error.error_deg))
+    mode = law.learn(found, radians(error.error_deg))
     left_deg = hypot(error.uncertainty_deg, _open_phase_deg(plan, found), _CORRECTED * error.error_deg)
     resonance = PhaseResonance(
         found.drive_hz + radians(error.error_deg) * mode.half_width_hz,
         radians(left_deg) * mode.half_width_hz,
         -degrees(1.0) / mode.half_width_hz,
     )
-    _say(loop, plan, number, found, Tracked(resonance, None, lock, looks, periods))
+    _say(loop, plan, number, found, Track(resonance, None, lock, looks, periods))
     return TrackedPlace(found.frequency_hz, found.base.amplitude, mode)
 
 
@@ -160,10 +160,10 @@ def _lock(
     for look in range(1, looks + 1):
         now = loop.setting
         yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / loop.motion_hz)
-        base, seen = controller.measured(), controller.found(0.0)
+        base, seen = controller.mean_level(), controller.settled_state(0.0)
         require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
         error_rad, left = law.see(now.frequency_hz, seen)
-        is_on = abs(error_rad) <= tolerance_rad and left <= most_left and seen.held is Held.WITHIN
+        is_on = abs(error_rad) <= tolerance_rad and left <= most_left and seen.held is Hold.WITHIN
         in_a_row = in_a_row + 1 if is_on else 0
         if in_a_row == _LOOKS_LOCKED:
             return look, LockResult.LOCKED
@@ -199,7 +199,7 @@ def _search(
     frequency_hz, lock = last.frequency_hz, LockResult.LOST
     for _ in range(plan.most_tries):
         move(loop, frequency_hz, level)
-        states.append((yield from controller.settled()))
+        states.append((yield from controller.settle()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
         # The phase is random if the harmonic is only noise, and drifts while the motion settles.
@@ -230,10 +230,10 @@ def _search(
         mode = _mode([*states, *flanks], resonance)
         # Return to the resonance before the recording, because the next level starts where this one ends.
         move(loop, found.frequency_hz, level)
-        found = yield from controller.settled()
+        found = yield from controller.settle()
     yield from record_settled(controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
     periods = round(sum(each.waited_s * each.drive_hz for each in states))
-    _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
+    _say(loop, plan, number, found, Track(resonance, mode, lock, len(search.tries), periods))
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
@@ -245,7 +245,7 @@ def _search(
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Track:
     """Result of resonance tracking at one base level."""
 
     resonance: PhaseResonance
@@ -266,7 +266,7 @@ def _flanks(
         frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
         if plan.low_hz <= frequency_hz <= plan.high_hz:
             move(controller.loop, frequency_hz, controller.level)
-            found.append((yield from controller.settled()))
+            found.append((yield from controller.settle()))
     return found
 
 
@@ -326,7 +326,7 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
 
-def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
+def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Track) -> None:
     lock = tracked.lock
     if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
         lock = LockResult.LOST

@@ -12,7 +12,7 @@ from ..plan import LOOK_PERIODS, RunState, look_s
 from ..recording import (
     DwellNote,
     ExcursionNote,
-    Held,
+    Hold,
     JumpSide,
     LevelNote,
     SegmentLabel,
@@ -122,7 +122,7 @@ class SettledState:
     judgement: Judgement
     base: MeasuredLevel
     """Acceleration amplitude of the base's fundamental [m/s2]."""
-    held: Held
+    held: Hold
     harmonics: tuple[complex, ...]
     """Displacement of m0 at 1 to 4 times its repetition rate, over that of the base at drive frequency."""
     drives: int = 1
@@ -170,7 +170,7 @@ class SettlingController:
     rule: Settling
     level: BaseLevel | None
 
-    def settled(self) -> Controller[SettledState]:
+    def settle(self) -> Controller[SettledState]:
         """Wait until the motion has settled, correct the level meanwhile, and return the result."""
         waited_s = 0.0
         while True:
@@ -182,12 +182,12 @@ class SettlingController:
                 continue
             if not is_late and self._correct_level():
                 continue
-            found = self.found(waited_s)
+            found = self.settled_state(waited_s)
             if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
                 self.loop.note(found.note)
                 return found
 
-    def measured(self) -> MeasuredLevel:
+    def mean_level(self) -> MeasuredLevel:
         """Return the base level [m/s2], from the newer half of the periods since the drive changed."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
@@ -201,11 +201,11 @@ class SettlingController:
         next_vpp = control.next_vpp(now_vpp, seen, self.level.acceleration_at(frequency_hz))
         return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
-    def held(self, measured: MeasuredLevel) -> Held:
+    def hold_state(self, measured: MeasuredLevel) -> Hold:
         """Return whether a measured base level is within its tolerance."""
         if self.level is None:
-            return Held.OPEN
-        return measured.held(self._target, self.level.tolerance)
+            return Hold.OPEN
+        return measured.hold_state(self._target, self.level.tolerance)
 
     @property
     def _target(self) -> float:
@@ -217,7 +217,7 @@ class SettlingController:
         if self.level is None or self.loop.periods.count < LOOK_PERIODS:
             return False
         now = self.loop.setting
-        measured = self.measured()
+        measured = self.mean_level()
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         level = self.level
         if self.loop.settling_order is not None:
@@ -230,7 +230,7 @@ class SettlingController:
         self.loop.change(now.frequency_hz, next_vpp)
         return True
 
-    def found(self, waited_s: float) -> SettledState:
+    def settled_state(self, waited_s: float) -> SettledState:
         """Return the state of the motion, from the periods since the last change of the drive."""
         loop, periods = self.loop, self.loop.periods
         # A motion judged by one order settles slowly, so only its newest periods are used.
@@ -245,7 +245,7 @@ class SettlingController:
             waited_s=waited_s,
             judgement=self._judgement(periods.response),
             base=measured,
-            held=self.held(measured),
+            held=self.hold_state(measured),
             harmonics=tuple(
                 loop.channels.transmissibility(
                     newest.base, newest.response[:, order], loop.drive_hz, order / loop.drives
@@ -267,14 +267,14 @@ class SettlingController:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
         is_at_the_end = found.setting_vpp >= self.loop.most_vpp
-        return is_known and (found.held is Held.WITHIN or is_at_the_end)
+        return is_known and (found.held is Hold.WITHIN or is_at_the_end)
 
 
 def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     """Ramp up to the level, settle, record, ramp down."""
     controller = SettlingController(loop, plan.settling, plan.base_level)
     yield from start(loop, plan.frequency_hz, plan.base_level)
-    yield from controller.settled()
+    yield from controller.settle()
     control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
     pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
@@ -286,8 +286,8 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
         yield from loop.listen(RunState.RECORDING, piece_s, plan.segment)
         measured = measured_level(loop.periods.base)
         require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
-        held = controller.held(measured)
-        outside += held is Held.OUTSIDE
+        held = controller.hold_state(measured)
+        outside += held is Hold.OUTSIDE
         loop.note(
             LevelNote(
                 at_s=begun_s + piece_s,
@@ -320,7 +320,7 @@ def record_and_judge(
     shortest_s = (controller.rule.periods + 2) / controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _record_held(controller, segment, duration_s)
-    found = controller.found(waited_s)
+    found = controller.settled_state(waited_s)
     _note(controller, found, segment)
     return found
 
@@ -340,7 +340,7 @@ def _note(controller: SettlingController, found: SettledState, segment: Segment)
             drive_hz=loop.drive_hz,
             base_m_per_s2=measured.amplitude,
             base_u=measured.uncertainty,
-            level=controller.held(measured),
+            level=controller.hold_state(measured),
             response_ii=found.response,
             motion=found.judgement.steadiness,
             period=found.judgement.period,
@@ -352,7 +352,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
     """Ramp up to the level, settle, sweep, ramp down."""
     level = plan.base_level
     yield from start(loop, plan.start_hz, level)
-    yield from SettlingController(loop, plan.settling, level).settled()
+    yield from SettlingController(loop, plan.settling, level).settle()
     estimator = GainEstimator(plan.average_s)
     excursion: ExcursionNote | None = None
     steps = outside = 0
@@ -381,5 +381,5 @@ def _excursion(
         return None
     begin_hz, worst = (frequency_hz, deviation) if before is None else (before.from_hz, before.worst)
     return ExcursionNote(
-        from_hz=begin_hz, to_hz=frequency_hz, worst=max(worst, deviation, key=abs), level=Held.OUTSIDE
+        from_hz=begin_hz, to_hz=frequency_hz, worst=max(worst, deviation, key=abs), level=Hold.OUTSIDE
     )

@@ -14,7 +14,7 @@ from ..excitation.held_response import HeldResponse
 from ..excitation.settled_sine import GLIDE_TONE_S
 from ..excitation.steps import Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, look_s, lowest_setting_vpp, needed_vpp, ramp
-from ..recording import FeedbackNote, Held, HeldResponseNote
+from ..recording import FeedbackNote, HeldResponseNote, Hold
 from ..rig import OnTable, Rig
 from .control_action import ControlAction, Controller, PhaseSamples, measured_level
 from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
@@ -358,6 +358,6 @@ def _record(loop: SineLoop, plan: HeldResponse, frequency_hz: float, direction: 
             base_m_per_s2=base.amplitude,
             base_u=base.uncertainty,
             setting_vpp=loop.setting.setting_vpp,
-            level=Held.WITHIN if is_held else Held.OUTSIDE,
+            level=Hold.WITHIN if is_held else Hold.OUTSIDE,
         )
     )

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConfigurationError, InstrumentError, SettingRefused
 from ..instruments import Block, Counts, FoundDevice, Identity, Overload, Samples
-from ..rig import TOKEN_KEY, Channel, ChannelConfig, DaqConfig, Rig, channels_of, given_token
+from ..rig import TOKEN_KEY, Channel, ChannelConfig, DaqConfig, Rig, channels_of, token_from_env
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
 from ._overload import overload_ranges
 
@@ -48,7 +48,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
 
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
         # A namedtuple's _replace is public in spite of its underscore.
-        carried = ((TOKEN_KEY, given_token()),) if given_token() else ()
+        carried = ((TOKEN_KEY, token_from_env()),) if token_from_env() else ()
         metadata = (*(details.metadata or ()), *carried)
         deadline_s = LOST_DEADLINE_S if self._is_lost else CALL_DEADLINE_S
         answer = continuation(details._replace(timeout=deadline_s, metadata=metadata), request)

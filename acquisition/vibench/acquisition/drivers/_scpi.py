@@ -147,7 +147,7 @@ class ScpiInstrument:
             "switch it off and on, and open the bench again"
         )
 
-    def known(self, header: str) -> Any:
+    def last_value(self, header: str) -> Any:
         """Return the last value read back for a setting; raises InstrumentError after a failed change."""
         if header not in self.held:
             raise InstrumentError(
@@ -260,7 +260,7 @@ class Number:
     relative: float = 0.0
 
     def __get__(self, owner: ScpiInstrument, _: type | None = None) -> float:
-        return float(owner.known(self.header))
+        return float(owner.last_value(self.header))
 
     def __set__(self, owner: ScpiInstrument, value: float) -> None:
         header, text = self.header.format(c=owner.channel), self.form.format(value)
@@ -279,7 +279,7 @@ class Word:
     answers: Mapping[str, tuple[str, ...]]
 
     def __get__(self, owner: ScpiInstrument, _: type | None = None) -> str:
-        return str(owner.known(self.header))
+        return str(owner.last_value(self.header))
 
     def __set__(self, owner: ScpiInstrument, word: str) -> None:
         owner.command(f"{self.header.format(c=owner.channel)} {word}")

@@ -15,7 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost, MissingLibrary
-from ..host.extras import need_extra
+from ..host.extras import require_extra
 from ..instruments import Block, Identity, IdleOutput, Samples
 from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges, require_playable
@@ -29,7 +29,7 @@ _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
 
 def _sounddevice() -> Any:
     """Load the library; raises MissingLibrary if it, or the system's PortAudio, is not installed."""
-    need_extra("sound")
+    require_extra("sound")
     try:
         return import_module("sounddevice")
     except OSError as error:
@@ -57,7 +57,7 @@ class _Card:
         highest = 1 + max(inputs)
         common = {"samplerate": self.rate_hz, "dtype": "float32", "device": daq.device}
         self.stream: Any = (
-            library.InputStream(channels=highest, callback=self._hear, **common)
+            library.InputStream(channels=highest, callback=self._take_block, **common)
             if self._output is None
             else library.Stream(channels=(highest, 1 + self._output), callback=self._hear_and_play, **common)
         )
@@ -74,7 +74,7 @@ class _Card:
             self.unplayed, self.is_armed, self.ran_dry = 0, False, False
             self.changed.notify_all()
 
-    def _hear(self, heard: Samples, frames: int, time: object, status: Any) -> None:
+    def _take_block(self, heard: Samples, frames: int, time: object, status: Any) -> None:
         del frames, time
         with self.changed:
             if status.input_overflow or self.waiting > self.most_waiting:
@@ -88,12 +88,12 @@ class _Card:
         played.fill(0.0)
         with self.changed:
             if self.is_armed and self._output is not None:
-                samples = self._taken(frames)
+                samples = self._next_samples(frames)
                 played[: samples.size, self._output] = samples
                 self.ran_dry = self.ran_dry or samples.size < frames or bool(status.output_underflow)
-        self._hear(heard, frames, time, status)
+        self._take_block(heard, frames, time, status)
 
-    def _taken(self, frames: int) -> Samples:
+    def _next_samples(self, frames: int) -> Samples:
         parts, left = [np.zeros(0)], frames
         while left and self.queued:
             part = self.queued.popleft()

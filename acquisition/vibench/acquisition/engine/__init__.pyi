@@ -26,9 +26,9 @@ from ._start import (
     AdoptedEngine as AdoptedEngine,
     EngineProcess as EngineProcess,
     StopDelivery as StopDelivery,
-    left_alone as left_alone,
     start_engine as start_engine,
     stop_engine as stop_engine,
+    unattended_engine as unattended_engine,
 )
 from ._status import (
     DRIVING as DRIVING,

@@ -7,7 +7,7 @@ import sys
 from threading import Event, Thread
 from types import FrameType
 
-from ..stopping.program import heeded_signals, signal_name
+from ..stopping.program import signal_name, stop_signals
 from ..stopping.stop import Cause
 from ._engine import Engine, JobQueue
 from ._request_handler import RequestHandler
@@ -26,13 +26,13 @@ def main() -> None:
     engine = Engine(options.attendance)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
-    _heed_signals(handler)
+    _handle_signals(handler)
     with serving(handler, options.what, options.host) as server:
         print(address_line(server.address), flush=True)  # noqa: T201 - this line is the handshake
         if options.attendance is Supervision.ATTENDED:
             Thread(target=_follow_parent, args=(handler,), name="engine parent", daemon=True).start()
         else:
-            _end_when_forgotten(handler, options.forgotten_s)
+            _end_when_unused(handler, options.forgotten_s)
         jobs.run()
 
 
@@ -50,15 +50,15 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _heed_signals(handler: RequestHandler) -> None:
+def _handle_signals(handler: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         handler.shutdown(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
 
-    for number in heeded_signals():
+    for number in stop_signals():
         signal.signal(number, on_signal)
 
 
-def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
+def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
     """End an idle engine that nobody uses, because it may block a bench for other programs."""
 
     def look() -> None:

@@ -29,7 +29,7 @@ class _Program:
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")
         self._lived_s, self._own_s = monotonic(), 0.0
-        self._seen_s = (self._lived_s, self._lived_s, self._worked_s)
+        self._seen_s = (self._lived_s, self._lived_s, self._processor_s)
         Thread(target=self._follow, name="follow program", daemon=True).start()
 
     def still_s(self) -> float:
@@ -38,7 +38,7 @@ class _Program:
         In state R (runnable), only its processor time counts: Linux reports a wait only after its end.
         """
         lived_s = self._lived_s  # read before the clock, because a byte may arrive in between
-        now_s, worked_s = monotonic(), self._worked_s
+        now_s, worked_s = monotonic(), self._processor_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)
         if lived_s != lived_then_s:
@@ -56,7 +56,7 @@ class _Program:
         return self._read_proc("stat").rpartition(") ")[2][:1]
 
     @property
-    def _worked_s(self) -> float:
+    def _processor_s(self) -> float:
         return 1e-9 * int((self._read_proc("schedstat").split() or ["0"])[0])
 
     def _read_proc(self, name: str) -> str:

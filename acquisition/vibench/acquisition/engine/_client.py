@@ -20,7 +20,7 @@ from .. import errors
 from ..campaign import ExistingRecordings
 from ..errors import AcquisitionError
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..host.toml_file import FrozenModel
 from ..plan import Campaign
 from ..stopping.program import (
@@ -99,7 +99,7 @@ def the_engine(pid: int | None) -> Announcement:
     wanted = "no engine is running" if pid is None else f"no engine runs as process {pid}"
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
-        raise EngineError(f"{wanted}; {_named(others)} has no engine and can only be stopped: 'vibench stop'")
+        raise EngineError(f"{wanted}; {_names(others)} has no engine and can only be stopped: 'vibench stop'")
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: "
         "watch or stop an engine of another user, or with another VIBENCH_STATE_DIR, from there"
@@ -139,11 +139,11 @@ def require_ended(engine: Announcement) -> None:
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:
     if len(chosen) > 1:
-        raise EngineError(f"several programs drive a bench: {_named(chosen)}; select one with --pid")
+        raise EngineError(f"several programs drive a bench: {_names(chosen)}; select one with --pid")
     return chosen[0]
 
 
-def _named(programs: Sequence[Program]) -> str:
+def _names(programs: Sequence[Program]) -> str:
     return ", ".join(f"{each.pid} ({each.what})" for each in programs)
 
 
@@ -273,7 +273,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         Raises EngineSilent when no answer comes within ``patience_s`` [s], now or later, and EngineGone when
         no engine listens at the address.
         """
-        return cls(connect(address, chosen(ConnectionRole, role), patience_s))
+        return cls(connect(address, member(ConnectionRole, role), patience_s))
 
     def status(self) -> EngineStatus:
         """Return the status of the engine."""
@@ -289,7 +289,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
     ) -> ArmedPlan:
         """Prepare a campaign; `arm_request` accepts all options."""
         return self.arm_request(
-            CampaignRequest(campaign=campaign, folder=folder, existing=chosen(ExistingRecordings, existing))
+            CampaignRequest(campaign=campaign, folder=folder, existing=member(ExistingRecordings, existing))
         )
 
     def close(self) -> None:

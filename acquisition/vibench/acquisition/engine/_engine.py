@@ -49,7 +49,7 @@ def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
                 units_per_volt=channel.units_per_volt,
                 full_scale_v=channel.full_scale_v,
             )
-            for channel in channels_of(bench.rig if role is None else bench.rig.aimed(role))
+            for channel in channels_of(bench.rig if role is None else bench.rig.with_beam_on(role))
         ),
         sample_rate_hz=bench.digitizer.sample_rate_hz,
     )
@@ -128,7 +128,7 @@ class Engine:
         except AcquisitionError as error:
             self._fails(error, EngineState.READY)
             raise
-        self.published.checked(result.report, result.checked.isoformat(timespec="seconds"))
+        self.published.note_check(result.report, result.checked.isoformat(timespec="seconds"))
         self.published.enter(EngineState.READY)
 
     def measure(
@@ -144,10 +144,10 @@ class Engine:
         facts_at = cache(partial(bench_facts, self.bench))
         roles = {name: each.point and each.point.role for name, each in request.campaign.recordings()}
 
-        def tell(progress: CampaignProgress) -> None:
-            self.published.tell(progress, facts_at(roles.get(progress.name)))
+        def report_progress(progress: CampaignProgress) -> None:
+            self.published.note_progress(progress, facts_at(roles.get(progress.name)))
 
-        def ended(point_result: PointResult) -> None:
+        def on_end(point_result: PointResult) -> None:
             self.published.note_result(point_result)
             on_result(point_result)
 
@@ -178,8 +178,8 @@ class Engine:
                 request.folder,
                 request.existing,
                 request.after_failure,
-                on_progress=tell,
-                on_result=ended,
+                on_progress=report_progress,
+                on_result=on_end,
                 switch=self.switch,
                 reopen=self._reconnecting.reopen,
                 changed_bench=request.changed_bench,
@@ -191,7 +191,7 @@ class Engine:
             self._check_ended(stopped)
             return ()
         except AcquisitionError as error:
-            self.published.failed(str(error))
+            self.published.note_failure(str(error))
             self._fails(error, EngineState.READY)
             raise
         self.published.messages.info(_campaign_in_words(point_results))

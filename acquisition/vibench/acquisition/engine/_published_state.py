@@ -16,7 +16,7 @@ from ..campaign import CampaignProgress, PointOutcome, PointResult
 from ..errors import AcquisitionError
 from ..host.beside import Beside
 from ..instruments import Block
-from ..plan import Campaign, RunState, measured_s
+from ..plan import Campaign, RunState, measuring_s
 from ._status import (
     ArmedPlan,
     BenchFacts,
@@ -83,7 +83,7 @@ class SampleBuffer:
             while self._blocks and self._blocks[0][0] + self._blocks[0][1].shape[1] <= oldest:
                 self._blocks.popleft()
 
-    def since(self, sample: int, most: int) -> SampleSlice:
+    def samples_since(self, sample: int, most: int) -> SampleSlice:
         """Return the samples from number ``sample`` on, but at most the newest ``most`` samples."""
         with self._lock:
             blocks = tuple(self._blocks)
@@ -107,7 +107,7 @@ class Messages:
         self._count = 0
 
     @property
-    def kept(self) -> tuple[EngineMessage, ...]:
+    def newest(self) -> tuple[EngineMessage, ...]:
         """Return the newest messages of the engine, from oldest to newest."""
         return tuple(self._kept)
 
@@ -194,7 +194,7 @@ class PublishedState:
         return status.model_copy(
             update={
                 "armed": armed,
-                "messages": self.messages.kept,
+                "messages": self.messages.newest,
                 "samples": self.sample_buffer.samples,
                 "run_id": self.sample_buffer.run_id,
                 "lost_blocks": self.sample_buffer.gaps,
@@ -212,7 +212,7 @@ class PublishedState:
         self._put(bench=bench, check=None, checked_utc="")
         self._put_rows(())
 
-    def checked(self, report: BenchReport, utc: str) -> None:
+    def note_check(self, report: BenchReport, utc: str) -> None:
         """Set the report of the bench check."""
         self._put(check=report, checked_utc=utc)
 
@@ -226,7 +226,7 @@ class PublishedState:
         """Set the campaign that is running."""
         self._folder = folder
         self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
-        self._planned_s = {name: measured_s(each) + campaign.rest_s for name, each in campaign.recordings()}
+        self._planned_s = {name: measuring_s(each) + campaign.rest_s for name, each in campaign.recordings()}
         self._plans = {
             name: f"{each.excitation.kind}, {each.excitation.highest_amplitude_vpp:g} Vpp"
             for name, each in campaign.recordings()
@@ -234,7 +234,7 @@ class PublishedState:
         self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.RUNNING, armed=None, run=None)
 
-    def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
+    def note_progress(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Update the status after a block of samples."""
         run = progress.run
         if progress.path != self._file:  # each attempt at a point is a new recording
@@ -270,7 +270,7 @@ class PublishedState:
             self._done_s += self._status.run.total_s
         self._row(point_result.name, point_result.outcome.value, point_result.reason, str(point_result.path))
 
-    def failed(self, reason: str) -> None:
+    def note_failure(self, reason: str) -> None:
         """Set the state of the running recording to failed."""
         for row in self._status.rows:
             if row.state == "running":

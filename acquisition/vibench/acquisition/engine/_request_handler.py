@@ -12,7 +12,7 @@ from ..campaign import planned_recordings
 from ..check.admission import CheckRule, require_on_record
 from ..errors import CheckFailed
 from ..instruments import Knob
-from ..plan import LimitCheck, played_alike, require_within_limits
+from ..plan import LimitCheck, distinct_drives, require_within_limits
 from ..rig import Confirm, KnobSheet, Rig
 from ..run.drive import drive_for
 from ..stopping.program import INTERVAL_S
@@ -52,7 +52,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
     # Check equal plans only once: a long campaign would otherwise make viewers wait.
-    for point in played_alike(points):
+    for point in distinct_drives(points):
         checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
         drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
     planned = planned_recordings(campaign, folder, request.existing)
@@ -165,7 +165,7 @@ class RequestHandler:
         """Note that a viewer is present; requests to check, arm or start count as presence, too."""
         self._last_request_s = monotonic()
 
-    def beat(self, still_s: float = 0.0) -> None:
+    def heartbeat(self, still_s: float = 0.0) -> None:
         """Note for how long the window has been blocked [s]; the server notes the viewer's presence."""
         self._still_s = still_s
 
@@ -182,7 +182,7 @@ class RequestHandler:
 
     def look(self, since_sample: int = 0, *, most: int) -> SampleSlice:
         """Return the newest samples of the run."""
-        return self._engine.published.sample_buffer.since(since_sample, most)
+        return self._engine.published.sample_buffer.samples_since(since_sample, most)
 
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig."""
@@ -252,10 +252,10 @@ class RequestHandler:
         """Write an event at the next sample of the recording."""
         self._engine.switch.mark(text)
 
-    def tell_change(self, text: str) -> None:
+    def note_change(self, text: str) -> None:
         """Write into the recording that the specimen has changed."""
         self._engine.published.messages.warn(text)
-        self._engine.switch.tell_change(text)
+        self._engine.switch.note_change(text)
 
     def open_rig(self) -> Rig:
         """Return the configuration of the open bench."""
@@ -266,7 +266,7 @@ class RequestHandler:
             )
         return rig
 
-    def carried_request(self) -> CampaignRequest:
+    def last_request(self) -> CampaignRequest:
         """Return the last started campaign, with its options."""
         if self._carried is None:
             raise EngineError("no campaign was started in this engine yet; arm and start a campaign")
@@ -277,13 +277,13 @@ class RequestHandler:
         with self._asking:
             self._engine.turn_twin(switch)
 
-    def tell_twin(self, told: TwinStatus) -> None:
+    def publish_twin(self, told: TwinStatus) -> None:
         """Publish the live twin's report."""
         self._engine.published.twin(told)
 
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "a request ended the engine") -> None:
         """End the run, silence everything, and let the engine end. Allowed in every engine state."""
-        self._stop(StopRequest.by(cause, reason))
+        self._stop(StopRequest.of(cause, reason))
         self._is_ending = True
         self._jobs.leave()
 
@@ -345,7 +345,7 @@ class RequestHandler:
             self.disarm()
             engine.published.messages.warn(f"The viewer was lost: {reason}.", "Disarmed.", "Arm again.")
         elif engine.published.state in SOUNDING and engine.switch.request is None:
-            engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
+            engine.switch.ask(StopRequest.of(Cause.VIEWER_GONE, reason))
             kept = "; the recording is kept" if engine.published.state in DRIVING else ""
             engine.published.messages.alarm(
                 f"The viewer was lost: {reason}.",

@@ -88,7 +88,7 @@ class Admission:
             if self._woken in ready:
                 break
             for connection in [each for each in self._waiting if each in ready]:
-                self._hear(connection)
+                self._receive(connection)
             self._turn_away_late_ones()
             if self._listening in ready:
                 self._accept()
@@ -109,7 +109,7 @@ class Admission:
                 return
             self._turn_away(next(iter(self._waiting)))
         try:
-            connection, _ = self._accepted()
+            connection, _ = self._accept_client()
         except OSError as error:
             if error.errno in _NO_ROOM:
                 sleep(YOUNG_S)
@@ -120,7 +120,7 @@ class Admission:
         self._waiting[connection] = _Waiting(monotonic(), IncomingMessage(HELLO))
         self._selector.register(connection, selectors.EVENT_READ)
 
-    def _accepted(self) -> tuple[socket.socket, object]:
+    def _accept_client(self) -> tuple[socket.socket, object]:
         """Accept the next connection; if no file descriptor is left, close the least important connection."""
         try:
             return self._listening.accept()
@@ -133,7 +133,7 @@ class Admission:
             self._make_room()
         return self._listening.accept()
 
-    def _hear(self, connection: socket.socket) -> None:
+    def _receive(self, connection: socket.socket) -> None:
         incoming = self._waiting[connection].incoming
         try:
             incoming.take(connection.recv(incoming.missing))

@@ -12,7 +12,7 @@ from time import monotonic
 from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, stop_path, write_stop_file
 
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..stopping.program import Program, engines_folder
 from ..stopping.stop import StopLevel
 from ._client import Announcement, EngineAddress, EngineClient, announced_engines
@@ -47,7 +47,7 @@ class AdoptedEngine(ClosedOnLeaving):
         _until(lambda: not self._announcement.is_alive, LEAVING_S)
 
 
-def left_alone() -> Announcement | None:
+def unattended_engine() -> Announcement | None:
     """Return an engine that runs a campaign although its parent program has ended; None if there is none."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
@@ -101,7 +101,7 @@ class EngineProcess(ClosedOnLeaving):
 
 def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> EngineProcess:
     """Start an engine of this installation, with no bench open. Raises EngineGone when it does not start."""
-    supervision = chosen(Supervision, supervision)
+    supervision = member(Supervision, supervision)
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
         [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", supervision.value],
         stdin=subprocess.PIPE if supervision is Supervision.ATTENDED else subprocess.DEVNULL,
@@ -164,7 +164,7 @@ def stop_engine(
     EngineError
         When a hold is requested from a program that is not an engine.
     """
-    level = chosen(StopLevel, level)
+    level = member(StopLevel, level)
     ended = EngineGone(
         f"process {engine.pid} ({engine.what}) ended without confirming that its output is off. {SWITCH_OFF}"
     )
@@ -177,14 +177,14 @@ def stop_engine(
                 f"process {engine.pid} ({engine.what}) is not an engine and cannot be held. It continues; "
                 "stop it with ramp, abort or off"
             )
-        _tell(engine, level, reason)
+        _send_stop(engine, level, reason)
         return StopDelivery.TOLD
     stop = stop_path(str(engines_folder()), engine.pid, engine.process_start, level)
     try:
         write_stop_file(stop, reason)
     except OSError as error:
         if isinstance(engine, Announcement):
-            return _tell(engine, level, reason)
+            return _send_stop(engine, level, reason)
         raise EngineGone(
             f"the stop for process {engine.pid} was not written to the state folder: {error}. {SWITCH_OFF}"
         ) from error
@@ -196,7 +196,7 @@ def stop_engine(
         case Fate.NOT_TAKEN if _runs(engine):
             if isinstance(engine, Announcement):
                 with suppress(EngineError):  # the engine hangs: the stop remains in the folder
-                    return _tell(engine, level, reason)
+                    return _send_stop(engine, level, reason)
             return StopDelivery.KEPT
     with suppress(OSError):
         Path(stop).unlink()
@@ -208,18 +208,18 @@ def _runs(engine: Program) -> bool:
     return engine.is_alive
 
 
-def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
+def _send_stop(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
     with EngineClient.attach(engine.address, patience_s=PATIENCE_S) as client:
         client.stop(level, reason)
         try:
-            if level is StopLevel.HOLD or _until(lambda: _heeds(client), HEEDED_S):
+            if level is StopLevel.HOLD or _until(lambda: _has_obeyed(client), HEEDED_S):
                 return StopDelivery.TOLD
         except EngineSilent:
             return StopDelivery.UNHEEDED
     return StopDelivery.UNHEEDED
 
 
-def _heeds(client: EngineClient) -> bool:
+def _has_obeyed(client: EngineClient) -> bool:
     status = client.status()
     is_silent = status.run is not None and status.run.amplitude_vpp == 0.0
     # Nothing plays before the first run of an engine and between two runs.

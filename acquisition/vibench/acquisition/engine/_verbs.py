@@ -29,7 +29,7 @@ from pydantic import (
 
 from ..campaign import AfterFailure, ChangedBench, ExistingRecordings
 from ..check.admission import CheckRule
-from ..host.toml_file import FrozenModel, validated
+from ..host.toml_file import FrozenModel, validate
 from ..plan import Campaign
 from ..rig import KnobSheet, Rig
 from ..stopping.stop import StopLevel
@@ -100,7 +100,7 @@ class Verb(Generic[A]):
 
     def message(self, **arguments: object) -> Message:
         """Return the message that carries a request."""
-        request = validated(arguments, self.request, f"a request to {self.word}")
+        request = validate(arguments, self.request, f"a request to {self.word}")
         return Message(request.model_dump_json().encode())
 
 
@@ -115,22 +115,22 @@ def verb(
 ) -> Callable[[Callable[Concatenate[Any, P], A]], Callable[Concatenate[Any, P], A]]:
     """Return a decorator that declares a method as a verb; the method then sends the request."""
 
-    def declared(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
+    def declare(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
         parameters = signature(call)
         row = Verb(word, call.__name__, _request(word, call), answer, states, work_s)
         VERBS[word] = row
 
         @wraps(call)
-        def asking(client: Any, /, *args: P.args, **kwargs: P.kwargs) -> A:
+        def send_request(client: Any, /, *args: P.args, **kwargs: P.kwargs) -> A:
             given = parameters.bind(client, *args, **kwargs)
             given.apply_defaults()
             _, *arguments = given.arguments.items()
             answered: A = client.ask(row, dict(arguments))
             return answered
 
-        return asking
+        return send_request
 
-    return declared
+    return declare
 
 
 def _request(word: str, call: Callable[..., object]) -> type[FrozenModel]:
@@ -231,7 +231,7 @@ class EngineVerbs:
         """Note an event at the next sample of the recording."""
 
     @verb("tell_change", DONE, *sorted(DRIVING))
-    def tell_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:
+    def note_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:
         """Report that the specimen has changed; a run with ``on_changed_specimen = "stop"`` ends."""
 
     @verb("rig", RIG)
@@ -240,7 +240,7 @@ class EngineVerbs:
         raise NotImplementedError
 
     @verb("request", REQUESTED)
-    def carried_request(self) -> CampaignRequest:
+    def last_request(self) -> CampaignRequest:
         """Return the last started campaign with its options, for a viewer that did not arm it."""
         raise NotImplementedError
 
@@ -249,7 +249,7 @@ class EngineVerbs:
         """Start or end the live twin."""
 
     @verb("tell_twin", DONE)
-    def tell_twin(self, told: TwinStatus) -> None:
+    def publish_twin(self, told: TwinStatus) -> None:
         """Publish the live twin's report."""
 
     @verb("status", STATUS)
@@ -258,7 +258,7 @@ class EngineVerbs:
         raise NotImplementedError
 
     @verb("beat", DONE)
-    def beat(self, still_s: NonNegativeFloat = 0.0) -> None:
+    def heartbeat(self, still_s: NonNegativeFloat = 0.0) -> None:
         """Report that the viewer is present, and how long its window was blocked (``still_s`` [s])."""
 
     @verb("look", SAMPLES)

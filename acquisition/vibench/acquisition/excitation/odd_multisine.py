@@ -34,7 +34,7 @@ class OddMultisine(PeriodicNoise):
     @model_validator(mode="after")
     def _lines_fit_the_band(self) -> Self:
         odd = [int(line) for line in self.candidates]
-        left_out = self._drawn()
+        left_out = self._detection_lines()
         excited = self.excited_lines or tuple(line for line in odd if line not in left_out)
         strangers = sorted(set(excited) - set(odd))
         if strangers:
@@ -64,7 +64,7 @@ class OddMultisine(PeriodicNoise):
         """The odd harmonics of ``repetition_hz`` that are excited."""
         return np.array(self.excited_lines, dtype=np.int64)
 
-    def _drawn(self) -> set[int]:
+    def _detection_lines(self) -> set[int]:
         random = np.random.Generator(
             np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(DETECTION_KEY,)))
         )

@@ -122,7 +122,7 @@ class LeadIn(FrozenModel):
     amplitude_vpp: AmplitudeVpp
 
 
-def around(frequency_hz: float) -> tuple[float, float]:
+def band_around(frequency_hz: float) -> tuple[float, float]:
     """Return the band assigned to a single sine: from an octave below to an octave above it [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
@@ -274,7 +274,7 @@ class FixedSine(AbstractExcitation):
     @property
     def band_hz(self) -> tuple[float, float]:
         """Band from an octave below the sine to an octave above it [Hz]."""
-        return around(self.frequency_hz)
+        return band_around(self.frequency_hz)
 
     @property
     def highest_frequency_hz(self) -> float:

@@ -71,7 +71,7 @@ class SteppedLevel(FixedSine):
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Yield each pass: its direction, and its levels in the order played [Vpp]."""
-        return self.direction.ways(self.rising_vpp)
+        return self.direction.passes(self.rising_vpp)
 
     def steps(self) -> Iterator[Step]:
         """Yield one step for every level, in the order played."""
@@ -87,7 +87,7 @@ class SteppedLevel(FixedSine):
 
     def _steps(self) -> int:
         # Count without building the list: a typing error in the step could give millions of levels.
-        ways = sum(1 for _ in self.direction.ways(()))
+        ways = sum(1 for _ in self.direction.passes(()))
         return ways * self._count()
 
     def _count(self) -> int:

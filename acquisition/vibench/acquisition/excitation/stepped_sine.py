@@ -9,7 +9,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host.toml_file import FrozenModel
 from ..recording import SegmentLabel
-from .plan import AbstractExcitation, Family, FrequencyHz, around
+from .plan import AbstractExcitation, Family, FrequencyHz, band_around
 from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
@@ -89,7 +89,7 @@ class FrequencySteps(AbstractExcitation):
     def band_hz(self) -> tuple[float, float]:
         """Lowest and highest frequency; for a single frequency, an octave below and above it [Hz]."""
         low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
-        return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
+        return (low_hz, high_hz) if low_hz < high_hz else band_around(high_hz)
 
     @property
     def approach(self) -> Approach:
@@ -108,7 +108,7 @@ class FrequencySteps(AbstractExcitation):
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Yield each pass: its direction, and its frequencies in the order played [Hz]."""
-        return self.direction.ways(self.rising_hz)
+        return self.direction.passes(self.rising_hz)
 
     @property
     def planned_wait_s(self) -> float:

@@ -107,7 +107,7 @@ class Direction(StrEnum):
     UP_THEN_DOWN = "up_then_down"
     DOWN_THEN_UP = "down_then_up"
 
-    def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def passes(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Yield each pass: ``"up"`` or ``"down"``, and the values in the order played.
         ``rising`` lists the values in ascending order.
         """

@@ -409,7 +409,7 @@ def first_day(
     """
     folder = config.absolute().parent
     again = f"start again with --from {in_a_command(config)} and a new name for the configuration"
-    pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed, again)]
+    pages = [*_heading(bench, config, operator), *_wires(bench.rig, confirmed, again)]
     first = bench_report(bench, folder, switch, FIRST_VPP)
     pages += _chapter(f"Noise floor, and a first sine of {1e3 * FIRST_VPP:g} mVpp", first)
     if first.verdict is Verdict.FAIL:
@@ -426,7 +426,7 @@ def in_a_command(path: Path) -> str:
     return f'"{path}"' if " " in str(path) else str(path)
 
 
-def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
+def _heading(bench: Bench, config: Path, operator: str) -> Iterator[str]:
     sheet = bench.confirmations
     yield f"# First day of {bench.rig.name}"
     now = datetime.now(UTC).astimezone()

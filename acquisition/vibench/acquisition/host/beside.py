@@ -46,7 +46,7 @@ class Beside:
     def _run(self) -> None:
         goes_on = True
         while goes_on:
-            with suppress(MemoryError), MEMORY_RESERVE.released_when_short():
+            with suppress(MemoryError), MEMORY_RESERVE.release_when_short():
                 goes_on = self._step()
 
     def _step(self) -> bool:

@@ -10,7 +10,7 @@ from ..errors import ConfigurationError
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
-def chosen(kind: type[Choice], given: Choice | str) -> Choice:
+def member(kind: type[Choice], given: Choice | str) -> Choice:
     """Return the given member, or the member with the given value; raises ConfigurationError if none has it.
 
     >>> from enum import StrEnum

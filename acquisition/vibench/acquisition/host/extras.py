@@ -15,7 +15,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 """Names of the modules that each extra of `pyproject.toml` installs."""
 
 
-def need_extra(extra: str) -> None:
+def require_extra(extra: str) -> None:
     """Require that the libraries of an extra are installed, without importing them.
 
     Raises MissingLibrary when one is not installed. ``extra`` is its name in `pyproject.toml`.
@@ -26,7 +26,7 @@ def need_extra(extra: str) -> None:
             raise _missing(library, extra)
 
 
-def need_space(megabytes: int, advice: str = "") -> None:
+def require_space(megabytes: int, advice: str = "") -> None:
     """Require address space for the libraries and their threads: with too little, they hang or abort.
 
     ``megabytes`` is the space [MB]. Raises ConfigurationError if the process has a lower limit; ``advice`` is

@@ -25,7 +25,7 @@ def printable(text: str) -> str:
     )
 
 
-def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
+def shorten(text: str, longest: int = LONGEST_CLAUSE) -> str:
     """Return the text, with three dots in place of the middle if it is long.
 
     >>> shortened("0123456789", 7)

@@ -43,7 +43,7 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
     return tuple(sorted(shipped_folder(folder).glob(f"*{SUFFIX}")))
 
 
-def named(given: Path | str, folder: str) -> Path:
+def file_path(given: Path | str, folder: str) -> Path:
     """Return the path of a user's file, or of a shipped file given by its bare name such as ``"quick"``.
 
     Raises ConfigurationError, with the names of the shipped files, when a bare name fits neither.

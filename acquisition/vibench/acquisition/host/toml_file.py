@@ -19,7 +19,7 @@ from vibench.sim import (
 from vibench.sim.operating_system.this import replace_file
 
 from ..errors import ConfigurationError
-from .printable import shortened
+from .printable import shorten
 from .schema import FORMAT, VERSION, schema_line
 from .shipped import shipped_folder
 
@@ -44,7 +44,7 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
     """Read the content of a TOML file as ``model``; see `load_toml`."""
     content = migrate(content, model.__name__, str(path))
-    return validated(content, model, str(path), path.absolute().parent)
+    return validate(content, model, str(path), path.absolute().parent)
 
 
 MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
@@ -59,7 +59,7 @@ def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
         raise ConfigurationError(
-            f"{origin}: {FORMAT} = {_shown(written)} cannot be read; this version of vibench reads 1 to "
+            f"{origin}: {FORMAT} = {_text_of(written)} cannot be read; this version of vibench reads 1 to "
             f"{VERSION}: install a later vibench"
         )
     for version in range(written, VERSION):
@@ -68,7 +68,7 @@ def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     return content
 
 
-def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
+def validate(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
     """Validate ``content`` of TOML or JSON as ``model``; paths in it are relative to ``folder``.
 
     Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow it.
@@ -115,7 +115,7 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
     other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
     if len(other) > MOST_CLAUSES:
         other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
-    return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
+    return shorten("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:
@@ -143,7 +143,7 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
     """Return the faults of the type that fits the file's value best."""
     if len(kinds) == 1:
         return (each for each, _ in kinds[0])
-    return (by_keys for _, by_keys in max(kinds, key=_nearness))
+    return (by_keys for _, by_keys in max(kinds, key=_closeness))
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
@@ -166,7 +166,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
     return found
 
 
-def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
+def _closeness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
     """Return how well a value fits a type: a fault inside it or in its size is less bad than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
@@ -185,22 +185,22 @@ def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) ->
 
 
 def _key(detail: Any) -> str:
-    return shortened(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
+    return shorten(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
 
 
 def _complaint(detail: Any) -> str:
-    reason = shortened(fault_in_words(detail))
+    reason = shorten(fault_in_words(detail))
     if not detail["loc"]:
         return reason
     match detail["input"]:
         case dict() | [dict(), *_]:  # the value is too long to show; the reason names the wrong entry
             given = ""
         case value:
-            given = f" = {_shown(value)}"
+            given = f" = {_text_of(value)}"
     return f"{_key(detail)}{given}: {reason[0].lower()}{reason[1:]}"
 
 
-def _shown(value: object) -> str:
+def _text_of(value: object) -> str:
     longest = 60
     # Formatting a whole list of a million numbers would take too long.
     match value:

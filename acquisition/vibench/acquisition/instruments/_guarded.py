@@ -140,7 +140,7 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)
-    return found if is_ours else Guarded(found, promise, f"{name!r} of {kind.value}")
+    return found if is_ours else PlugInGuard(found, promise, f"{name!r} of {kind.value}")
 
 
 _SILENCING = {"stop", "close", "silence"}
@@ -150,7 +150,7 @@ _ADVICE = (
 )
 
 
-class Guarded:
+class PlugInGuard:
     """Wrapper of an instrument or driver that passes on only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
@@ -172,54 +172,54 @@ class Guarded:
         return self._held
 
     def _let_through(self, member: str) -> Any:
-        found = self._tried(member, lambda: getattr(self._held, member))
+        found = self._call_safely(member, lambda: getattr(self._held, member))
         hint = _return_types(self._promise).get(member, Any)
         if not callable(getattr(self._promise, member, None)):
-            return self._as_promised(member, hint, found)
-        return lambda *given, **named: self._as_promised(
-            member, hint, self._tried(member, lambda: found(*map(_bare, given), **named))
+            return self._validate(member, hint, found)
+        return lambda *given, **named: self._validate(
+            member, hint, self._call_safely(member, lambda: found(*map(_bare, given), **named))
         )
 
-    def _tried(self, member: str, attempt: Callable[[], Any]) -> Any:
+    def _call_safely(self, member: str, attempt: Callable[[], Any]) -> Any:
         try:
             return attempt()
         except AcquisitionError:
             raise
         except (Exception, SystemExit) as error:  # a plug-in's code may raise anything
-            raise self._broken(member, f"{type(error).__name__}: {error}") from error
+            raise self._promise_error(member, f"{type(error).__name__}: {error}") from error
 
-    def _as_promised(self, member: str, hint: Any, found: Any) -> Any:
+    def _validate(self, member: str, hint: Any, found: Any) -> Any:
         if hint is type(None):
             return None
         if getattr(hint, "_is_protocol", False):
-            return Guarded(found, hint, self._name)
+            return PlugInGuard(found, hint, self._name)
         try:
-            return _taken(hint, found)
+            return _convert(hint, found)
         except (TypeError, ValueError) as error:
-            raise self._broken(member, f"it returned {error}") from error
+            raise self._promise_error(member, f"it returned {error}") from error
 
-    def _broken(self, member: str, what: str) -> BrokenPromise:
+    def _promise_error(self, member: str, what: str) -> BrokenPromise:
         where = "when called" if member == "__call__" else f"in {member}"
         is_source = member in _SILENCING and self._promise is not Digitizer
         alarm = " THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand." if is_source else ""
         return BrokenPromise(f"the plug-in {self._name} failed {where}: {what}.{alarm} {_ADVICE}")
 
 
-def _taken(hint: Any, value: Any) -> Any:
+def _convert(hint: Any, value: Any) -> Any:
     """Return a value converted to ``hint`` (data classes by field); raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
-        return _taken_part(name, hint, value)
+        return _convert_field(name, hint, value)
     if not isinstance(value, cast("type", hint)):
         raise TypeError(f"{value!r:.80} as {name}")
     taken = {
-        at: _taken_part(f"{name}.{at}", each, getattr(value, at))
+        at: _convert_field(f"{name}.{at}", each, getattr(value, at))
         for at, each in _hints(cast("type", hint)).items()
     }
     return replace(cast("Any", value), **taken)
 
 
-def _taken_part(name: str, hint: Any, value: object) -> Any:
+def _convert_field(name: str, hint: Any, value: object) -> Any:
     try:
         return _adapter(hint).validate_python(value)
     except ValidationError as error:
@@ -249,4 +249,4 @@ def _adapter(hint: Any) -> TypeAdapter[Any]:
 
 def _bare(given: Any) -> Any:
     """Return the instrument without its guard, to be passed to a plug-in."""
-    return given.bare() if isinstance(given, Guarded) else given
+    return given.bare() if isinstance(given, PlugInGuard) else given

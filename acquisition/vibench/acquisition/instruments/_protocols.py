@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from ..errors import InstrumentError
-from ..host.printable import shortened
+from ..host.printable import shorten
 from ..host.toml_file import FrozenModel
 
 Samples = NDArray[np.float64]
@@ -338,7 +338,7 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
         )
     if unknown := {each.channel for each in block.overloads} - set(digitizer.roles):
         raise InstrumentError(
-            f"the converter reports overloads of channels {shortened(repr(sorted(unknown)))}; it has "
+            f"the converter reports overloads of channels {shorten(repr(sorted(unknown)))}; it has "
             f"{', '.join(digitizer.roles)}. Check that no other program changed its task"
         )
     return block

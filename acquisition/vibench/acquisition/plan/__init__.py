@@ -36,13 +36,13 @@ from ..excitation.stepped_sine import FrequencySteps, SteppedSine
 from ..excitation.steps import Approach, Direction, Segment, Step
 from ..excitation.streamed_noise import StreamedNoise
 from ..excitation.white_noise import WhiteNoise
-from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
+from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, distinct_drives, load_campaign
 from ._limits import (
     LimitCheck,
     LimitSide,
     check_amplitude_vpp,
     check_phases,
-    expected_under_check,
+    check_phasors,
     nearest_expected,
     require_within_limits,
     run_check_vpp,
@@ -79,7 +79,7 @@ from ._schedule import (
     known_phases,
     lead_in_s,
     lowest_setting_vpp,
-    measured_s,
+    measuring_s,
     phases,
     ramp,
     require_played,
@@ -152,10 +152,11 @@ __all__ = [
     "base_motion",
     "check_amplitude_vpp",
     "check_phases",
+    "check_phasors",
+    "distinct_drives",
     "drive_source_of",
     "duration_s",
     "excitation_text",
-    "expected_under_check",
     "half_cosine",
     "known_phases",
     "lead_in_s",
@@ -163,11 +164,10 @@ __all__ = [
     "look_s",
     "loop_time_s",
     "lowest_setting_vpp",
-    "measured_s",
+    "measuring_s",
     "nearest_expected",
     "needed_vpp",
     "phases",
-    "played_alike",
     "predicted_loads",
     "present_word",
     "preview_measurement",

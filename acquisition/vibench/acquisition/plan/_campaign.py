@@ -9,9 +9,9 @@ from typing import Any, Self
 from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 
 from ..excitation.kinds import EXCITATION_KINDS, present_word
-from ..host.shipped import named
+from ..host.shipped import file_path
 from ..host.toml_file import FrozenModel, load_toml
-from ._schedule import Measurement, Name, Point, ScanPoint, measured_s
+from ._schedule import Measurement, Name, Point, ScanPoint, measuring_s
 from ._sweep import LONGEST_NAME, Sweep
 
 
@@ -77,8 +77,8 @@ class Campaign(FrozenModel):
                         "[defaults] lists one kind of excitation under its present and its former name; "
                         "put the values into one table"
                     )
-                measurements = [_with_defaults(each, defaults) for each in _listed(rest, "measurements")]
-                sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]
+                measurements = [_with_defaults(each, defaults) for each in _as_list(rest, "measurements")]
+                sweeps = [_fill_sweep(each, defaults) for each in _as_list(rest, "sweeps")]
                 return {**rest, "measurements": measurements, "sweeps": sweeps}
             case _:
                 return content
@@ -129,7 +129,7 @@ class Campaign(FrozenModel):
         """Return all planned recordings: measurements, then sweeps; a scan repeats them at each point."""
         listed = (Point(name, each) for each in self.measurements for name in _names(each))
         alone = (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
-        return tuple(_at(place, each) for place in self._numbered_scan() for each in alone) or alone
+        return tuple(_point_at(place, each) for place in self._numbered_scan() for each in alone) or alone
 
     def _numbered_scan(self) -> tuple[ScanPoint, ...]:
         return tuple(
@@ -161,14 +161,14 @@ class Campaign(FrozenModel):
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
-def _at(place: ScanPoint, point: Point) -> Point:
+def _point_at(place: ScanPoint, point: Point) -> Point:
     """Return a campaign's measurement as it is made at the scan point ``place``."""
     measurement = point.measurement.model_copy(update={"point": place})
     chain = f"{point.chain}-{place.name}" if point.chain else ""
     return Point(f"{point.name}-{place.name}", measurement, chain)
 
 
-def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
+def distinct_drives(points: tuple[Point, ...]) -> tuple[Point, ...]:
     """Return one point for each different drive; its limit checks apply to all points with this drive."""
     first: dict[str, Point] = {}
     for point in points:
@@ -177,7 +177,7 @@ def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
 
 
 def _recorded_s(points: tuple[Point, ...]) -> float:
-    return sum(measured_s(point.measurement) for point in points)
+    return sum(measuring_s(point.measurement) for point in points)
 
 
 def load_campaign(path: Path | str) -> Campaign:
@@ -185,7 +185,7 @@ def load_campaign(path: Path | str) -> Campaign:
 
     Raises ConfigurationError with file, key, given value and allowed values.
     """
-    return load_toml(named(path, "campaigns"), Campaign)
+    return load_toml(file_path(path, "campaigns"), Campaign)
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:
@@ -194,18 +194,18 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
     return tuple(f"{measurement.name}-{number}" for number in range(1, measurement.repeats + 1))
 
 
-def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
+def _as_list(content: Mapping[Any, Any], key: str) -> list[Any]:
     """Return the value of ``key`` as a list; any other type becomes an entry, which validation refuses."""
     given = content.get(key, [])
     return list(given) if isinstance(given, list | tuple) else [given]
 
 
-def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
+def _fill_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
     match sweep:
         case {"measurement": dict(template), **rest}:
             others = [
                 {**_of_kind(defaults, each.get("kind")), **each} if isinstance(each, dict) else each
-                for each in _listed(rest, "excitations")
+                for each in _as_list(rest, "excitations")
             ]
             return {**rest, "measurement": _with_defaults(template, defaults), "excitations": others}
         case _:

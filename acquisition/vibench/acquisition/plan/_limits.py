@@ -419,7 +419,7 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
     )
 
 
-def expected_under_check(
+def check_phasors(
     rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
 ) -> ComplexArray:
     """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
@@ -450,7 +450,7 @@ def nearest_expected(measured: float, expected: ComplexArray) -> float:
     measured
         Acceleration amplitude of the base [m/s2].
     expected
-        Phasors from `expected_under_check`, shape (n,) [m/s2].
+        Phasors from `check_phasors`, shape (n,) [m/s2].
     """
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

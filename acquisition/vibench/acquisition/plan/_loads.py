@@ -128,20 +128,18 @@ class _BroadPlay:
         self._terminal_v = terminal_v
         self._follow = follow
         self._band_hz = band_hz
-        self._touches = self._through(model.transfer, BaseQuantity.P).peak > model.gap_m
+        self._touches = self._load(model.transfer, BaseQuantity.P).peak > model.gap_m
 
     def load(self, quantity: BaseQuantity) -> Load:
         if not self._touches:
-            return self._through(self._model.transfer, quantity)
-        stuck = self._through(self._model.stuck_transfer, quantity)
+            return self._load(self._model.transfer, quantity)
+        stuck = self._load(self._model.stuck_transfer, quantity)
         # Add the effect of a motion p whose amplitude equals the gap, averaged over the band.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
 
-    def _through(
-        self, transfer: Callable[[BaseQuantity, Floats], ComplexArray], quantity: BaseQuantity
-    ) -> Load:
+    def _load(self, transfer: Callable[[BaseQuantity, Floats], ComplexArray], quantity: BaseQuantity) -> Load:
         return self._follow(lambda hz: self._terminal_v * transfer(quantity, hz))
 
 

@@ -135,7 +135,7 @@ class Measurement(FrozenModel):
         if self.until is None:
             return self
         allowed = () if isinstance(self.excitation, AbstractFeedback) else self.excitation.wishes
-        if unknown := [name for name in self.until.wishes if name not in allowed]:
+        if unknown := [name for name in self.until.required_bounds if name not in allowed]:
             known = f"give {' or '.join(allowed)}" if allowed else "leave until out"
             raise ValueError(
                 f"until contains {unknown[0]}, which {self.excitation.kind} does not support; {known}"
@@ -320,7 +320,7 @@ def lead_in_s(measurement: Measurement) -> float:
     return CHECK_S + sum(phase.duration_s for phase in takewhile(leads_in, phases(measurement)))
 
 
-def measured_s(measurement: Measurement) -> float:
+def measuring_s(measurement: Measurement) -> float:
     """Return the longest possible duration of a measurement, including its bench check [s]."""
     return CHECK_S + duration_s(measurement)
 

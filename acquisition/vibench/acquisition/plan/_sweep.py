@@ -206,7 +206,7 @@ class Sweep(FrozenModel):
 
         Raises ValueError when a combination is not a valid measurement; the message names point and key.
         """
-        return tuple(self._led()) if self.continue_from_previous else tuple(self._alone())
+        return tuple(self._chain_points()) if self.continue_from_previous else tuple(self._single_points())
 
     def _passes(self) -> int:
         return sum(2 if way in _TURNING and self.continue_from_previous else 1 for way in self.direction)
@@ -231,7 +231,7 @@ class Sweep(FrozenModel):
             place = dict(zip(ordered, values, strict=True))
             yield _Place(place, {axis: self._word(axis, value) for axis, value in place.items()})
 
-    def _alone(self) -> Iterator[Point]:
+    def _single_points(self) -> Iterator[Point]:
         for place in self._places(self._axes()):
             name = place.name(self.name)
             measurement = _measurement(self._content(name, place.values), name)
@@ -240,7 +240,7 @@ class Sweep(FrozenModel):
                 measurement = measurement.model_copy(update={"excitation": turned})
             yield Point(name, measurement)
 
-    def _led(self) -> Iterator[Point]:
+    def _chain_points(self) -> Iterator[Point]:
         """Yield the points of each chain; earlier points are the lead-in of later ones."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))

@@ -41,12 +41,12 @@ class Until(FrozenModel):
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":
-        if not self.wishes:
+        if not self.required_bounds:
             raise ValueError('until contains no result; give for example response_i = "1 %"')
         return self
 
     @property
-    def wishes(self) -> dict[str, float]:
+    def required_bounds(self) -> dict[str, float]:
         """Required relative bounds by name of the result."""
         return {name: wish for name in WISHES if (wish := getattr(self, name)) is not None}
 

@@ -1,11 +1,11 @@
-from ._disk import DiskTrouble as DiskTrouble, sole_use as sole_use, troubled_disks as troubled_disks
+from ._disk import DiskTrouble as DiskTrouble, sole_use as sole_use, trouble_disks as trouble_disks
 from ._dropouts import (
     DROPOUT_DELAY_S as DROPOUT_DELAY_S,
     BridgedChannel as BridgedChannel,
     Dropout as Dropout,
-    bridged as bridged,
-    found_dropouts as found_dropouts,
-    undecided_from as undecided_from,
+    bridge as bridge,
+    find_dropouts as find_dropouts,
+    first_undecided as first_undecided,
 )
 from ._feedback_note import (
     BranchEnd as BranchEnd,
@@ -15,8 +15,8 @@ from ._feedback_note import (
     DwellNote as DwellNote,
     ExcursionNote as ExcursionNote,
     FeedbackNote as FeedbackNote,
-    Held as Held,
     HeldResponseNote as HeldResponseNote,
+    Hold as Hold,
     JumpNote as JumpNote,
     JumpSearchEnd as JumpSearchEnd,
     JumpSide as JumpSide,
@@ -80,13 +80,13 @@ from ._seal import (
     SealDepth as SealDepth,
     SealKey as SealKey,
     SealState as SealState,
-    closed_on_error as closed_on_error,
+    close_on_error as close_on_error,
     copy_sentence as copy_sentence,
     first_copies as first_copies,
     forget_checks as forget_checks,
     noted_seals as noted_seals,
-    opened as opened,
-    opened_to_look as opened_to_look,
+    open_database as open_database,
+    open_read_only as open_read_only,
     seal_key as seal_key,
 )
 from ._tables import (

@@ -49,13 +49,13 @@ def _names(text: str) -> str:
     return text
 
 
-def _unknown_as_none(value: object) -> object:
+def _none_if_unknown(value: object) -> object:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Unknown = BeforeValidator(_unknown_as_none)
+Unknown = BeforeValidator(_none_if_unknown)
 """Validator that turns NaN, which marks an unknown number in the file, into None."""
 Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
 """Sample rate, from one sample in two weeks to a terahertz [1/s]."""

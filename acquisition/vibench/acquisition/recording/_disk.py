@@ -96,7 +96,7 @@ class DiskTrouble:
             self._delay_s = delay_s
         return self._speed_up
 
-    def meet(self) -> None:
+    def apply(self) -> None:
         """Apply the current fault: wait for a slow disk; raises OSError (ENOSPC) for a full disk."""
         with self._changed:
             # Wait for a slow disk; stop waiting as soon as the fault ends.
@@ -129,17 +129,17 @@ class TroubledDisk:
 
     def write(self, offset: int, data: Buffer) -> None:
         """Write ``data`` at ``offset`` of the file."""
-        self._trouble.meet()
+        self._trouble.apply()
         self._disk.write(offset, data)
 
     def sync(self) -> None:
         """Return when everything written so far would survive a power cut."""
-        self._trouble.meet()
+        self._trouble.apply()
         self._disk.sync()
 
     def reserve(self, offset: int, size: int) -> None:
         """Reserve space at this range of the file."""
-        self._trouble.meet()
+        self._trouble.apply()
         self._disk.reserve(offset, size)
 
     def close(self) -> None:
@@ -152,7 +152,7 @@ _installed: list[DiskTrouble] = []
 
 
 @contextmanager
-def troubled_disks(trouble: DiskTrouble) -> Iterator[None]:
+def trouble_disks(trouble: DiskTrouble) -> Iterator[None]:
     """Apply ``trouble`` to every recording opened in this context."""
     _installed.append(trouble)
     try:
@@ -172,4 +172,4 @@ def open_disk(path: Path) -> Disk:
 def meet_trouble() -> None:
     """Apply the active simulated faults before a whole file is written."""
     for trouble in tuple(_installed):
-        trouble.meet()
+        trouble.apply()

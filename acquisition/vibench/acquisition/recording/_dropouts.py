@@ -66,7 +66,7 @@ class Dropout(NamedTuple):
     """Number of the sample after the last one."""
 
 
-def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
+def find_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
     """Return the drop-outs: jumps away from the motion that later return to it.
 
     Parameters
@@ -80,12 +80,12 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
         return ()
     longest = LONGEST_S * sample_rate_hz
-    found = _held(velocity, longest)
-    velocity = bridged(velocity, tuple(found))
+    found = _hold_dropouts(velocity, longest)
+    velocity = bridge(velocity, tuple(found))
     sharp, usual = _corners(velocity)
     rings, far = sharp > _DETECTED * usual, np.flatnonzero(sharp > _FAR * usual)
 
-    def explained(edges: Places) -> tuple[Dropout, ...]:
+    def explain(edges: Places) -> tuple[Dropout, ...]:
         runs = [
             Dropout(
                 int(run[0]) - _ringing(rings[run[0] :: -1], flank) - 2,
@@ -96,14 +96,14 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         return _explain(velocity, runs, flank, longest) if len(runs) <= _MOST_RUNS else ()
 
     for edges in _apart(far, longest) if far.size else ():
-        together = explained(edges)
+        together = explain(edges)
         for each in [] if together else _apart(edges, flank):
-            together += explained(each)
+            together += explain(each)
         found += together
     return _join(sorted(found), flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
-def _held(velocity: Samples, longest: float) -> list[Dropout]:
+def _hold_dropouts(velocity: Samples, longest: float) -> list[Dropout]:
     """Return drop-outs in which the decoder repeats one value; noise may hide the corners at their edges."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
@@ -127,7 +127,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
     return tuple(joined)
 
 
-def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
+def first_undecided(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
     """Return the sample from which a drop-out may still be undetected; without one, the number of samples.
 
     Parameters
@@ -218,7 +218,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
     return rough if is_far and is_steep else np.inf
 
 
-def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
+def bridge(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     """Return the velocity, shape (samples,), with drop-outs bridged by linear prediction.
 
     The bridge minimises the prediction error of a linear predictor fitted to the samples around the drop-out
@@ -229,12 +229,12 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     velocity
         Velocity, shape (samples,); it is not modified.
     dropouts
-        Drop-outs, as returned by `found_dropouts`.
+        Drop-outs, as returned by `find_dropouts`.
     """
     bridged_velocity, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:
         hidden[each.first : each.stop] = True
-    for first, stop, behind in _together(dropouts, velocity.size):
+    for first, stop, behind in _groups(dropouts, velocity.size):
         near = slice(max(first - _CONTEXT, 0), min(stop + _CONTEXT, behind))
         if np.all(np.isfinite(bridged_velocity[near][~hidden[near]])):
             bridged_velocity[near] = _likeliest(bridged_velocity[near], ~hidden[near])
@@ -242,7 +242,7 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     return bridged_velocity
 
 
-def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
+def _groups(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
     """Yield begin and end of each group of close drop-outs, and the begin of the next group."""
     groups: list[list[Dropout]] = []
     for each in dropouts:
@@ -297,7 +297,7 @@ class BridgedChannel:
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
-        bridged_velocity = bridged(
+        bridged_velocity = bridge(
             self.recording.read(self.role, first, last),
             tuple(Dropout(each.first - first, each.stop - first) for each in dropouts),
         )
@@ -322,7 +322,7 @@ class BridgedChannel:
             return known[self.role, place]
         first, stop = place * block, (place + 1) * block
         begin, end = max(first - margin, 0), min(stop + margin, self.recording.samples)
-        heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
+        heard = find_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
         if end == stop + margin:  # otherwise a growing recording may get more samples here

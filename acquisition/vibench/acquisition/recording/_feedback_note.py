@@ -26,7 +26,7 @@ class Steadiness(StrEnum):
     UNSETTLED = "unsettled"
 
 
-class Held(StrEnum):
+class Hold(StrEnum):
     """Whether the controlled amplitude of the base (or of m0) was within its tolerance."""
 
     WITHIN = "within tolerance"
@@ -104,7 +104,7 @@ class SettledNote(AbstractNote):
     setting_vpp: SixFigures
     base_m_per_s2: SixFigures
     base_u: SixFigures
-    level: Held
+    level: Hold
 
 
 class SegmentNote(AbstractNote):
@@ -117,7 +117,7 @@ class SegmentNote(AbstractNote):
     """Drive frequency in the converter's time [Hz]."""
     base_m_per_s2: SixFigures
     base_u: SixFigures
-    level: Held
+    level: Hold
     response_ii: SixFigures
     motion: Steadiness
     period: int
@@ -150,7 +150,7 @@ class LevelNote(AbstractNote):
     base_m_per_s2: SixFigures
     base_u: SixFigures
     setting_vpp: SixFigures
-    level: Held
+    level: Hold
 
 
 class ExcursionNote(AbstractNote):
@@ -161,7 +161,7 @@ class ExcursionNote(AbstractNote):
     to_hz: SixFigures
     worst: SixFigures
     """Largest relative deviation of the level, with its sign."""
-    level: Held
+    level: Hold
 
 
 class JumpNote(AbstractNote):
@@ -196,7 +196,7 @@ class ResonanceNote(AbstractNote):
     response_ii: SixFigures
     base_m_per_s2: SixFigures
     base_u: SixFigures
-    held: Held
+    held: Hold
     motion: Steadiness
     tries: int
     lock: LockResult
@@ -245,7 +245,7 @@ class HeldResponseNote(AbstractNote):
     base_m_per_s2: SixFigures
     base_u: SixFigures
     setting_vpp: SixFigures
-    level: Held
+    level: Hold
 
 
 class BranchEnd(StrEnum):

@@ -171,11 +171,11 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
             tmp.unlink()
         if isinstance(error, (RecordingError, KeyboardInterrupt)):
             raise
-        raise RecordingError(f"{final} could not be written: {error}. {whereabouts(part, error)}") from error
+        raise RecordingError(f"{final} could not be written: {error}. {location(part, error)}") from error
     return final
 
 
-def whereabouts(part: Path, error: Exception) -> str:
+def location(part: Path, error: Exception) -> str:
     """Return a sentence: where the committed samples are after a disk error, and what to do."""
     try:
         is_there = part.exists()
@@ -267,7 +267,7 @@ def _copy_channel(
 ) -> tuple[str, CountOverview]:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
     digest, sums = hashlib.sha256(), OverviewSums()
-    write_chunks(dataset, sums.summed(_hashed_pieces(source, samples, digest)))
+    write_chunks(dataset, sums.add_pieces(_hashed_pieces(source, samples, digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)

@@ -50,7 +50,7 @@ class OverviewSums:
         self._low: list[Counts] = []
         self._high: list[Counts] = []
 
-    def summed(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
+    def add_pieces(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
         """Yield the pieces unchanged, and add each to the overview."""
         for piece in pieces:
             self.add(piece)

@@ -191,7 +191,7 @@ def samples_id(file: h5py.File, roles: Sequence[str]) -> str:
     return _sha256(" ".join(stated).encode()) if all(stated) else ""
 
 
-class Identified(Protocol):
+class FileIdentity(Protocol):
     """Identifiers by which two files are recognised as the same recording."""
 
     @property
@@ -200,7 +200,7 @@ class Identified(Protocol):
     def samples_id(self) -> str: ...
 
 
-def first_copies(recordings: Sequence[Identified]) -> list[int]:
+def first_copies(recordings: Sequence[FileIdentity]) -> list[int]:
     """Return for each recording the index of the first recording with the same samples or recording_id."""
     seen: dict[str, int] = {}
     firsts = []
@@ -212,7 +212,7 @@ def first_copies(recordings: Sequence[Identified]) -> list[int]:
     return firsts
 
 
-def copy_sentence(kept: Identified, name: str, copy: Identified) -> str:
+def copy_sentence(kept: FileIdentity, name: str, copy: FileIdentity) -> str:
     """Return the text that explains why ``copy`` counts as a duplicate of the recording ``name``."""
     if copy.samples_id and copy.samples_id == kept.samples_id:
         return f"has the same samples as {name}"
@@ -232,7 +232,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         if not checksum and is_of_a_sealing_version(group.file):
             return SealCheck(SealState.DAMAGED, "its seal is gone", "")
         if not checksum:
-            return _unsealed("it was saved before results were sealed", key)
+            return _missing_seal("it was saved before results were sealed", key)
         text = _result_text(group)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         require_reachable(group.file, error)
@@ -355,7 +355,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
             "been changed; restore it from a copy"
         )
         return SealCheck(SealState.SEAL_GONE, sentence, "")
-    return _unsealed("it was made before recordings were sealed", key)
+    return _missing_seal("it was made before recordings were sealed", key)
 
 
 def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[str, str | int | float]:
@@ -364,7 +364,7 @@ def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[
     return dict(zip(names, values, strict=False))
 
 
-def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
+def _missing_seal(excuse: str, key: SealKey | None) -> SealCheck:
     """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
@@ -421,7 +421,7 @@ def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
     """
     noted: dict[str, list[NotedSeal]] = {}
     for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
-        with suppress(sqlite3.Error), closing(opened_to_look(journal)) as connection:
+        with suppress(sqlite3.Error), closing(open_read_only(journal)) as connection:
             for file, *seals in connection.execute(_NOTED):
                 noted.setdefault(file, []).append(NotedSeal(*seals))
     return noted
@@ -443,7 +443,7 @@ def journal_objection(path: Path, seal: str) -> str:
     return ""
 
 
-def opened(uri: str) -> sqlite3.Connection:
+def open_database(uri: str) -> sqlite3.Connection:
     """Open the database at a SQLite ``uri``; transactions must be started and ended explicitly."""
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
@@ -451,7 +451,7 @@ def opened(uri: str) -> sqlite3.Connection:
 
 
 @contextmanager
-def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+def close_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
     """Close a new connection if its first use fails; Windows cannot move or delete an open file.
 
     Raises sqlite3.Error, or any other error of the first use, after closing.
@@ -468,17 +468,17 @@ def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connecti
         raise
 
 
-def opened_to_look(path: Path) -> sqlite3.Connection:
+def open_read_only(path: Path) -> sqlite3.Connection:
     """Open a database read-only, also in a read-only folder."""
     address = path.resolve().as_uri()
     try:
         # If this connection could write, the last connection to close would clean up the database files.
-        with closed_on_error(opened(f"{address}?mode=rw")) as connection:
+        with close_on_error(open_database(f"{address}?mode=rw")) as connection:
             connection.execute("PRAGMA query_only = ON")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()
             return connection
     except sqlite3.OperationalError:
-        return opened(f"{address}?mode=ro")
+        return open_database(f"{address}?mode=ro")
 
 
 # An analysis must read the same samples that were checked, although it reads the file again.

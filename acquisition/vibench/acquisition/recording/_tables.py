@@ -169,7 +169,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     is still open, or whose end is cut off here, is marked incomplete.
     """
     if table is layout.SEGMENTS:
-        return _clipped_segments(columns, n_valid)
+        return _clip_segments(columns, n_valid)
     if table in {layout.OVERLOADS, layout.GAPS}:
         keep = columns["first_sample"] < n_valid
         kept = {name: values[keep] for name, values in columns.items()}
@@ -178,7 +178,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     return columns
 
 
-def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
+def _clip_segments(columns: Columns, n_valid: int) -> Columns:
     first = np.minimum(columns["first_sample"], n_valid)
     last = columns["last_sample"]
     # A power cut may leave a complete segment without its end. Only an empty segment at sample 0 ends at -1.

@@ -25,7 +25,7 @@ from ..instruments import Block, Counts, Samples
 from . import _layout as layout
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer, Journal, Number
 from ._disk import Disk, open_disk
-from ._finalise import discard, finalise, whereabouts
+from ._finalise import discard, finalise, location
 from ._header import ChannelHeader, RecordingHeader
 from ._layout import COUNT_DTYPE, LARGEST_COUNT, RecordingState, encode
 from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
@@ -339,5 +339,5 @@ class RecordingWriter:
         except OSError as error:
             raise RecordingError(
                 f"The end of the recording could not be written: {error}."
-                f" {whereabouts(layout.part_of(self.path), error)}"
+                f" {location(layout.part_of(self.path), error)}"
             ) from error

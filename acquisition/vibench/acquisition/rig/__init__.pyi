@@ -14,8 +14,8 @@ from ._configuration import (
     Rig as Rig,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
-    given_token as given_token,
     highest_carried_hz as highest_carried_hz,
+    token_from_env as token_from_env,
 )
 from ._knobs import (
     CalibrationRule as CalibrationRule,

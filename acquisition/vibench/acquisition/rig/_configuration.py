@@ -39,7 +39,7 @@ TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
 """Environment variable for the token; a command line would be visible to other users."""
 
 
-def given_token() -> str:
+def token_from_env() -> str:
     """Return the token from the environment; empty if no token is set."""
     return os.environ.get(TOKEN_VARIABLE, "")
 
@@ -434,7 +434,7 @@ class Rig(FrozenModel):
         is_scanned = role in SCANNED_ROLES and Role.M0_VELOCITY not in self._roles
         return described.get(role, self.sensors.get(role, self.vibrometer if is_scanned else None))
 
-    def aimed(self, role: Role) -> Self:
+    def with_beam_on(self, role: Role) -> Self:
         """Return the rig with the vibrometer's beam on the mass of ``role``, such as ``m2_velocity``.
 
         Raises ConfigurationError when no channel records the vibrometer or another sensor measures that mass.

@@ -180,7 +180,7 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
     Unattended programs use `confirm_by_sheet`.
     """
     if not sys.stdin.isatty():
-        wanted = "; ".join(_shown(knob) for knob in knobs)
+        wanted = "; ".join(_knob_text(knob) for knob in knobs)
         raise CheckFailed(
             f"these settings are made by hand and must be confirmed: {wanted}. Nothing was energised, "
             "because no one can answer here; confirm them at a terminal (vibench bench check --knobs "
@@ -208,7 +208,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
                 f"{path} was confirmed at {sheet.confirmed:%Y-%m-%d %H:%M %Z}; it is valid for {valid}. "
                 "Nothing was energised; confirm the knobs again"
             )
-        missing = [_shown(knob) for knob in knobs if knob not in sheet.knobs]
+        missing = [_knob_text(knob) for knob in knobs if knob not in sheet.knobs]
         if missing:
             raise CheckFailed(
                 f"{path} does not confirm {'; '.join(missing)}. Nothing was energised; check these "
@@ -243,7 +243,7 @@ def load_knob_sheet(path: Path) -> KnobSheet:
     return load_toml(path, KnobSheet)
 
 
-def _shown(knob: Knob) -> str:
+def _knob_text(knob: Knob) -> str:
     return f"{knob.instrument} {knob.setting} at {knob.value}"
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from ..errors import ConfigurationError
-from ..host.shipped import named
+from ..host.shipped import file_path
 from ..host.toml_file import load_toml
 from ..instruments import (
     AnalogOutput,
@@ -24,7 +24,7 @@ def load_rig(path: Path | str) -> Rig:
 
     Raises ConfigurationError with file, key, given value and allowed values.
     """
-    path = named(path, "hardware_configs")
+    path = file_path(path, "hardware_configs")
     rig = load_toml(path, Rig)
     _require_plug_ins(rig, path)
     if rig.virtual is None or rig.virtual.faults is None:
@@ -69,7 +69,7 @@ def with_faults(rig: Rig, script: Path) -> Rig:
             f"{script}: faults can be scripted only on a virtual rig, and {rig.name!r} is a real one. "
             "Nothing was opened; leave the script out, or give a rig with a [virtual] table"
         )
-    script = named(script, "hardware_configs/faults")
+    script = file_path(script, "hardware_configs/faults")
     scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})
     return rig.model_copy(update={"virtual": scripted})
 

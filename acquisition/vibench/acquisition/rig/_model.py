@@ -100,7 +100,7 @@ class RigModel:
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
         """Return the same quantity as `transfer`, but with m1 fixed to m2 by the stops."""
-        return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck_motion)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
         """Return ``quantity`` per metre of p imposed by the stops, complex, shape of ``frequency_hz``."""
@@ -110,7 +110,7 @@ class RigModel:
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
         """Return complex peaks of ``quantity`` at peak voltages ``terminal_v`` [V], shape of both inputs."""
-        return self._of(quantity, frequency_hz, self._motion(frequency_hz).under(terminal_v, self.gap_m))
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).response(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:
         """Return the peak terminal voltage [V] for a peak table acceleration [m/s2], shape (n,)."""

@@ -78,16 +78,16 @@ class AcquisitionLoop:
         sampled = self.samples
         while sampled < goal:
             yield self._next(min(piece, goal - self.samples))
-            sampled = self._sampled
+            sampled = self._converted
         # Ignore up to half a sample: this is the rounding of the goal and must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
 
     @property
-    def _sampled(self) -> int:
+    def _converted(self) -> int:
         """Number of samples per channel converted so far, read or not."""
         return self.samples + self._digitizer.waiting_samples
 
-    def linger(self, duration_s: float) -> Block:
+    def extend(self, duration_s: float) -> Block:
         """Read and record an additional block, and delay the rest of the plan by its duration."""
         self._due_s += duration_s
         return self._next(round(duration_s * self._digitizer.sample_rate_hz))
@@ -102,7 +102,7 @@ class AcquisitionLoop:
 
     def cut(self) -> None:
         """Let the next duration start now, even if the last one is incomplete and samples are unread."""
-        self._due_s = self._sampled / self._digitizer.sample_rate_hz
+        self._due_s = self._converted / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:
         """Start ``segment`` at the next sample, unless it is open already; end any other segment."""

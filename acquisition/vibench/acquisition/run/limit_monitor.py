@@ -143,7 +143,7 @@ class LimitMonitor:
         if self._change is not None:
             raise self._change
         if block.overloads and self._limits.on_overload is OnOverload.STOP:
-            raise self._overloaded(block, block.overloads[0])
+            raise self._overload_error(block, block.overloads[0])
 
     def note_change(self, text: str, sample: int) -> None:
         """Note a change of the specimen; if the plan requires it, the next block raises LimitExceeded."""
@@ -287,7 +287,7 @@ class LimitMonitor:
             trip,
         )
 
-    def _overloaded(self, block: Block, overload: Overload) -> LimitExceeded:
+    def _overload_error(self, block: Block, overload: Overload) -> LimitExceeded:
         roles = [channel.role.value for channel in self._channels]
         channel = self._channels[roles.index(overload.channel)]
         volts = block.volts[roles.index(overload.channel)]

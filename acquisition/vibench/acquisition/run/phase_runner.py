@@ -31,7 +31,7 @@ CLEAR = 0.3
 """Fraction of the amplitude above which a sample counts as clearly positive or negative."""
 
 
-class Heard(Protocol):
+class Sink(Protocol):
     """Object that receives every block that is read."""
 
     def append(self, block: Block) -> None:
@@ -164,7 +164,7 @@ class _Pace(Enum):
     """The end of the previous phase: no command is due, or commands take no time."""
 
 
-class Stopped(Exception):
+class StopRequested(Exception):
     """Raised when somebody requested the run to end."""
 
     def __init__(self, request: StopRequest) -> None:
@@ -176,7 +176,7 @@ class PhaseRunner:
     """The sampling part of a run: phases, holds, and the ramp of an early end.
 
     After every block the limits and the stop switch are checked. If the run must end, LimitExceeded,
-    RunStalled or `Stopped` is raised, and the run ramps down.
+    RunStalled or `StopRequested` is raised, and the run ramps down.
     """
 
     def __init__(
@@ -247,7 +247,7 @@ class PhaseRunner:
         if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
-    def _drive_checks(self, phase: Phase) -> Heard | None:
+    def _drive_checks(self, phase: Phase) -> Sink | None:
         """Return a consumer of the phase's blocks that checks the drive against the plan, or None."""
         if not self._may_glide(phase):
             return None
@@ -323,10 +323,10 @@ class PhaseRunner:
             )
         return late_s
 
-    def _catch_up(self, into: Heard | None = None) -> Iterator[Progress]:
-        return self._recorded(self.loop.catch_up(), into)
+    def _catch_up(self, into: Sink | None = None) -> Iterator[Progress]:
+        return self._record(self.loop.catch_up(), into)
 
-    def _recorded(self, blocks: Iterable[Block], into: Heard | None = None) -> Iterator[Progress]:
+    def _record(self, blocks: Iterable[Block], into: Sink | None = None) -> Iterator[Progress]:
         for block in blocks:
             if into is not None:
                 into.append(block)
@@ -351,18 +351,18 @@ class PhaseRunner:
         self.loop.cut()
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level), self.loop.time_s):
-                yield from self._recorded(self.loop.pass_time(wait_s))
+                yield from self._record(self.loop.pass_time(wait_s))
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
                     break
         self._drive.cut()
         self.loop.log(EventKind.OFF, "output switched off")
-        yield from self._listened()
+        yield from self._listen()
         self.loop.log(EventKind.SILENCE, f"{level.value}: {self._silence.text()}")
         self._silence.require_silence()
 
-    def _listened(self) -> Iterator[Progress]:
+    def _listen(self) -> Iterator[Progress]:
         """Continue to record until the measured drive is silent, or for `LONGEST_S`.
 
         A drive that is still measured is switched off again, and its amplitude lowered, at growing intervals.
@@ -375,7 +375,7 @@ class PhaseRunner:
         lower_s = self.loop.elapsed_s + wait_s
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
-                self._silence.note_heard()
+                self._silence.note_signal()
                 with suppress(AcquisitionError):  # the measured drive decides, not the result of this call
                     self._drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
@@ -383,27 +383,27 @@ class PhaseRunner:
                 lower_s, wait_s = lower_s + 2 * wait_s, 2 * wait_s
             yield from self._read(LISTEN_S)
 
-    def _read(self, duration_s: float, into: Heard | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
+    def _read(self, duration_s: float, into: Sink | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s, lead_s):
-            yield from self._recorded([block], into)
+            yield from self._record([block], into)
             if self._switch.is_holding and self._look == self._go_on:
-                yield from self._held()
+                yield from self._hold()
 
-    def _held(self) -> Iterator[Progress]:
+    def _hold(self) -> Iterator[Progress]:
         """Hold the run, monitored and recorded, until it is resumed or stopped.
 
         Signals that must be fed with samples cannot be held. The recording has space for `HOLD_LONGEST_S`;
         after that, the run is ramped down.
         """
         if refusal := self.refusal_to_hold():
-            self._stop_held(f"{refusal}: the run was ramped down")
+            self._stop_hold(f"{refusal}: the run was ramped down")
         before = self.state
         self._enter(RunState.HELD)
         while self._switch.is_holding:
             self._held_s += BLOCK_S
             if self._held_s > HOLD_LONGEST_S:
-                self._stop_held(f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording")
-            yield from self._recorded([self.loop.linger(BLOCK_S)])
+                self._stop_hold(f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording")
+            yield from self._record([self.loop.extend(BLOCK_S)])
         self._enter(before)
 
     def refusal_to_hold(self) -> str:
@@ -411,17 +411,17 @@ class PhaseRunner:
         source = self._drive.drive_source.value
         return "" if self._drive.can_hold else f"the present signal of the {source} cannot be held"
 
-    def _stop_held(self, reason: str) -> NoReturn:
+    def _stop_hold(self, reason: str) -> NoReturn:
         """Stop the run, and with it the campaign, because a hold is impossible."""
-        request = StopRequest.by(Cause.OPERATOR, reason)
+        request = StopRequest.of(Cause.OPERATOR, reason)
         self._switch.ask(request)
-        raise Stopped(request)
+        raise StopRequested(request)
 
     def _go_on(self, block: Block) -> None:
         """Raise an exception if the run must end early: a limit, a stall, or a request."""
         self._limit_monitor.require_safe(block)
         if (request := self._switch.request) is not None:
-            raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
+            raise RunStalled(request.reason) if request.cause is Cause.FAULT else StopRequested(request)
 
     def _report_progress(self, block: Block) -> Progress:
         """Write requested events to the recording, and return the progress."""

@@ -15,7 +15,7 @@ from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExcee
 from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Tone
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import chosen
+from ..host.chosen import member
 from ..instruments import Block, FunctionGenerator
 from ..plan import (
     CHECK_S,
@@ -40,7 +40,7 @@ from .acquisition_loop import AcquisitionLoop
 from .drive import Drive, drive_for
 from .ending import Ending, Outcome, Progress
 from .limit_monitor import LimitMonitor
-from .phase_runner import GlideWatch, PhaseRunner, Stopped
+from .phase_runner import GlideWatch, PhaseRunner, StopRequested
 from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figures, require_checkable
 from .until import UntilWatch
 
@@ -215,7 +215,7 @@ class Run(ClosedOnLeaving):
 
         It has no effect on a run that has ended or is in its final ramp.
         """
-        self.switch.ask(StopRequest.by(Cause.OPERATOR, reason))
+        self.switch.ask(StopRequest.of(Cause.OPERATOR, reason))
 
     def close(self) -> None:
         """End the run if needed: ramp down, silence, finish the recording."""
@@ -225,7 +225,7 @@ class Run(ClosedOnLeaving):
         return self._blocks
 
     def _carry_out(self) -> Generator[Progress, None, None]:
-        sink = self._admitted()
+        sink = self._open_writer()
         loop = AcquisitionLoop(self._bench.digitizer, sink, self._guard.advance)
         self._runner = PhaseRunner(
             self._drive,
@@ -239,7 +239,7 @@ class Run(ClosedOnLeaving):
         )
         self.switch.refusal_to_hold = self._runner.refusal_to_hold
         try:
-            yield from self._played_or_stopped(self._runner)
+            yield from self._play_or_stop(self._runner)
         except (GeneratorExit, DriveLate, LimitExceeded, RunStalled):
             raise
         except KeyboardInterrupt:
@@ -260,27 +260,27 @@ class Run(ClosedOnLeaving):
                 if self._until is not None:
                     self._until.close()
 
-    def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
+    def _play_or_stop(self, runner: PhaseRunner) -> Iterator[Progress]:
         """Play the plan; after a stop or an exceeded limit, ramp down as fast as the cause requires."""
         try:
-            yield from self._played(runner)
+            yield from self._play(runner)
             self._ending.is_finished(runner.loop.lost_samples, self._known)
-        except Stopped as stop:
+        except StopRequested as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
-            yield from self._ramped_down_early(runner, stop.request.level)
+            yield from self._ramp_down_early(runner, stop.request.level)
         except (DriveLate, LimitExceeded, RunStalled) as error:
             self._ending.is_failed(error, str(error))
             if isinstance(error, LimitExceeded):
                 runner.loop.log_limit_trip(error)
             cause = Cause.FAULT if isinstance(error, RunStalled) else Cause.LIMIT
-            yield from self._ramped_down_early(runner, LEVELS[cause])
+            yield from self._ramp_down_early(runner, LEVELS[cause])
             raise
         except GeneratorExit:
             self._ending.is_stopped("the calling program abandoned the run", Cause.PROGRAM)
-            deque(self._ramped_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
+            deque(self._ramp_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
-    def _admitted(self) -> RecordingWriter:
+    def _open_writer(self) -> RecordingWriter:
         """Check plan and bench before anything moves; then create the recording and return its writer."""
         self._state = RunState.CHECKING
         try:
@@ -309,7 +309,7 @@ class Run(ClosedOnLeaving):
             self._state = RunState.FAILED
             raise
 
-    def _played(self, runner: PhaseRunner) -> Iterator[Progress]:
+    def _play(self, runner: PhaseRunner) -> Iterator[Progress]:
         loop = runner.loop
         loop.log(EventKind.PLAYER, self._drive.drive_source.value)
         playing: Iterator[Phase] = iter(())
@@ -322,7 +322,7 @@ class Run(ClosedOnLeaving):
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement, self._bench.rig))
-                yield from self._checked(runner)
+                yield from self._run_check(runner)
                 self._drive.announce(announced)
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
@@ -334,13 +334,13 @@ class Run(ClosedOnLeaving):
         if self._controller is None:
             for phase in playing:
                 yield from runner.run_phase(phase)
-                self._note_known(loop)
-            self._note_known(loop)
+                self._log_bounds(loop)
+            self._log_bounds(loop)
         else:
-            yield from _controlled(runner, self._controller)
+            yield from _run_controller(runner, self._controller)
         loop.enter(None)
 
-    def _note_known(self, loop: AcquisitionLoop) -> None:
+    def _log_bounds(self, loop: AcquisitionLoop) -> None:
         """Log the error bounds of each finished result; the reason of the run's end repeats the last."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
@@ -353,7 +353,7 @@ class Run(ClosedOnLeaving):
         self._drive.arm(coming)
         self._bench.digitizer.start()
 
-    def _checked(self, runner: PhaseRunner) -> Iterator[Progress]:
+    def _run_check(self, runner: PhaseRunner) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
         silence, settling, measuring = check_phases(self._measurement, self._bench.rig)
@@ -371,7 +371,7 @@ class Run(ClosedOnLeaving):
         )
         runner.loop.log(EventKind.CHECK, figures.text())
 
-    def _ramped_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
+    def _ramp_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
         return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
@@ -380,7 +380,7 @@ class Run(ClosedOnLeaving):
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
 
-def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
+def _run_controller(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
     """Carry out a controller's actions; the controller receives the samples of each action."""
     try:
         action = next(controller)
@@ -415,7 +415,7 @@ def run_measurement(
     Raises AcquisitionError in the cases listed in `run.Run`; the generator is then silent, and a recording
     that had started is finished as failed.
     """
-    run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
+    run = Run(bench, measurement, path, member(LowLevelCheck, bench_check), create, switch)
     # Signals are handled until the run has ended, so that none interrupts the silencing.
     with stop_on_signal(run.switch, path.stem), run:
         for progress in run:

@@ -15,7 +15,7 @@ from ..errors import AcquisitionError, CheckFailed, InstrumentError
 from ..host.beside import ClosedOnLeaving
 from ..host.log import LOG
 from ..instruments import Block, Samples
-from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
+from ..plan import CHECK_FREQUENCY_HZ, check_phasors, nearest_expected
 from ..rig import Channel, Rig, Role
 from ..stopping.program import Watchdog
 from ..stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
@@ -77,14 +77,14 @@ def check_figures(
     base = _row(channels, Role.BASE_ACCELERATION)
     terminal_v = 0.5 * amplitude_vpp * rig.generator.terminal_factor()
 
-    def measured(volts: Samples, row: int) -> float:
+    def amplitude(volts: Samples, row: int) -> float:
         return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt
 
-    moved = measured(during, base)
-    expected = nearest_expected(moved, expected_under_check(rig, terminal_v))
-    figures = CheckFigures(measured(during, drive), terminal_v, moved, expected)
-    _require_quiet("the drive voltage", measured(quiet, drive), figures.expected_drive_v, "V")
-    _require_quiet("the base acceleration", measured(quiet, base), figures.expected_base_m_per_s2, "m/s2")
+    moved = amplitude(during, base)
+    expected = nearest_expected(moved, check_phasors(rig, terminal_v))
+    figures = CheckFigures(amplitude(during, drive), terminal_v, moved, expected)
+    _require_quiet("the drive voltage", amplitude(quiet, drive), figures.expected_drive_v, "V")
+    _require_quiet("the base acceleration", amplitude(quiet, base), figures.expected_base_m_per_s2, "m/s2")
     _require_drive(figures)
     _require_base(figures)
     return figures
@@ -219,13 +219,13 @@ class SilenceWatch:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
-    def note_heard(self) -> None:
+    def note_signal(self) -> None:
         """Note whether more than hum remains after the output was switched off."""
         self.is_heard |= not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
 
     def require_silence(self) -> None:
         """Raise InstrumentError if more than hum remained after switching off."""
-        self.note_heard()
+        self.note_signal()
         if self.is_heard:
             raise InstrumentError(
                 f"the drive is {self.text()}. It was commanded off and the recording is kept; THE OUTPUT "

@@ -96,7 +96,7 @@ class OutputSynthesizer:
             elif self.level > 0.0:
                 self._fade(RELEASE_S)
             else:
-                self._rest(wanted)
+                self._add_silence(wanted)
 
     def _begin(self, phase: Phase) -> None:
         self._due_s += phase.duration_s
@@ -108,7 +108,7 @@ class OutputSynthesizer:
         self._stretch = _Stretch(self._stretch.play, self._sample, end, self.level, 0.0)
         self._due_s = end / self._rate_hz
 
-    def _rest(self, samples: int) -> None:
+    def _add_silence(self, samples: int) -> None:
         self._stretch = _Stretch(None, self._sample, self._sample + samples, 0.0, 0.0)
         self._due_s = self._stretch.end / self._rate_hz
 
@@ -167,7 +167,7 @@ class StreamDrive:
     @property
     def is_playing(self) -> bool:
         """Whether samples other than zero still have to be played."""
-        return self._is_playing and self._sounds_until > self._played
+        return self._is_playing and self._sounds_until > self._played_samples
 
     def arm(self, coming: Iterable[Phase]) -> None:
         """Write the first samples, which start to play with the digitizer."""
@@ -184,15 +184,15 @@ class StreamDrive:
         """Write in advance while an earlier phase plays; yield reading times until more samples fit."""
         self._is_playing = True
         full_vpp = self._amplitude_vpp * full_level(phase.play)
-        yield from self._listened(phase.duration_s, full_vpp * phase.end_level)
+        yield from self._split_duration(phase.duration_s, full_vpp * phase.end_level)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
         """Play the samples already written, then fade by the device's clock; yield as in `perform`."""
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)
-        yield from self._listened(written_s, self.setting_vpp)
-        yield from self._listened(fade_s, 0.0)
+        yield from self._split_duration(written_s, self.setting_vpp)
+        yield from self._split_duration(fade_s, 0.0)
 
     def cut(self) -> None:
         """Set the output to zero volts at once."""
@@ -212,11 +212,11 @@ class StreamDrive:
             self.cut()
 
     @property
-    def _played(self) -> int:
+    def _played_samples(self) -> int:
         """Number of samples played so far, from the reading time."""
         return round(self._read_s * self._output.sample_rate_hz)
 
-    def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
+    def _split_duration(self, duration_s: float, end_vpp: float) -> Iterator[float]:
         """Yield a duration in parts no longer than a block; write samples in advance after each part."""
         begin_vpp = self.setting_vpp
         parts = ceil(duration_s / BLOCK_S * (1 - _ROUNDING))
@@ -227,7 +227,7 @@ class StreamDrive:
             self._write_ahead()
 
     def _write_ahead(self) -> None:
-        room = self._played + self._output.ahead_samples - self._written
+        room = self._played_samples + self._output.ahead_samples - self._written
         if room > 0:
             self._write(room)
 

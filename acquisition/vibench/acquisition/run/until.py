@@ -105,7 +105,7 @@ class UntilWatch(ClosedOnLeaving):
                     self._begin(FEWEST_REALISATIONS * phase.duration_s)
                 yield phase
                 if is_result:
-                    self._recorded(phase.duration_s)
+                    self._count_time(phase.duration_s)
         self._end()
 
     def _pieces(self, phase: Phase) -> Iterator[Phase]:
@@ -117,7 +117,7 @@ class UntilWatch(ClosedOnLeaving):
             piece_s = min(PIECE_S, left_s)
             yield Phase(phase.state, phase.play, piece_s, phase.segment)
             left_s -= piece_s
-            self._recorded(piece_s)
+            self._count_time(piece_s)
 
     @property
     def _is_reached(self) -> bool:
@@ -126,7 +126,7 @@ class UntilWatch(ClosedOnLeaving):
     def _begin(self, first_s: float) -> None:
         self._stretch += 1
         self._recorded_s, self._due_s = 0.0, first_s
-        wishes = self._until.wishes
+        wishes = self._until.required_bounds
         self._begun = UntilNote(wishes=wishes, longest_s=self._longest_s, stretch=self._stretch)
 
     def _end(self) -> None:
@@ -134,7 +134,7 @@ class UntilWatch(ClosedOnLeaving):
             self.ended.append(progress.model_copy(update={"recorded_s": self._recorded_s}))
             self._begun = None
 
-    def _recorded(self, duration_s: float) -> None:
+    def _count_time(self, duration_s: float) -> None:
         """Count the recorded time, and request an analysis when one is due."""
         self._recorded_s += duration_s
         note, recorded_s = self.progress, self._recorded_s

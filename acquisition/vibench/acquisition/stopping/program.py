@@ -303,7 +303,7 @@ def withdraw(program: Program) -> None:
         _path(program).unlink()
 
 
-class _Reached:
+class _StopTargets:
     """List of what a stop from outside must end in this process: an engine, runs, checks.
 
     The first entry is announced for the whole process until it ends; an engine thus also covers its runs.
@@ -385,7 +385,7 @@ class _Reached:
             press(level, reason)
 
 
-_REACHED = _Reached()
+_REACHED = _StopTargets()
 
 
 @contextmanager
@@ -479,7 +479,7 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
 
     ``vibench stop`` finds the program under the name ``what`` and leaves a stop file in the state folder; it
     works in any thread. Python delivers signals only to the main thread. There, every signal that would end
-    or suspend the program requests a stop (`heeded_signals`). SIGHUP stays ignored if it was ignored before
+    or suspend the program requests a stop (`stop_signals`). SIGHUP stays ignored if it was ignored before
     (nohup), because such a run is meant to continue.
 
     The first signal ramps down and ends the run as stopped: Ctrl-C with the planned ramp, the others faster.
@@ -513,11 +513,11 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
         match len(received):
             case 1:
                 cause = Cause.KEYBOARD if name == "SIGINT" else Cause.TERMINATED
-                switch.ask(StopRequest.by(cause, f"{name}: stopped from the keyboard or by the system"))
+                switch.ask(StopRequest.of(cause, f"{name}: stopped from the keyboard or by the system"))
             case 2:
                 raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, on_signal) for number in heeded_signals()}
+    before = {number: signal.signal(number, on_signal) for number in stop_signals()}
     try:
         yield
     finally:
@@ -531,7 +531,7 @@ def signal_name(number: int) -> str:
     return known.get(number, f"signal {number}")
 
 
-def heeded_signals() -> list[int]:
+def stop_signals() -> list[int]:
     """Return the signals that request a stop during a drive: those that would end or suspend the process.
 
     Signals that the program handles or ignores itself are left out, and so are those in

@@ -81,7 +81,7 @@ class StopRequest:
     reason: str
 
     @classmethod
-    def by(cls, cause: Cause, reason: str) -> "StopRequest":
+    def of(cls, cause: Cause, reason: str) -> "StopRequest":
         """Return a request with the level of its cause."""
         return cls(cause, LEVELS[cause], reason)
 
@@ -139,7 +139,7 @@ class StopSwitch:
         while self._marks:
             yield self._marks.popleft()
 
-    def tell_change(self, text: str) -> None:
+    def note_change(self, text: str) -> None:
         """Report a change of the specimen; it ends a run with ``on_changed_specimen = "stop"``."""
         self._changes.append(text)
 
@@ -218,7 +218,7 @@ class MemoryReserve:
             held.close()
 
     @contextmanager
-    def released_when_short(self) -> Iterator[None]:
+    def release_when_short(self) -> Iterator[None]:
         """Release the reserve on a MemoryError inside the context, and raise the error again."""
         try:
             yield

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 LONGEST_PERIOD = 32
 _TABLE = 2
@@ -26,7 +26,7 @@ _STEADY_SCATTER = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class Points(Labelled):
+class Points(Tabular):
     """Poincaré points of a motion, one per drive period, with their noise, relative to the orbit's size."""
 
     value: Reals

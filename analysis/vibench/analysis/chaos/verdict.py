@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from .period import Points, is_settled, scatter_drifts, shortest_period, slow_share
 from .witnesses import (
     FEWEST,
@@ -176,7 +176,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionVerdict(Labelled):
+class MotionVerdict(Tabular):
     """Kind of a recorded motion, with the reason for this verdict."""
 
     DOCUMENT: ClassVar = (
@@ -246,39 +246,39 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     # A settled motion repeats at the end, however long its transient was. An irregular end or a long period
     # may itself be a transient: a decay into noise rotates about a point.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
-        return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
+        return _no_verdict(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")
 
 
 def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
     evidence = Evidence(drive_hz, len(last.value), last.spread, last.noise_level, is_settled=is_settled(last))
     if not evidence.is_settled:
-        return _undecided(
+        return _no_verdict(
             "the motion still changes: its mean or its scatter drifts; let it settle for longer",
             evidence,
         )
     if last.noise_level > LARGEST_NOISE:
-        return _undecided(
+        return _no_verdict(
             f"noise is {100 * last.noise_level:.0f} % of the orbit, too much to show that the motion "
             "repeats; raise the level or use a finer vibrometer range",
             evidence,
         )
     period = shortest_period(last)
     if (period or math.inf) > _LOW_PERIOD and scatter_drifts(last):
-        return _undecided("the scatter of the points still changes; let the motion settle longer", evidence)
+        return _no_verdict("the scatter of the points still changes; let the motion settle longer", evidence)
     if period is None:
         return _aperiodic(Points(last.value[-MOST_POINTS:], last.noise), evidence, seed)
     if period > 1:
         found = rotation(last.value)
         hum_hz = mains_hz(found, drive_hz, len(last.value))
         if hum_hz is not None and (period > _LOW_PERIOD or last.spread <= _LARGEST_HUM):
-            return _humming(replace(evidence, rotation=found), hum_hz, period)
+            return _hum_verdict(replace(evidence, rotation=found), hum_hz, period)
     every = "drive period" if period == 1 else f"{period} drive periods"
     why = f"the points repeat every {every} to within their noise"
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
 
 
-def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
+def _hum_verdict(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
     """Return the verdict on a motion with mains hum: periodic if the hum is small, otherwise undecided."""
     if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
         why = (
@@ -286,7 +286,7 @@ def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVer
             f"{hum_hz:g} Hz, which is mains hum"
         )
         return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
-    return _undecided(
+    return _no_verdict(
         f"{100 * evidence.spread:.2g} % of the orbit is at {hum_hz:g} Hz, which may be mains hum or motion; "
         "dwell at another frequency",
         evidence,
@@ -294,12 +294,12 @@ def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVer
 
 
 def _too_few(why: str, points: Points, drive_hz: float) -> MotionVerdict:
-    return _undecided(
+    return _no_verdict(
         why, Evidence(drive_hz, len(points.value), np.nan, points.noise_level, is_settled=False)
     )
 
 
-def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
+def _no_verdict(why: str, evidence: Evidence) -> MotionVerdict:
     return MotionVerdict(MotionKind.UNDECIDED, why, evidence)
 
 
@@ -311,7 +311,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     )
     turns = found.turns_per_period * len(points.value)
     if slow_share(points) > SLOW or (is_curve and turns < _FEWEST_TURNS):
-        return _undecided(
+        return _no_verdict(
             f"the motion varies slowly, by {100 * evidence.spread:.2g} % of the orbit, with fewer than "
             f"{_FEWEST_TURNS:g} cycles in the record; record longer",
             evidence,
@@ -319,7 +319,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     if is_curve:
         hum_hz = mains_hz(found, so_far.drive_hz, len(points.value))
         if hum_hz is not None:
-            return _humming(evidence, hum_hz, None)
+            return _hum_verdict(evidence, hum_hz, None)
         why = f"the points move along a closed curve, by {found.turns_per_period:.4f} turns per drive period"
         return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
@@ -329,7 +329,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
                 "noise"
             )
             return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
-        return _undecided(
+        return _no_verdict(
             f"the scatter of the points is {evidence.spread / evidence.noise:.1f} times their noise, but "
             f"{ABOVE_NOISE:g} times are needed; raise the level or use a finer vibrometer range",
             evidence,
@@ -363,7 +363,7 @@ def _verdict(
     evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest, bent_test: SurrogateTest
 ) -> MotionVerdict:
     if not noise_test.is_valid:
-        return _undecided(
+        return _no_verdict(
             f"the spectra of surrogate signals are {100 * noise_test.spectrum_error:.0f} % off, so linear "
             "noise cannot be excluded; record longer",
             evidence,
@@ -371,18 +371,18 @@ def _verdict(
     if not noise_test.rejects_linear_noise:
         return _noisy(evidence, noise_test)
     if not bent_test.rejects_linear_noise:
-        return _undecided(
+        return _no_verdict(
             f"noise after a static nonlinearity also fits the points (p = {bent_test.p:.2f}); record longer",
             evidence,
         )
     if test.is_oversampled:
-        return _undecided(
+        return _no_verdict(
             f"neighbouring points are correlated ({test.neighbour_correlation:.2f}), so the 0-1 test is "
             "not valid; record longer",
             evidence,
         )
     if test.k < CHAOTIC_K:
-        return _undecided(f"0-1 test: {test.k:.2f}, neither regular nor chaotic; record longer", evidence)
+        return _no_verdict(f"0-1 test: {test.k:.2f}, neither regular nor chaotic; record longer", evidence)
     above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
     why = (
         f"settled points, {above}not on a closed curve; the 0-1 test gives {test.k:.3f}, and linear noise "
@@ -394,7 +394,7 @@ def _verdict(
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
     """Return the verdict if linear noise explains the points: periodic if it is small, else undecided."""
     if evidence.spread > SMALL:
-        return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
+        return _no_verdict(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (
         f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit, like linear "
         f"noise (p = {noise_test.p:.2f}), but more than the vibrometer noise"

@@ -15,7 +15,7 @@ from ..errors import NotEnoughData
 from ..live import column_starts, envelope
 from ..overlay.ensemble import CurveDifference, logarithmic_difference
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 
 class CurveOrigin(StrEnum):
@@ -41,7 +41,7 @@ class CurveKind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve(Labelled):
+class Curve(Tabular):
     """One curve; arrays of shape (points,), with ascending frequencies except on branches."""
 
     source: str

@@ -13,15 +13,15 @@ from vibench.sim import OrbitShape, Parameter, phase_resonance_branch
 from vibench.sim.branches import (
     BranchOrigin,
     FoundBranch,
-    balanced_branches,
+    balance_branches,
     growth_time_s,
     least_growth_time_s,
-    shot_branches,
+    shoot_branches,
 )
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..signals.arrays import Reals
-from ..tables import Labelled, columns
+from ..tables import Tabular, columns
 from ._branch_request import BranchMethod, BranchRequest
 
 
@@ -42,7 +42,7 @@ class LineEvent:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchLine(Labelled):
+class BranchLine(Tabular):
     """One branch with n points, in order along the branch."""
 
     OWN_UNITS: ClassVar = {"states": "m, m, m, m s-1, m s-1, m s-1"}
@@ -111,7 +111,7 @@ class BranchLine(Labelled):
         """Time in which a small deviation grows by a factor e; infinite if stable, shape (n,)."""
         return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
-    def along(self, parameter: Parameter) -> Reals:
+    def axis_values(self, parameter: Parameter) -> Reals:
         """Return the values of the varied parameter: frequencies [Hz] or amplitudes [m]."""
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
@@ -170,7 +170,7 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchDiagram(Labelled):
+class BranchDiagram(Tabular):
     """All branches found for one request."""
 
     DOCUMENT: ClassVar = "options=request branches=lines least_growth_time_s elapsed_s"
@@ -258,7 +258,7 @@ class BranchDiagram(Labelled):
         found = []
         for origin in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE):
             for kind, name in ((CurveKind.RESPONSE_I, "response_i"), (CurveKind.RESPONSE_II, "response_ii")):
-                frequency_hz, size = self._strung(name, is_stable=origin is CurveOrigin.STABLE)
+                frequency_hz, size = self._join(name, is_stable=origin is CurveOrigin.STABLE)
                 if frequency_hz.size:
                     unknown = np.full(frequency_hz.shape, np.nan)
                     note = self.cost_sentence
@@ -266,7 +266,7 @@ class BranchDiagram(Labelled):
                     found.append(Curve(source, origin, kind, frequency_hz, size, unknown, note))
         return tuple(found)
 
-    def _strung(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
+    def _join(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
         """Return all stable (or unstable) stretches in one curve, separated by NaN."""
         places: list[Reals] = []
         sizes: list[Reals] = []
@@ -282,20 +282,20 @@ class BranchDiagram(Labelled):
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
     """Compute the branches of a request, and yield them one by one."""
-    where = request.shaken, request.path, request.start, request.stop
+    where = request.chosen_specimen, request.path, request.start, request.stop
     if request.resonance_band_hz is not None:
         found = _resonance(request, request.resonance_band_hz)
     elif request.method is BranchMethod.SHOOTING:
-        found = shot_branches(*where, request.search)
+        found = shoot_branches(*where, request.search)
     else:
-        found = balanced_branches(*where, request.balance_options, request.search)
+        found = balance_branches(*where, request.balance_options, request.search)
     return (line_of(each) for each in found)
 
 
 def _resonance(request: BranchRequest, band_hz: tuple[float, float]) -> Iterator[FoundBranch]:
     began = time.perf_counter()
     levels_m = request.start, request.stop
-    branch = phase_resonance_branch(request.shaken, band_hz, levels_m, request.phase_of)
+    branch = phase_resonance_branch(request.chosen_specimen, band_hz, levels_m, request.phase_of)
     origin, elapsed_s = BranchOrigin.PHASE_RESONANCE, time.perf_counter() - began
     yield FoundBranch(branch, OrbitShape.MIRRORED, 1, origin, has_twin=False, elapsed_s=elapsed_s)
 

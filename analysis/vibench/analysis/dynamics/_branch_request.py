@@ -87,7 +87,7 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
             )
-        law = self.shaken.contact
+        law = self.chosen_specimen.contact
         if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
             raise ValueError(
                 f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the method "
@@ -120,7 +120,7 @@ class BranchRequest(SpecimenChoice):
         low_hz, high_hz = self.resonance_band_hz
         if not low_hz < high_hz:
             raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; swap the two ends")
-        lower, upper = self.shaken.gaps_m
+        lower, upper = self.chosen_specimen.gaps_m
         followed = self.along, self.method, self.time_s
         if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
             raise ValueError(
@@ -152,7 +152,7 @@ class BranchRequest(SpecimenChoice):
     @property
     def balance_options(self) -> BalanceOptions:
         """Options of harmonic balance."""
-        lower, upper = self.shaken.gaps_m
+        lower, upper = self.chosen_specimen.gaps_m
         kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
         most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
         return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)

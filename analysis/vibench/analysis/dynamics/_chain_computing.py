@@ -33,7 +33,7 @@ from ..frequency_response.transmissibility import transmissibility
 from ..overlay.simulated_channels import recorded_base_motion
 from ..recordings.facts import plan_of, require_intact, require_measured_size
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from ._chain_request import ChainDrive, ChainRequest
 
 WAVES = 61
@@ -49,7 +49,7 @@ DECIBELS = 20.0 / math.log(10.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ChainRun(Labelled):
+class ChainRun(Tabular):
     """Results of one chain with one drive; arrays have one value per cell, counted from the base."""
 
     DOCUMENT: ClassVar = (
@@ -92,7 +92,7 @@ class ChainRun(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class ChainAnswer(Labelled):
+class ChainAnswer(Tabular):
     """All results for one request of a chain."""
 
     OWN_UNITS: ClassVar = {"wave_numbers": "rad"}
@@ -223,14 +223,14 @@ def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
                 pass
             case ChainDrive.STEADY:
                 for frequency_hz in request.frequencies_hz:
-                    yield _timed_run(_steady, chain, request, Harmonic(frequency_hz, request.amplitude_m))
+                    yield _time_run(_run_steady, chain, request, Harmonic(frequency_hz, request.amplitude_m))
             case ChainDrive.SWEPT:
                 sweep = LinearSweep(
                     request.start_hz, request.stop_hz, request.duration_s, request.amplitude_m
                 )
-                yield _timed_run(_swept, chain, request, sweep)
+                yield _time_run(_run_sweep, chain, request, sweep)
             case ChainDrive.RECORDED:
-                yield _timed_run(_run_under_recording, chain, request, _base_of(request))
+                yield _time_run(_run_under_recording, chain, request, _base_of(request))
 
 
 def chain_answer(request: ChainRequest) -> ChainAnswer:
@@ -243,7 +243,7 @@ def chain_answer(request: ChainRequest) -> ChainAnswer:
 Driven = TypeVar("Driven", Harmonic, LinearSweep, Sampled)
 
 
-def _timed_run(
+def _time_run(
     run: Callable[[Chain, ChainRequest, Driven], ChainRun], chain: Chain, request: ChainRequest, drive: Driven
 ) -> ChainRun:
     began = time.perf_counter()
@@ -254,7 +254,7 @@ def _timed_run(
     return replace(found, elapsed_s=time.perf_counter() - began)
 
 
-def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
+def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     """Compute the responses in a run from rest, then energies and motion in a continuation of it."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error = np.full(chain.size, math.nan)
@@ -299,7 +299,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     )
 
 
-def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
+def _run_sweep(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
     run = integrate_chain(
         chain, drive, drive.duration_s, request.accuracy,
         sample_rate_hz=_rate_hz(chain, drive.highest_hz, drive.duration_s),
@@ -315,7 +315,7 @@ def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) ->
     rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
     # Sample the response at the times of the base samples, as the estimator requires.
     run = integrate_chain(
-        chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded_rate(rate, chain, duration_s)
+        chain, drive, duration_s, request.accuracy, sample_rate_hz=_require_rate(rate, chain, duration_s)
     )
     if run.outcome is not Outcome.REACHED_END:
         return _bare_run(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
@@ -407,10 +407,10 @@ def _base_of(request: ChainRequest) -> Sampled:
 def _rate_hz(chain: Chain, highest_hz: float, duration_s: float) -> float:
     """Choose a sample rate that resolves the fastest motion and fits into memory."""
     highest_hz = max(highest_hz, float(chain.natural_frequencies_hz[-1]))
-    return _bounded_rate(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
+    return _require_rate(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
 
 
-def _bounded_rate(rate_hz: float, chain: Chain, duration_s: float) -> float:
+def _require_rate(rate_hz: float, chain: Chain, duration_s: float) -> float:
     wanted = rate_hz * duration_s * chain.size * 2.0 * VX
     if wanted > MOST_NUMBERS:
         raise ValueError(

@@ -104,7 +104,7 @@ class ChainRequest(SpecimenChoice):
     def unit(self) -> Chain:
         """Smallest chain that is repeated: the specimen and any `others`."""
         changed = self.model.strip() or None, self.damping_time_s, self.gap_m
-        return Chain((self.shaken, *(each.specimen(*changed) for each in self.others)))
+        return Chain((self.chosen_specimen, *(each.specimen(*changed) for each in self.others)))
 
     def chain(self, cells: int) -> Chain:
         """Build a chain with this number of cells by repeating the unit."""

@@ -46,7 +46,7 @@ def motion_classes(results: MapResults) -> Reals:
     ndarray
         The shape of the grid of varied parameters.
     """
-    motion, period, impacts = (results.shown(name) for name in ("motion", "period", "impact_rate"))
+    motion, period, impacts = (results.map_values(name) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)
     found = np.full(motion.shape, np.nan)
     is_periodic = motion == kinds.index(MotionKind.PERIODIC)
@@ -75,10 +75,10 @@ def map_caption(results: MapResults) -> str:
     plan = results.plan
     sentences = [
         (
-            f"{', '.join((_specimen_words(plan.specimen), *_fixed(plan)))}; {plan.accuracy.value}; motions "
+            f"{', '.join((_specimen_words(plan.specimen), *_consts(plan)))}; {plan.accuracy.value}; motions "
             f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} initial state(s)."
         ),
-        f"{results.computed} of {plan.grid.size} points computed.",
+        f"{results.points} of {plan.grid.size} points computed.",
     ]
     audit = results.audit
     if audit is not None and audit.audited:
@@ -102,7 +102,7 @@ def _specimen_words(specimen: SpecimenTable) -> str:
     return f"Specimen {specimen.name}" + (f" ({', '.join(changed)})" if changed else "")
 
 
-def _fixed(plan: Map) -> list[str]:
+def _consts(plan: Map) -> list[str]:
     """Return the fixed parameters of a map; initial values of zero are left out."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}

@@ -21,7 +21,7 @@ from vibench.sim import (
 ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CONTACT_LAWS.values())])]
 
 
-def _at(field: str, error: ValueError) -> ValidationError:
+def _field_error(field: str, error: ValueError) -> ValidationError:
     """Return a validation error located at one field, so that a form shows it beside the field."""
     kind = PydanticCustomError("value_error", "{said}", {"said": str(error)})
     return ValidationError.from_exception_data(field, [{"type": kind, "loc": (field,), "input": None}])
@@ -51,20 +51,20 @@ class SpecimenChoice(FrozenModel):
             try:
                 found = SpecimenTable.model_validate(load_specimen(self.specimen).model_dump())
             except ValueError as error:
-                raise _at("specimen", error) from error
+                raise _field_error("specimen", error) from error
             object.__setattr__(self, "described", found)
         else:
             object.__setattr__(self, "specimen", found.name)
         try:
-            self.shaken  # noqa: B018 - making it is the check
+            self.chosen_specimen  # noqa: B018 - making it is the check
         except ValueError as error:
             # If the specimen's own law also fails, that error is raised: the chosen law is not the cause.
             self.specimen_under(found.contact)
-            raise _at("model", error) from error
+            raise _field_error("model", error) from error
         return self
 
     @property
-    def shaken(self) -> Specimen:
+    def chosen_specimen(self) -> Specimen:
         """The specimen with the chosen contact law, damping and gap."""
         return self.specimen_under(self.law)
 
@@ -92,6 +92,6 @@ class SpecimenChoice(FrozenModel):
     @property
     def damping_sum_per_s(self) -> float:
         """Rate at which the dampers contract phase-space volume: -tr(M^-1 C)."""
-        found = self.shaken
+        found = self.chosen_specimen
         damping, mass = found.damping_matrix.diagonal(), found.mass_matrix.diagonal()
         return -float((damping / mass).sum())

@@ -12,7 +12,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import Accuracy, Harmonic, LyapunovSpectrum, Parameter, PowerLaw, lyapunov_spectrum
 
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
@@ -80,7 +80,7 @@ class SpectrumRequest(SpecimenChoice):
     @property
     def is_elastic(self) -> bool:
         """Whether the contact dissipates no energy."""
-        law = self.shaken.contact
+        law = self.chosen_specimen.contact
         return isinstance(law, PowerLaw) or law.kind in ELASTIC
 
     @property
@@ -158,7 +158,7 @@ def point_of(
 
 
 @dataclass(frozen=True)
-class ExponentSpectrum(Labelled):
+class ExponentSpectrum(Tabular):
     """Lyapunov exponents at all points of one request."""
 
     DOCUMENT: ClassVar = "options=request points largest_sum_difference elapsed_s"
@@ -195,7 +195,7 @@ class ExponentSpectrum(Labelled):
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
     """Compute and yield the exponents at each value of the varied parameter, in order."""
-    specimen = request.shaken
+    specimen = request.chosen_specimen
     for value in request.values:
         began = time.perf_counter()
         drive = Harmonic(*request.drive(value))

@@ -7,12 +7,12 @@ a mapping of channels. Nothing in a file is ever executed. See docs/exchange.md.
 >>> import numpy as np
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
->>> from vibench.analysis.exchange import opened_source
+>>> from vibench.analysis.exchange import open_source
 >>> with TemporaryDirectory() as folder:
 ...     path = Path(folder) / "bench.csv"
 ...     rows = [(0.0, 0.0), (0.5, 0.2), (1.0, 0.1)]
 ...     np.savetxt(path, rows, delimiter=",", header="time [s],velocity [m/s]", comments="")
-...     with opened_source(path) as source:
+...     with open_source(path) as source:
 ...         for channel in source.channels:
 ...             print(channel.name, channel.label, channel.unit, channel.sample_rate_hz)
 1 time s 2.0

@@ -25,7 +25,7 @@ from ._mapping import (
     ImportMapping as ImportMapping,
 )
 from ._source import (
-    opened_source as opened_source,
+    open_source as open_source,
 )
 from ._source_channel import (
     SourceChannel as SourceChannel,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vibench.acquisition import shortened
+from vibench.acquisition import shorten
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
@@ -376,7 +376,7 @@ class _Scan:
         allowed = (
             _COARSE_SPREAD * self._rounding if self.is_coarse else 2 * _PLACED * interval + self._rounding
         )
-        trouble = self._trouble or _impossible(self._runs, self._samples, span)
+        trouble = self._trouble or _time_fault(self._runs, self._samples, span)
         if not trouble and spread > allowed:
             trouble = (
                 f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis: they "
@@ -393,7 +393,7 @@ class _Scan:
         return TimeAxis(start, interval, uncertainty, rounding, tuple(self._runs), trouble)
 
 
-def _impossible(runs: list[tuple[int, int]], samples: int, span: float) -> str:
+def _time_fault(runs: list[tuple[int, int]], samples: int, span: float) -> str:
     if len(runs) > MOST_RUNS:
         return f"has more than {MOST_RUNS} jumps in its times"
     if span > _LONGEST_PAUSE * samples:
@@ -455,7 +455,7 @@ def restarts(
         if not abs(place - np.rint(place)) <= _PLACED:
             return (), f"has a new start at sample {sample}, {place:.3f} sample intervals after its first one"
         runs.append((sample, round(place)))
-    return tuple(runs), _impossible(runs, samples, runs[-1][1] + samples - runs[-1][0])
+    return tuple(runs), _time_fault(runs, samples, runs[-1][1] + samples - runs[-1][0])
 
 
 _APART = 0.1
@@ -635,7 +635,7 @@ def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping
     unclear = [each for each, mapped in both if "delay_s" not in mapped.model_fields_set]
     for first, each in pairwise(unclear):
         if differing := sorted({*first.shifts} ^ {*each.shifts}):
-            said = ", ".join(f"{name} = {shortened(value)}" for name, value in differing)
+            said = ", ".join(f"{name} = {shorten(value)}" for name, value in differing)
             raise InvalidRequest(
                 f"{path.name} states {said} for {first.name} and {each.name}, which may shift their times; "
                 f"give delay_s of both channels in the mapping{_or_ignore(channels)}"

@@ -35,12 +35,12 @@ from ..signals.arrays import Flags, Reals
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
 from ._mapping import ChannelMapping, ImportMapping
-from ._source import Source, channel_blocks, find_channel, opened_source
+from ._source import Source, channel_blocks, find_channel, open_source
 from ._source_channel import SourceChannel
 
 
 @dataclass(frozen=True)
-class LaidPart:
+class PartSpan:
     """A part of the plan as a range of samples in the file."""
 
     segment: Segment
@@ -50,13 +50,13 @@ class LaidPart:
 
 
 @dataclass(frozen=True)
-class _Planned:
+class _PlannedPart:
     segment: Segment
     settle_s: float
     record_s: float
 
 
-def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
+def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[PartSpan, ...]:
     """Return the plan's parts as sample ranges; parts after the end of the file are left out or cut.
 
     Raises InvalidRequest when there are too many parts, parts overlap, or no part begins inside the file.
@@ -64,7 +64,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
     planned = list(_recorded_steps(mapping.measurement.excitation))
     stretches = _stated_times(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
     parts = [
-        LaidPart(each.segment, round(start_s * sample_rate_hz), round(min(stop_s * sample_rate_hz, FARTHEST)))
+        PartSpan(each.segment, round(start_s * sample_rate_hz), round(min(stop_s * sample_rate_hz, FARTHEST)))
         for each, (start_s, stop_s) in zip(planned, stretches, strict=False)
         if start_s * sample_rate_hz < FARTHEST and round(start_s * sample_rate_hz) < samples
     ]
@@ -76,7 +76,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
     return tuple(parts)
 
 
-def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
+def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_PlannedPart]:
     """Yield the parts of the plan; steps that a run records without interruption are joined."""
     joined = 0
 
@@ -87,10 +87,10 @@ def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_Planned]:
 
     for (segment, _), steps in groupby(excitation.steps(), key=lambda step: (step.segment, part(step))):
         together = list(steps)
-        yield _Planned(segment, together[0].settle_s, sum(each.record_s for each in together))
+        yield _PlannedPart(segment, together[0].settle_s, sum(each.record_s for each in together))
 
 
-def _in_turn(begins_s: float, planned: Sequence[_Planned]) -> Iterator[tuple[float, float]]:
+def _in_turn(begins_s: float, planned: Sequence[_PlannedPart]) -> Iterator[tuple[float, float]]:
     now_s = begins_s
     for each in planned:
         start_s = now_s + each.settle_s
@@ -98,7 +98,7 @@ def _in_turn(begins_s: float, planned: Sequence[_Planned]) -> Iterator[tuple[flo
         yield start_s, now_s
 
 
-def _stated_times(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple[float, float]]:
+def _stated_times(mapping: ImportMapping, planned: Sequence[_PlannedPart]) -> Iterator[tuple[float, float]]:
     parts = mapping.parts
     if len(parts) > len(planned):
         raise InvalidRequest(
@@ -123,7 +123,7 @@ NEAR_FULL_SCALE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
+class _ChannelImport:
     """One channel to import, with its mapping and its source channel."""
 
     mapped: ChannelMapping
@@ -167,11 +167,11 @@ def import_recording(
     RecordingError
         When ``out`` exists or cannot be written. A failed import leaves no file.
     """
-    with opened_source(path) as source:
+    with open_source(path) as source:
         found = [find_channel(source, each.source, path) for each in mapping.channels]
         aligned = align(found, mapping, path)
         samples, rate = aligned.places, aligned.rate_hz
-        wanted = tuple(map(_Wanted, mapping.channels, found, aligned.pieces, aligned.late_s))
+        wanted = tuple(map(_ChannelImport, mapping.channels, found, aligned.pieces, aligned.late_s))
         parts = place_parts(mapping, rate, samples)
         header = RecordingHeader(
             channels=tuple(_header(path.name, source, each) for each in wanted),
@@ -203,7 +203,7 @@ def _require_samples(writer: RecordingWriter, path: Path) -> None:
         raise UnusableData(f"{path.name} has no sample with numbers in all channels; choose other channels")
 
 
-def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
+def _origin(wanted: tuple[_ChannelImport, ...], mapping: ImportMapping, path: Path) -> Origin:
     """Return the origin of the recording; it is simulated if any channel is simulated."""
     origins = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and origins - {mapping.origin}:
@@ -214,7 +214,7 @@ def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> 
     return Origin.SIMULATED if Origin.SIMULATED in {*origins, mapping.origin} else Origin.REAL
 
 
-def _header(name: str, source: Source, each: _Wanted) -> ChannelHeader:
+def _header(name: str, source: Source, each: _ChannelImport) -> ChannelHeader:
     mapped, found = each.mapped, each.source
     quantity, unit = mapped.kind
     try:
@@ -282,7 +282,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
 
 
 def _bench(
-    path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], aligned: Alignment
+    path: Path, mapping: ImportMapping, wanted: Sequence[_ChannelImport], aligned: Alignment
 ) -> dict[str, Any]:
     """Return the known facts of the bench, and facts on the imported file."""
     with path.open("rb") as file:
@@ -310,8 +310,8 @@ def _bench(
 def _write(
     writer: RecordingWriter,
     source: Source,
-    wanted: Sequence[_Wanted],
-    parts: Sequence[LaidPart],
+    wanted: Sequence[_ChannelImport],
+    parts: Sequence[PartSpan],
     samples: int,
     observer: TransferObserver,
 ) -> None:
@@ -338,14 +338,14 @@ def _write(
         writer.end_segment()
 
 
-def _blocks(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Block]:
+def _blocks(values: Reals, first: int, wanted: Sequence[_ChannelImport]) -> Iterator[Block]:
     """Yield blocks without missing values, with marks on samples near full scale."""
     for start, stop in _runs(np.all(np.isfinite(values), axis=0)):
         kept = np.ascontiguousarray(values[:, start:stop])
         yield Block(first + start, kept, tuple(_overloads(kept, first + start, wanted)))
 
 
-def _overloads(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Overload]:
+def _overloads(values: Reals, first: int, wanted: Sequence[_ChannelImport]) -> Iterator[Overload]:
     for row, each in zip(values, wanted, strict=True):
         full_scale = each.mapped.full_scale or each.source.full_scale
         if full_scale is not None:

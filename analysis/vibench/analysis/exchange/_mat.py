@@ -71,7 +71,7 @@ def _look(content: memoryview, order: str, depth: int) -> None:
             case _ if kind == MATRIX:
                 _look(data, order, depth + 1)
             case _ if kind == COMPRESSED:
-                _look(memoryview(_decompressed(data)), order, depth + 1)
+                _look(memoryview(_decompress(data)), order, depth + 1)
             case _:
                 _require_plain(kind)
         padding = 0 if kind == COMPRESSED else -size % TAG_BYTES
@@ -83,7 +83,7 @@ def _require_plain(kind: int) -> None:
         raise ValueError(f"an element of the unknown type {kind}")
 
 
-def _decompressed(data: memoryview) -> bytes:
+def _decompress(data: memoryview) -> bytes:
     unpacking = zlib.decompressobj()
     found = unpacking.decompress(data, LARGEST_BYTES)
     if unpacking.unconsumed_tail:

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vibench.acquisition import shortened
+from vibench.acquisition import shorten
 from vibench.sim.hdf5_files.door import system_error
 
 from ..errors import InvalidRequest, UnusableData
@@ -75,7 +75,7 @@ MOST_CHANNELS = 4096
 
 
 @contextmanager
-def opened_source(path: Path) -> Iterator[Source]:
+def open_source(path: Path) -> Iterator[Source]:
     """Open a file with the reader for its suffix. Nothing in it is ever executed: no pickles, no macros.
 
     Raises InvalidRequest when the file does not exist or has no reader for its suffix; UnusableData when it
@@ -124,7 +124,7 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
             and len({axes[time].moments for time in near if axes[time].unit is not None}) > 1
         ):
             # HDF5 sorts names alphabetically, so their order does not show which times belong to a channel.
-            named = ", ".join(shortened(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
+            named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
             axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
         yield axes[chosen[0]].of(channel) if chosen else channel
@@ -176,8 +176,7 @@ def _readable(path: Path) -> Iterator[None]:
         if reason := system_error(error):
             raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
         raise UnusableData(
-            f"{path.name} is damaged, or has a wrong suffix ({shortened(str(error))}); copy or export "
-            "it again"
+            f"{path.name} is damaged, or has a wrong suffix ({shorten(str(error))}); copy or export it again"
         ) from error
 
 
@@ -194,4 +193,4 @@ def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     named = [each.title for each in source.channels[:CHANNELS_SHOWN]]
     rest = len(source.channels) - len(named)
     held = ", ".join(named) + (f" and {rest} more" if rest else "")
-    raise InvalidRequest(f"{path.name} has {many} {shortened(wanted, NAME_SHOWN)!r}; it has {held}")
+    raise InvalidRequest(f"{path.name} has {many} {shorten(wanted, NAME_SHOWN)!r}; it has {held}")

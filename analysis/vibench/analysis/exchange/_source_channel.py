@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition import shortened
+from vibench.acquisition import shorten
 from vibench.acquisition.recording import Origin
 
 from ..signals.arrays import Reals
@@ -146,8 +146,8 @@ class SourceChannel:
     @property
     def title(self) -> str:
         """Name and label of the channel in messages."""
-        label = f" ({shortened(self.label, NAME_SHOWN)})" if self.label else ""
-        return repr(shortened(self.name, NAME_SHOWN)) + label
+        label = f" ({shorten(self.label, NAME_SHOWN)})" if self.label else ""
+        return repr(shorten(self.name, NAME_SHOWN)) + label
 
     @property
     def are_counts(self) -> bool:

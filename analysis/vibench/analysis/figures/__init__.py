@@ -4,6 +4,6 @@ Each figure has a caption and tables of the plotted numbers. It is saved as PNG,
 data give the same bytes. The colours are distinguishable for colour-blind readers.
 """
 
-from vibench.acquisition import need_extra
+from vibench.acquisition import require_extra
 
-need_extra("figures")
+require_extra("figures")

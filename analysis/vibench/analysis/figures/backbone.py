@@ -43,10 +43,10 @@ def backbone_figure(
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, overlay)
     lost = lost_levels(analysis.facts.feedback)
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         places = figure.subplot_mosaic([["frequency", "backbone"], ["amplitude", "backbone"]])
-        broken = _broken(levels, lost)
+        broken = _interrupt(levels, lost)
         _frequencies(places["frequency"], broken)
         _amplitudes(places["amplitude"], broken, base, simulated_m)
         _backbone(places["backbone"], broken)
@@ -71,7 +71,7 @@ def backbone_figure(
     )
 
 
-def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
+def _interrupt(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
     """Insert NaN at the levels without a resonance, so that lines are interrupted there."""
     nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
     gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
@@ -85,7 +85,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
     """Return amplitudes in a readable unit, the factor from metres to this unit, and its name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
-    scale, unit = style.prefixed(float(np.nanmax(amplitude_m)), "m")
+    scale, unit = style.with_prefix(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
 
 

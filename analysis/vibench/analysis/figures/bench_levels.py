@@ -13,11 +13,11 @@ _UNITS = {"m s-1": "m/s", "m s-2": "m/s²"}
 
 def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
     """Draw the smallest and largest values of every channel over the whole recording."""
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_FRAME_IN + _ROW_IN * len(facts.channels))
         panels = figure.subplots(len(facts.channels), 1, sharex=True, squeeze=False)[:, 0]
         for axes, level in zip(panels, facts.channels, strict=True):
-            factor, unit = style.prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+            factor, unit = style.with_prefix(level.peak, _UNITS.get(level.header.unit, level.header.unit))
             shape = level.envelope
             axes.fill_between(
                 shape.time_s, factor * shape.lower, factor * shape.upper, color=style.MEASURED, linewidth=0.3
@@ -47,5 +47,5 @@ def bench_levels_caption(facts: RecordingFacts) -> str:
 
 
 def _peak(level: ChannelLevel) -> str:
-    factor, unit = style.prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+    factor, unit = style.with_prefix(level.peak, _UNITS.get(level.header.unit, level.header.unit))
     return f"{level.header.role.replace('_', ' ')} {factor * level.peak:.3g} {unit}"

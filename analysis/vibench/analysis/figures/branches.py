@@ -46,7 +46,7 @@ def branches_figure(
     tracked
         Tracked resonances; a branch of phase resonance shows their frequencies in its first panel.
     """
-    with style.styled():
+    with style.figure_style():
         holdable = diagram.holdable
         figure = style.new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
         panels = figure.subplots(2 if holdable is None else 3, 1, sharex=True)
@@ -61,7 +61,7 @@ def branches_figure(
         _events(panels[1], diagram)
         if diagram.request.loop_time_s is not None and holdable is not None:
             _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
-        _across(panels[-1], diagram)
+        _label_x_axis(panels[-1], diagram)
         style.legend_above(figure, list(panels), columns=4)
         figure.align_ylabels()
     return style.DrawnFigure(
@@ -135,7 +135,7 @@ def _growth(
 
 def _place(diagram: BranchDiagram, line: BranchLine) -> Reals:
     scale = 1.0 if diagram.request.along is Parameter.FREQUENCY else 1e6
-    return np.asarray(scale * line.along(diagram.request.along))
+    return np.asarray(scale * line.axis_values(diagram.request.along))
 
 
 def _events(axes: Axes, diagram: BranchDiagram) -> None:
@@ -161,7 +161,7 @@ def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) 
         axes.plot(curve.frequency_hz, curve.magnitude, ".", color=colour, alpha=0.7, label=label)
 
 
-def _across(axes: Axes, diagram: BranchDiagram) -> None:
+def _label_x_axis(axes: Axes, diagram: BranchDiagram) -> None:
     request = diagram.request
     if request.along is Parameter.FREQUENCY:
         axes.set_xlabel("drive frequency [Hz]")

@@ -25,7 +25,7 @@ _NOTHING = 1e-300
 def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
     """Draw waves and transmission; if there are runs, also motion, energies and impacts of the last run."""
     last = found.shown_run
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_WAVES_IN if last is None else _RUNS_IN)
         if last is None:
             waves, across = figure.subplots(2, 1, sharex=True)
@@ -36,7 +36,7 @@ def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
             _map(figure, figure.add_subplot(grid[2, :]), found, last)
             _per_cell(figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1]), last)
         _waves(waves, found)
-        _across(across, found)
+        _draw_cells(across, found)
         style.legend_above(figure, [waves, across], columns=4)
     return style.DrawnFigure(
         name="chain",
@@ -84,7 +84,7 @@ def _waves(axes: Axes, found: ChainAnswer) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _across(axes: Axes, found: ChainAnswer) -> None:
+def _draw_cells(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
     for number, (cells, place, name) in enumerate(found.shown_cells):
         colour = style.LEVELS[number % len(style.LEVELS)]
@@ -101,7 +101,7 @@ def _across(axes: Axes, found: ChainAnswer) -> None:
 
 def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
     largest = float(np.nanmax(np.abs(run.motion_m), initial=0.0))
-    factor, unit = style.prefixed(largest, "m")
+    factor, unit = style.with_prefix(largest, "m")
     edges = np.arange(run.cells + 1) + 0.5
     middle = run.time_s
     half = 0.5 * float(middle[1] - middle[0]) if middle.size > 1 else 0.5
@@ -129,7 +129,7 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
 
 def _per_cell(energies: Axes, impacts: Axes, run: ChainRun) -> None:
     place = np.arange(1, run.cells + 1)
-    factor, unit = style.prefixed(float(np.nanmax(run.energy_j, initial=0.0)), "J")
+    factor, unit = style.with_prefix(float(np.nanmax(run.energy_j, initial=0.0)), "J")
     energy, error = factor * run.energy_j, factor * run.energy_error_j
     energies.errorbar(place, energy, error, fmt="o", color=style.SIMULATED)
     if float(np.nanmin(run.energy_j, initial=math.inf)) > 0.0:

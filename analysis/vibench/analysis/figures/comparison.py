@@ -50,7 +50,7 @@ def comparison_figure(
     if not curves:
         raise InvalidRequest("a figure without curves was requested; choose one or more curves")
     difference = None if pair is None else curve_difference(*pair)
-    with style.styled():
+    with style.figure_style():
         rows = 1 if difference is None else 2
         figure = style.new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
         panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]

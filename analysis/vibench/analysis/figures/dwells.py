@@ -36,7 +36,7 @@ def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
     """Draw one row per level, weak to strong: whole dwell, last periods, spectrum of the analysed window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
     at = model_resonances(specimen_of(rising[0][0].facts.bench))
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_FRAME_IN + _ROW_IN * len(rising))
         panels = figure.subplots(len(rising), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.5))
         for row, (analysis, overlay) in zip(panels, rising, strict=True):
@@ -61,7 +61,7 @@ def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
 
 def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
     found, response = analysis.displacement, analysis.response
-    factor, unit = style.prefixed(float(np.max(np.abs(found.upper))), "m")
+    factor, unit = style.with_prefix(float(np.max(np.abs(found.upper))), "m")
     motion = response.displacement
     stop_s = (motion.samples.size - motion.edge_samples) / motion.sample_rate_hz
     axes.axvspan(stop_s - response.window_s, stop_s, color=style.COLLIDING, zorder=0, label="window analysed")
@@ -80,7 +80,7 @@ def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
 
 def _zoom(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None) -> None:
     time_s, motion = last_periods(response)
-    factor, unit = style.prefixed(float(np.max(np.abs(motion))), "m")
+    factor, unit = style.with_prefix(float(np.max(np.abs(motion))), "m")
     axes.plot(1e3 * time_s, factor * motion, color=style.MEASURED, linewidth=1.2, label="measured")
     if overlay is not None:
         simulated = factor * last_periods(overlay.response)[1]

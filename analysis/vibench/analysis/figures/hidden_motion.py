@@ -20,7 +20,7 @@ _POINTS = 200
 
 def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw p between the stops over the whole analysed part of the recording, and enlarged over a few ms."""
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(4.4)
         whole, zoom = figure.subplots(2, 1)
         _whole(whole, motion)
@@ -90,7 +90,7 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw impulses over time, force over penetration, energy lost at each impact, and measured gaps."""
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(5.2)
         (impulses, force), (energy, gaps) = figure.subplots(2, 2)
         _impulses(impulses, motion)
@@ -115,7 +115,7 @@ def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
 def _impulses(axes: Axes, motion: HiddenMotion) -> None:
     found, free = motion.tracked.collisions, motion.free.impacts
     largest = max([*found.impulses, *free.impulses], default=1.0)
-    factor, unit = style.prefixed(largest, "N s")
+    factor, unit = style.with_prefix(largest, "N s")
     for impacts, mark, color in ((found, ".", style.MEASURED), (free, "x", style.PREDICTED)):
         time_s = (motion.first_sample + impacts.samples) / motion.sample_rate_hz
         axes.plot(time_s, factor * impacts.impulses, mark, color=color, markersize=2.0, rasterized=True)

@@ -13,7 +13,7 @@ _HEIGHT_IN = 3.4
 def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigure:
     """Draw Response II of both sweeps, the jumps, and the bands in which the sweeps differ."""
     found = hysteresis(up.response, down.response, up.jumps, down.jumps)
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         axes = figure.subplots()
         axes.fill_between(

@@ -56,15 +56,15 @@ def map_figure(
     levels
         Levels of recordings, drawn as lines into a map of frequency and amplitude.
     """
-    with style.styled():
-        if len(results.plan.varied) == 1:
+    with style.figure_style():
+        if len(results.plan.varying) == 1:
             figure, title = _diagram(results, diagram), "Motions along one parameter"
         else:
             usual = "duration" if results.plan.is_basin else "response_i"
             figure, title = _map(results, shown or usual, levels), "Map of motions"
     return style.DrawnFigure(
         name="map",
-        title=f"{title}: {', '.join(each.long_name for each in results.plan.varied)}",
+        title=f"{title}: {', '.join(each.long_name for each in results.plan.varying)}",
         caption=map_caption(results),
         figure=figure,
         tables=(motion_table(results.motions),),
@@ -85,7 +85,7 @@ def _map(
     else:
         _draw_classes(panels[0], results)
     for axes, name in zip(panels[1:], quantities, strict=True):
-        mesh = _draw(axes, results, results.shown(name), norm=_scale(name, results.shown(name)))
+        mesh = _draw(axes, results, results.map_values(name), norm=_scale(name, results.map_values(name)))
         figure.colorbar(mesh, ax=axes, label=SHOWN[name])
         for level in levels:
             _draw_level(axes, level, mesh)
@@ -95,7 +95,7 @@ def _map(
 
 
 def _draw(axes: Axes, results: MapResults, values: Reals, **look: Any) -> QuadMesh:
-    first, second = results.plan.varied
+    first, second = results.plan.varying
     (across, _), (up, _) = _axis_edges(results, first), _axis_edges(results, second)
     return axes.pcolormesh(across, up, values, rasterized=True, shading="flat", **look)
 
@@ -107,13 +107,13 @@ def _axis_edges(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
     factor, unit = (
         (1.0, quantity.units)
         if quantity.units == "Hz"
-        else style.prefixed(max(map(abs, edges)), quantity.units)
+        else style.with_prefix(max(map(abs, edges)), quantity.units)
     )
     return factor * edges, f"{quantity.long_name} [{unit.replace('u', 'µ')}]"
 
 
 def _place(axes: Axes, results: MapResults) -> None:
-    first, second = results.plan.varied
+    first, second = results.plan.varying
     for quantity, label, scale in (
         (first, axes.set_xlabel, partial(axes.set_xscale, "log")),
         (second, axes.set_ylabel, partial(style.magnitude_axis, axes)),
@@ -174,7 +174,7 @@ def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
 def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     figure = style.new_figure(2.0 * _STRIP_IN)
     panels = figure.subplots(2, 1, sharex=True)
-    quantity = results.plan.varied[0]
+    quantity = results.plan.varying[0]
     values = np.array(results.plan.axes[-1].values)
     _, label = _axis_edges(results, quantity)
     factor = _axis_edges(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
@@ -182,13 +182,13 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
         colour, text = _UP_AND_DOWN.get(start, (style.LEVELS[index % len(style.LEVELS)], f"from {start}"))
         dots = {"color": colour, "linestyle": "none", "marker": "."}
         panels[0].plot([], [], markersize=5.0, label=text, **dots)
-        panels[0].plot(factor * values, results.shown("response_i", index), markersize=2.0, **dots)
-        sections = MICRO * results.shown("section_p", index)
+        panels[0].plot(factor * values, results.map_values("response_i", index), markersize=2.0, **dots)
+        sections = MICRO * results.map_values("section_p", index)
         places = np.repeat(factor * values[:, None], sections.shape[1], axis=1)
         panels[1].plot(places.reshape(-1), sections.reshape(-1), markersize=0.6, rasterized=True, **dots)
     if diagram is not None:
         for line in diagram.lines:
-            place = factor * line.along(diagram.request.along)
+            place = factor * line.axis_values(diagram.request.along)
             draw_line(panels[0], line, place, line.response_i[:, 0])
             draw_line(panels[1], line, place, _section(line))
     style.magnitude_axis(panels[0])

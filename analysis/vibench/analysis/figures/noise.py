@@ -27,7 +27,7 @@ def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyRespon
     """Draw standard deviations due to noise and distortion, and levels at undriven spectral lines."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_DISTORTION_HEIGHT_IN if has_quiet_lines else _DISTORTION_LOW_HEIGHT_IN)
         panels: list[Axes] = list(figure.subplots(1 + has_quiet_lines, 1, sharex=True, squeeze=False)[:, 0])
         _shares(panels[0], periodic)
@@ -139,12 +139,12 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     view = rising[0].view
     at = model_resonances(specimen_of(rising[0].facts.bench))
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_LEVELS_HEIGHT_IN)
         axes = figure.subplots()
         mark_resonances(axes, at)
         for number, each in enumerate(rising):
-            found = view.shown(each.response.frequency_response)
+            found = view.apply(each.response.frequency_response)
             level = each.response.base_level.rms_acceleration
             label = f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)"
             line, colour = (
@@ -153,7 +153,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
             )
             axes.plot(
                 found.frequency_hz,
-                view.drawn(found.magnitude),
+                view.place(found.magnitude),
                 line,
                 color=colour,
                 linewidth=1.0,
@@ -171,7 +171,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
     columns = {}
     for each in rising:
         columns[f"frequency_hz_{each.facts.name}"] = each.response.frequency_response.frequency_hz
-        columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.frequency_response).magnitude
+        columns[f"magnitude_{each.facts.name}"] = view.apply(each.response.frequency_response).magnitude
     return style.DrawnFigure(
         name="transmission_levels",
         title=f"{view.title} at all noise levels",
@@ -211,17 +211,17 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
     shape = envelope(seen.volts, rate_hz)
     frequency_hz, size = _largest_lines(seen)
     strong = np.flatnonzero(size > _SMALLEST_PART * float(np.max(size)))
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_EXCITATION_HEIGHT_IN)
         signal, spectrum = figure.subplots(1, 2)
-        factor, unit = style.prefixed(seen.peak_v, "V")
+        factor, unit = style.with_prefix(seen.peak_v, "V")
         signal.fill_between(
             shape.time_s, factor * shape.lower, factor * shape.upper, color=style.PREDICTED, linewidth=0.3
         )
         signal.set_xlim(0, float(shape.time_s[-1]))
         signal.set_xlabel("time [s]")
         signal.set_ylabel(f"planned voltage [{unit}]")
-        factor, unit = style.prefixed(float(np.max(size)), "V")
+        factor, unit = style.with_prefix(float(np.max(size)), "V")
         spectrum.plot(frequency_hz, factor * size, color=style.PREDICTED, linewidth=0.8)
         style.frequency_axis(
             spectrum, 0.8 * float(frequency_hz[strong[0]]), 1.25 * float(frequency_hz[strong[-1]])

@@ -21,7 +21,7 @@ def portraits_figure(analyses: Sequence[DwellAnalysis]) -> style.DrawnFigure:
     """Draw m0's velocity over displacement with one point per drive period, one panel for each level."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
     rows = -(-len(rising) // _COLUMNS)
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(0.5 + _PANEL_IN * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(rising)), squeeze=False).ravel()
         for axes, analysis in zip(panels, rising, strict=False):
@@ -55,8 +55,8 @@ def verdict_text(verdict: MotionVerdict) -> str:
 
 def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     section = analysis.motion.section
-    length, unit = style.prefixed(float(np.max(np.abs(section.orbit_displacement_m))), "m")
-    speed, speed_unit = style.prefixed(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
+    length, unit = style.with_prefix(float(np.max(np.abs(section.orbit_displacement_m))), "m")
+    speed, speed_unit = style.with_prefix(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
     rate = analysis.response.displacement.sample_rate_hz
     shown = round(_ORBIT_PERIODS / section.drive_hz * rate)
     orbit = length * section.orbit_displacement_m[-shown:], speed * section.orbit_velocity_m_per_s[-shown:]

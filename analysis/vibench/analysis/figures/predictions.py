@@ -39,7 +39,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         for place, method in enumerate(methods)
     }
     columns = min(2, len(curves))
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(4.6 if len(curves) == 1 else 6.6)
         panels = figure.subplots(-(-len(curves) // columns), columns, squeeze=False, sharex=True, sharey=True)
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
@@ -91,7 +91,7 @@ def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
     request = found.request
     is_frequency = request.along is Parameter.FREQUENCY
     place = found.column("frequency_hz") if is_frequency else 1e6 * found.column("amplitude_m")
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_SPECTRUM_HEIGHT_IN)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         _exponents(upper, place, found)
@@ -167,7 +167,7 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigur
     """
     rows = -(-len(specimens) // _COLUMNS)
     tables = []
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(0.6 + 2.1 * rows)
         panels = figure.subplots(rows, min(_COLUMNS, len(specimens)), squeeze=False).flat
         for axes, named in zip_longest(panels, specimens.items()):

@@ -21,7 +21,7 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
         "node": np.array(scan.nodes),
         **{f"{axis}_m": np.array([getattr(each, f"{axis}_m") for each in points]) for axis in "xyz"},
     }
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         magnitudes, phases = figure.subplots(2, 1, sharex=True)
         for number, shape in enumerate(scan.shapes):
@@ -34,8 +34,8 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
                 "linewidth": 1.0,
             }
             size = np.abs(shape.values)
-            drawn = view.drawn(size)
-            low, high = (view.drawn(each) for each in shape.magnitude_bounds)
+            drawn = view.place(size)
+            low, high = (view.place(each) for each in shape.magnitude_bounds)
             high = np.where(np.isfinite(high), high, drawn)
             magnitudes.errorbar(
                 places, drawn, (drawn - low, high - drawn), label=f"{shape.frequency_hz:.1f} Hz", **look

@@ -53,7 +53,7 @@ def stepped_sine_figure(
 ) -> style.DrawnFigure:
     """Draw Responses I and II over the stepped quantity, with a different marker for each direction."""
     along = look.along(analysis.response)
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
         _responses(first, along, analysis, overlay, RESPONSE_I)

@@ -93,7 +93,7 @@ STYLE: Mapping[Any, Any] = {
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def figure_style() -> Iterator[None]:
     """Apply the style inside a ``with`` block only."""
     with mpl.rc_context(dict(STYLE)):
         yield
@@ -157,7 +157,7 @@ def _plain(value: float, _place: int | None = None) -> str:
     return f"$10^{{{power}}}$" if digits == "1" else f"${digits}\\cdot10^{{{power}}}$"
 
 
-def prefixed(largest: float, unit: str) -> tuple[float, str]:
+def with_prefix(largest: float, unit: str) -> tuple[float, str]:
     """Return a factor that scales ``largest`` to between 1 and 1000, and the unit with its SI prefix."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
@@ -186,22 +186,22 @@ class DrawnFigure:
     @cached_property
     def png(self) -> bytes:
         """The figure as PNG, drawn once."""
-        return self._drawn("png")
+        return self._render("png")
 
     @cached_property
     def svg(self) -> bytes:
         """The figure as SVG, drawn once."""
-        return self._drawn("svg")
+        return self._render("svg")
 
     @cached_property
     def pdf(self) -> bytes:
         """The figure as PDF, drawn once."""
-        return self._drawn("pdf")
+        return self._render("pdf")
 
-    def _drawn(self, kind: str) -> bytes:
+    def _render(self, kind: str) -> bytes:
         target = BytesIO()
         metadata = {"svg": _NO_DATE, "pdf": _NO_PDF_DATE}.get(kind)
-        with styled():
+        with figure_style():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
         # The first drawing computes the layout, which is half of the cost; the next format reuses it.
         self.figure.set_layout_engine("none")

@@ -30,7 +30,7 @@ _HEIGHT_IN = 6.4
 
 def sweep_figure(analysis: SweepAnalysis, overlay: SweepOverlay | None = None) -> style.DrawnFigure:
     """Draw the envelope over time with a frequency axis, and Responses I and II over frequency."""
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
         _envelope(envelope, analysis, overlay)
@@ -52,7 +52,7 @@ def sweep_figure(analysis: SweepAnalysis, overlay: SweepOverlay | None = None) -
 def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None) -> None:
     found = analysis.response
     largest = float(max(np.max(found.upper), -np.min(found.lower)))
-    factor, unit = style.prefixed(largest, "m/s")
+    factor, unit = style.with_prefix(largest, "m/s")
     for number, region in enumerate(analysis.collisions.regions):
         label = "masses collide (measured)" if number == 0 else None
         axes.axvspan(region.start.time_s, region.stop.time_s, color=style.COLLIDING, zorder=0, label=label)
@@ -181,7 +181,7 @@ _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
     """Draw the spectrogram of the velocity, and the displacement at multiples (orders) of the drive."""
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_ORDERS_HEIGHT_IN)
         picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))
         _picture(figure, picture, analysis)
@@ -203,7 +203,7 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
     decibel = 20 * np.log10(np.maximum(found.amplitude / top, 10 ** (-_RANGE_DB / 20)))
     shown = axes.pcolormesh(found.time_s, found.frequency_hz, decibel, cmap="viridis", rasterized=True)
     shown.set_clim(-_RANGE_DB, 0)
-    factor, unit = style.prefixed(top, "m/s")
+    factor, unit = style.with_prefix(top, "m/s")
     figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
     axes.set_xlabel("time of the sweep [s]")
     axes.set_ylabel(f"frequency in the\nvelocity of {analysis.facts.mass} [Hz]")
@@ -215,7 +215,7 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
     for region in analysis.collisions.regions:
         axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     shown = response.harmonics.amplitude
-    factor, unit = style.prefixed(float(shown.max()), "m")
+    factor, unit = style.with_prefix(float(shown.max()), "m")
     for order, colour, line in zip(
         _ORDERS_SHOWN, (style.LEVELS[0], style.MEASURED, *style.LEVELS[1:4]), _ORDER_STYLES, strict=True
     ):

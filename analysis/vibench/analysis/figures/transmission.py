@@ -37,7 +37,7 @@ _BELOW = 0.5
 def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
     """Draw the measured transmission with bounds, phase, coherence, and simulation with its difference."""
     at = model_resonances(specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen)
-    with style.styled():
+    with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)
         rows = 3 if overlay is None else 4
         panels = figure.subplots(
@@ -68,65 +68,65 @@ def _magnitudes(
     axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances
 ) -> None:
     view = analysis.view
-    measured = view.shown(analysis.response.frequency_response)
+    measured = view.apply(analysis.response.frequency_response)
     size = measured.magnitude
     low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
     high = np.minimum(measured.magnitude_upper, size * _LARGEST_BOUND_RATIO)
     mark_resonances(axes, at)
     bounds = f"{100 * measured.settings.confidence:g} % bounds"
     axes.fill_between(
-        measured.frequency_hz, view.drawn(low), view.drawn(high), color=style.BOUNDS, alpha=0.45, label=bounds
+        measured.frequency_hz, view.place(low), view.place(high), color=style.BOUNDS, alpha=0.45, label=bounds
     )
     if overlay is not None:
-        simulated, sines = view.shown(overlay.response.frequency_response), overlay.prediction
+        simulated, sines = view.apply(overlay.response.frequency_response), overlay.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
         linear = np.abs(base_transmissibility(overlay.run.specimen, fine_hz)[:, 0])
-        linear = view.drawn(linear * view.factor(fine_hz))
+        linear = view.place(linear * view.factor(fine_hz))
         axes.plot(fine_hz, linear, **style.LINEAR_CURVE)
         micrometres = 1e6 * float(sines.amplitude_m[0])
-        response_i = view.drawn(sines.response_i * view.factor(sines.frequency_hz))
+        response_i = view.place(sines.response_i * view.factor(sines.frequency_hz))
         label = f"Response I, sines of A0 = {micrometres:.3g} µm"
         axes.plot(sines.frequency_hz, response_i, color=style.PREDICTED, linewidth=0.9, label=label)
         factor = view.factor(simulated.frequency_hz)
         middle = draw_band(
-            axes, simulated.frequency_hz, overlay, TRANSMISSION, lambda values: view.drawn(values * factor)
+            axes, simulated.frequency_hz, overlay, TRANSMISSION, lambda values: view.place(values * factor)
         )
-        curve = view.drawn(simulated.magnitude) if middle is None else middle
+        curve = view.place(simulated.magnitude) if middle is None else middle
         axes.plot(simulated.frequency_hz, curve, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
-    axes.plot(measured.frequency_hz, view.drawn(size), color=style.MEASURED, label="measured", zorder=3)
+    axes.plot(measured.frequency_hz, view.place(size), color=style.MEASURED, label="measured", zorder=3)
     peaks = analysis.response.resonances
     peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
     heights = np.array([each.peak_magnitude for each in peaks])
-    tops, label_found = view.drawn(heights * view.factor(peaks_hz)), "resonances found" if peaks else None
+    tops, label_found = view.place(heights * view.factor(peaks_hz)), "resonances found" if peaks else None
     axes.plot(peaks_hz, tops, "v", color=style.MEASURED, label=label_found, zorder=4)
     if view.scale is MagnitudeScale.LOG:
         style.magnitude_axis(axes)
     seen = size[np.isfinite(size) & (size > 0)]
     if seen.size:
-        axes.set_ylim(bottom=float(view.drawn(np.array([_BELOW * np.min(seen)]))[0]))
+        axes.set_ylim(bottom=float(view.place(np.array([_BELOW * np.min(seen)]))[0]))
     axes.set_ylabel(view.label(analysis.facts.mass))
 
 
 def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances) -> None:
     """Draw the phase from -180 to 180 degrees, with bounds where these are narrower than a full turn."""
     view = analysis.view
-    measured = view.shown(analysis.response.frequency_response)
+    measured = view.apply(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
     axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45)
     if overlay is not None:
-        simulated = view.shown(overlay.response.frequency_response)
-        phase = _unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad))
+        simulated = view.apply(overlay.response.frequency_response)
+        phase = _cut_wrap(simulated.frequency_hz, np.rad2deg(simulated.phase_rad))
         axes.plot(*phase, **style.SIMULATED_CURVE)
     axes.plot(
-        *_unbroken(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=style.MEASURED, linewidth=0.9
+        *_cut_wrap(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=style.MEASURED, linewidth=0.9
     )
     axes.set_ylim(-_HALF_TURN_DEG, _HALF_TURN_DEG)
     axes.set_yticks([-_HALF_TURN_DEG, 0, _HALF_TURN_DEG])
     axes.set_ylabel("phase [°]")
 
 
-def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
+def _cut_wrap(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
     """Return a phase curve interrupted where it wraps, so that no line crosses the panel."""
     wraps = np.flatnonzero(np.abs(np.diff(phase_deg)) > _HALF_TURN_DEG) + 1
     return np.insert(frequency_hz, wraps, frequency_hz[wraps]), np.insert(phase_deg, wraps, np.nan)
@@ -213,18 +213,18 @@ def estimate_sentence(response: NoiseResponse) -> str:
 
 def _tables(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> tuple[Table, ...]:
     view = analysis.view
-    measured = view.shown(analysis.response.frequency_response)
+    measured = view.apply(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
     found = columns(
         measured,
         "frequency_hz magnitude magnitude_lower magnitude_upper magnitude_db=decibel phase_rad "
         "phase_lower_rad phase_upper_rad coherence",
     )
-    found["magnitude_h1"] = view.shown(analysis.response.h1).magnitude
-    found["magnitude_h2"] = view.shown(analysis.response.h2).magnitude
+    found["magnitude_h1"] = view.apply(analysis.response.h1).magnitude
+    found["magnitude_h2"] = view.apply(analysis.response.h2).magnitude
     if overlay is None:
         return (table(name, **found),)
     found |= band_columns(overlay, TRANSMISSION, "transmission")
-    found["magnitude_simulated"] = view.shown(overlay.response.frequency_response).magnitude
+    found["magnitude_simulated"] = view.apply(overlay.response.frequency_response).magnitude
     found |= columns(overlay.difference, "difference_db=decibel difference_standard_errors=standard_errors")
     return table(name, **found), sines_table(name, overlay.prediction)

@@ -94,7 +94,7 @@ class CollisionNumbers:
         return tuple(each.what.value for each in self.determined if each.what in (*_SIDES, Hidden.MEAN_GAP))
 
     @property
-    def contradicted(self) -> tuple[str, ...]:
+    def contradictions(self) -> tuple[str, ...]:
         """Parameters that differ from the described value by more than their bounds' width, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
@@ -112,7 +112,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
     return (found.response_i - lift) / found.response_ii
 
 
-def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
+def track_recordings(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
     The second result is empty. If no recording can be tracked, the first is None and the second the reason.
@@ -122,7 +122,7 @@ def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[Colli
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
         try:
             with open_recording(each.path) as recording:
-                motion = hidden_motion(recording, specimen, *each.within(recording))
+                motion = hidden_motion(recording, specimen, *each.clip(recording))
         except AnalysisError as error:
             why.append(f"{each.name}: {error}")
             continue
@@ -154,7 +154,7 @@ def numbers_from_statistics(
             with open_recording(each.path) as recording:
                 shaker = _fit_shaker(recording, results, specimen)
                 found, distance = statistical_numbers(
-                    recording, specimen, each.within(recording), each.drive_hz, shaker, linear
+                    recording, specimen, each.clip(recording), each.drive_hz, shaker, linear
                 )
         except AnalysisError as error:
             why.setdefault(str(error), []).append(each.name)
@@ -191,7 +191,7 @@ class _Colliding:
     """Relative position, 0 to 1, of the part's centre within the longest segment with this label."""
     drive_hz: float | None = None
 
-    def within(self, recording: Recording) -> tuple[float, float]:
+    def clip(self, recording: Recording) -> tuple[float, float]:
         """Return start and end of the part within the recording [s]."""
         rate = recording.sample_rate_hz
         start_s, stop_s = max(

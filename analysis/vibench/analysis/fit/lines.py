@@ -81,7 +81,7 @@ class Freedom:
 
 
 @dataclass(frozen=True, eq=False)
-class Descended:
+class LineFit:
     """Result of a fit to spectral lines."""
 
     specimen: Specimen
@@ -156,14 +156,14 @@ class Lines:
             ]
         )
 
-    def squared(self, residuals: Reals) -> Reals:
+    def misfit(self, residuals: Reals) -> Reals:
         """Return the sum of squared residuals of magnitude and phase for each line."""
         magnitudes, phases = np.split(residuals[: 2 * self.frequency_hz.size], 2)
         return np.asarray(magnitudes**2 + phases**2)
 
     def students(self, residuals: Reals) -> Reals:
         """Return residuals whose squares follow chi square although the scatter is estimated."""
-        count, squared = 2 * self.frequency_hz.size, self.squared(residuals)
+        count, squared = 2 * self.frequency_hz.size, self.misfit(residuals)
         factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
         return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])
 
@@ -206,13 +206,13 @@ def lines_of(
     )
 
 
-def fit_lines(lines: Lines) -> Descended:
+def fit_lines(lines: Lines) -> LineFit:
     """Fit from the described specimen; if that fails, also from stiffer and softer specimens."""
     usual = Freedom()
-    best = _from(lines, usual, lines.start)
+    best = _fit_from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
         # The starting point may be wrong by a turn of phase: restart from stiffer and softer specimens.
-        others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
+        others = [_fit_from(lines, usual, lines.start + _stiffer_start(lines, scale)) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):
         raise NotEnoughData(
@@ -222,27 +222,27 @@ def fit_lines(lines: Lines) -> Descended:
     return _fit_from_description(lines, usual, best)
 
 
-def fit_lines_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
+def fit_lines_further(lines: Lines, allowed: Freedom, usual: LineFit) -> LineFit:
     """Fit a model with additional parameters, from the previous result and from the description."""
     opened = replace(lines, free=(*lines.free, *allowed.parameters))
     begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
     ways = [(start, further) for start in begun for further in allowed.starts]
-    found = [_from(opened, allowed, np.concatenate([start, further])) for start, further in ways]
+    found = [_fit_from(opened, allowed, np.concatenate([start, further])) for start, further in ways]
     return _fit_from_description(opened, allowed, min(found, key=lambda each: each.cost))
 
 
-def _stiffer(lines: Lines, scale: float) -> Reals:
+def _stiffer_start(lines: Lines, scale: float) -> Reals:
     steps = [np.log(scale) if each in LINEAR[1:] else 0.0 for each in lines.free]
     return np.array([*steps, *np.zeros(lines.start.size - len(lines.free))])
 
 
 @dataclass(frozen=True, eq=False)
-class _Ended:
+class _FitEnd:
     x: Reals
     cost: float
 
 
-def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
+def _fit_from(lines: Lines, allowed: Freedom, start: Reals) -> _FitEnd:
     """Fit by least squares, which converges from a distant start, and then by likelihood."""
     open_ended = np.full(start.size - len(allowed.low), np.inf)
     bounds = (np.concatenate([-open_ended, allowed.low]), np.concatenate([open_ended, allowed.high]))
@@ -255,12 +255,12 @@ def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
 
     near = _descent(plain, start, bounds)
     if lines.is_away(near.x):
-        return _Ended(near.x, np.inf)
+        return _FitEnd(near.x, np.inf)
     left = likely(near.x)
     if left @ left > _HOPELESS * lines.limit * lines.freedom:
-        return _Ended(near.x, 0.5 * float(left @ left))
+        return _FitEnd(near.x, 0.5 * float(left @ left))
     found = _descent(likely, near.x, bounds)
-    return _Ended(found.x, np.inf if lines.is_away(found.x) else float(found.cost))
+    return _FitEnd(found.x, np.inf if lines.is_away(found.x) else float(found.cost))
 
 
 def _descent(
@@ -278,13 +278,13 @@ def _descent(
     )
 
 
-def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
+def _fit_from_description(lines: Lines, allowed: Freedom, found: _FitEnd) -> LineFit:
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
     # The scatter is estimated, so the likelihood is Student's. The variance of its slope is (spread + 2) /
     # spread times its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
-    squared = lines.squared(lines.residuals(found.x, allowed.model))
+    squared = lines.misfit(lines.residuals(found.x, allowed.model))
     slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
     slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]
     wider = lines.correlation[0] * (spread + 2) / spread
@@ -293,7 +293,7 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _Ended) -> Desc
     squares = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
     shares = squares[:, : lines.frequency_hz.size] + squares[:, lines.frequency_hz.size :]
     shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
-    return Descended(
+    return LineFit(
         specimen=lines.specimen(found.x[:count]),
         logarithms=found.x[:count],
         covariance=whole[:count, :count],

@@ -12,7 +12,7 @@ from ..errors import InvalidRequest
 from ..frequency_response.results import FrequencyResponse
 from ..signals.arrays import Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE
-from ..tables import Labelled
+from ..tables import Tabular
 from .lines import Lines, fit_lines, lines_of
 from .parameters import (
     ALSO_FREE,
@@ -31,7 +31,7 @@ CLOCK_RELATIVE_SD = 25e-6
 
 
 @dataclass(frozen=True, eq=False)
-class SpecimenFit(Labelled):
+class SpecimenFit(Tabular):
     """A fitted specimen, or the reason why the model does not fit."""
 
     specimen: Specimen
@@ -57,7 +57,7 @@ class SpecimenFit(Labelled):
         """Whether the model explains the spectral lines."""
         return self.reduced_chi_square <= self.limit
 
-    def drawn(self, rng: np.random.Generator) -> Specimen:
+    def random_specimen(self, rng: np.random.Generator) -> Specimen:
         """Return a random specimen within the fit's uncertainty."""
         logarithms = rng.multivariate_normal([np.log(each.value) for each in self.values], self.covariance)
         drawn = zip((each.parameter for each in self.values), np.exp(logarithms), strict=True)

@@ -145,16 +145,16 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     size = (parameters - parameters[:-1].mean(axis=0)) / (parameters[:-1].std(axis=0) + 1e-12)
     terms = np.column_stack([np.ones(len(size)), size, size**2])
     values = np.vstack([statistics, observed]) / (statistics.std(axis=0) + 1e-12)
-    seen = _far(terms[:-1], values[:-1], terms[-1], values[-1])
+    seen = _distances(terms[:-1], values[:-1], terms[-1], values[-1])
     furthest = np.zeros(2)
     for number in range(len(statistics)):
         others = np.arange(len(statistics)) != number
-        own = _far(terms[:-1][others], values[:-1][others], terms[number], values[number])
+        own = _distances(terms[:-1][others], values[:-1][others], terms[number], values[number])
         furthest = np.maximum(furthest, own)
     return float(np.sqrt(np.max(seen / furthest)))
 
 
-def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
+def _distances(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
     """Return two squared distances of a run from other runs: along their components and outside of them.
 
     ``own_terms`` and ``own_values`` belong to this run, with shapes (terms,) and (statistics,).
@@ -316,7 +316,7 @@ def statistical_numbers(
     if not np.isfinite(specimen.gaps_m).all():
         raise InvalidRequest("the specimen has a stop on one side only; a fit to statistics needs two stops")
     draws = stretch_draws(recording, specimen, start, stop, fitted)
-    measured = draws.measured
+    measured = draws.recorded_motion
     if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
         raise NotEnoughData(
             f"{measured.shape[1] / rate_hz:.3g} s of this motion at {rate_hz:g} samples/s are too little for "
@@ -355,7 +355,7 @@ class _Runs:
             return np.array(list(pool.map(self._one, parameters, seeds)))
 
     def _one(self, logarithms: Reals, rng: np.random.Generator) -> Reals:
-        specimen = self.specimen if self.linear is None else self.linear.drawn(rng)
+        specimen = self.specimen if self.linear is None else self.linear.random_specimen(rng)
         motion = self.draws.draw(_specimen_of(specimen, logarithms), rng)
         return chaos_statistics(motion, self.draws.recording.sample_rate_hz, self.drive_hz)[self.heard]
 

@@ -11,7 +11,7 @@ import numpy as np
 from vibench.sim import Specimen
 
 from ..signals.arrays import Complexes, Reals
-from .lines import Descended, Freedom, Lines, fit_lines_further, loaded_response, own_response
+from .lines import Freedom, LineFit, Lines, fit_lines_further, loaded_response, own_response
 from .parameters import DAMPERS, MASSES, SHOWN, Parameter, parameter_value
 
 TOLD_APART = 2.0 * float(np.log(20.0))
@@ -64,7 +64,7 @@ class Suspect:
         return self.behind < TOLD_APART
 
 
-def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
+def suspects(lines: Lines, usual: LineFit, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
     """Fit without each assumption in turn; return them ranked by likelihood and number of parameters.
 
     Parameters
@@ -77,7 +77,7 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
         Whether realisations scatter more than noise; None if unknown.
     """
     tried = []
-    for assumption, allowed, describe in _ways(lines, is_nonlinear=is_nonlinear):
+    for assumption, allowed, describe in _assumptions(lines, is_nonlinear=is_nonlinear):
         found = fit_lines_further(lines, allowed, usual)
         parameters = len(allowed.parameters) + len(allowed.low)
         freedom = lines.freedom - parameters
@@ -107,20 +107,20 @@ _Told = Callable[[Specimen, Reals], str]
 """Function that describes the fitted change; an empty text if the change is impossible."""
 
 
-def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
+def _assumptions(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
     for each in MASSES:
         if each not in lines.free:
-            yield Assumption(each.value[:2]), Freedom((each,)), _otherwise(lines.nominal, each)
+            yield Assumption(each.value[:2]), Freedom((each,)), _value_text(lines.nominal, each)
     for each in DAMPERS:
         if each in lines.free:
             continue
         link = each.value[:2]
         if is_nonlinear is not True:
-            yield Assumption(link), Freedom((each,)), _otherwise(lines.nominal, each)
+            yield Assumption(link), Freedom((each,)), _value_text(lines.nominal, each)
         if is_nonlinear is not False:
-            yield Assumption.FRICTION, Freedom((each,)), _rubs(lines.nominal, each)
+            yield Assumption.FRICTION, Freedom((each,)), _friction_text(lines.nominal, each)
     if not lines.scale_sd:
-        yield Assumption.SENSITIVITY, Freedom((), _response, ((0.0,),), (-1.0,), (1.0,)), _off
+        yield Assumption.SENSITIVITY, Freedom((), _response, ((0.0,),), (-1.0,), (1.0,)), _gain_text
     top_hz = float(lines.frequency_hz.max())
     starts = (float(np.log(1.3 * top_hz)), float(np.log(2.5 * top_hz)))
     low_hz = float(lines.frequency_hz.min())
@@ -149,7 +149,7 @@ def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumpti
     )
 
 
-def _otherwise(nominal: Specimen, parameter: Parameter) -> _Told:
+def _value_text(nominal: Specimen, parameter: Parameter) -> _Told:
     name, factor, unit = SHOWN[parameter]
     was = parameter_value(nominal, parameter)
 
@@ -161,7 +161,7 @@ def _otherwise(nominal: Specimen, parameter: Parameter) -> _Told:
     return describe
 
 
-def _rubs(nominal: Specimen, damper: Parameter) -> _Told:
+def _friction_text(nominal: Specimen, damper: Parameter) -> _Told:
     link, was = damper.value[1], parameter_value(nominal, damper)
 
     def describe(specimen: Specimen, _: Reals) -> str:
@@ -175,7 +175,7 @@ def _response(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Comple
     return np.asarray(np.exp(further[0]) * own_response(specimen, frequency_hz, further))
 
 
-def _off(_: Specimen, further: Reals) -> str:
+def _gain_text(_: Specimen, further: Reals) -> str:
     return (
         f"a ratio of vibrometer and accelerometer sensitivity that is {100 * np.expm1(further[0]):+.3g} % "
         "off (a transmission does not show which of the two is wrong)"

@@ -20,9 +20,9 @@ from ..overlay.shaker_fit import fit_shaker
 from ..recordings.channels import RecordedChannels
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
-from ..tables import Labelled, columns, plain, plus_minus
+from ..tables import Tabular, columns, plain, plus_minus
 from ..uncertainty.budget import stated_uncertainties
-from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
+from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, track_recordings
 from .gap_fit import bracketed_gap, fit_gap
 from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
 from .specimen_fit import SpecimenFit, fit_specimen, not_linear
@@ -71,7 +71,7 @@ class TableFit:
         return f"Fitted mass of the moving table = ({mass}) g; described: {1e3 * self.described_kg:.4g} g."
 
 
-def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
+def fit_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
     """Fit the shaker to weak noise and compare its mass with the bench; None without a described shaker.
 
     The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when no
@@ -91,7 +91,7 @@ _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
 
 @dataclass(frozen=True, eq=False)
-class UpdatedSpecimen(Labelled):
+class UpdatedSpecimen(Tabular):
     """A specimen fitted to recordings, with the values that stayed undetermined and the misfits."""
 
     specimen: Specimen
@@ -110,7 +110,7 @@ class UpdatedSpecimen(Labelled):
     """Specimen as described by the bench configuration."""
 
     @property
-    def fitted(self) -> bool:
+    def is_fitted(self) -> bool:
         """Whether at least one parameter was fitted."""
         return bool(self.values) or self.collisions is not None
 
@@ -131,7 +131,7 @@ class UpdatedSpecimen(Labelled):
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
-    def checked(self, results: CampaignResults) -> "UpdatedSpecimen":
+    def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
         """Return the fit; remove its values if its overlay in ``results`` disagrees with the fitted noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
@@ -251,9 +251,9 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
 
 
 def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ...]:
-    if found is None or not found.contradicted:
+    if found is None or not found.contradictions:
         return ()
-    sentence = " and ".join(found.contradicted)
+    sentence = " and ".join(found.contradictions)
     return (Suspect(Assumption.GAPS, sentence, found.misfit, mends=True, behind=0.0),)
 
 
@@ -314,7 +314,7 @@ def update_model(
         reasons.append("Gaps and contacts stay as described: the linear model does not fit.")
     else:
         updated = _with_gaps(updated, results, reasons, observer)
-        if not updated.fitted and updated.fits:
+        if not updated.is_fitted and updated.fits:
             raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(reasons)}")
     return replace(updated, not_determined=tuple(reasons))
 
@@ -348,7 +348,7 @@ def _linear(
 
 def _table(weakest: NoiseResult, linear: SpecimenFit, reasons: list[str]) -> TableFit | None:
     try:
-        return fitted_table(weakest.analysis, linear.specimen)
+        return fit_table(weakest.analysis, linear.specimen)
     except AnalysisError as error:
         reasons.append(f"The mass of the table stays as described: {error}.")
         return None
@@ -358,7 +358,7 @@ def _with_gaps(
     updated: UpdatedSpecimen, results: CampaignResults, reasons: list[str], observer: Observer
 ) -> UpdatedSpecimen:
     """Add the gaps from tracking, else from statistics, else the smaller gap from the onset of collisions."""
-    found, why = tracked_numbers(results, updated.specimen)
+    found, why = track_recordings(results, updated.specimen)
     if found is None:
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
         both = f"{why}; by statistics: {why_not}" if why_not else why

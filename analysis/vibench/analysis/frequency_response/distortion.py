@@ -7,12 +7,12 @@ import numpy as np
 from scipy.special import digamma, polygamma
 
 from ..signals.arrays import Flags, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from .periodic import DetectionLines, Drift, PeriodicFrequencyResponse
 
 
 @dataclass(frozen=True)
-class Distortion(Labelled):
+class Distortion(Tabular):
     """Noise and nonlinear distortion relative to a transmission; medians over spectral lines."""
 
     DOCUMENT: ClassVar = (

@@ -178,7 +178,7 @@ def hit_spectra(
     return HitSpectra(chosen, np.fft.rfft(windowed)[..., :lines], hits.left_out)
 
 
-def weighted_alike(response: FrequencyResponse) -> FrequencyResponse:
+def with_assumed_scatter(response: FrequencyResponse) -> FrequencyResponse:
     """Return the response to a single hit with an assumed scatter, for a fit without bounds."""
     # Assume equal noise on all lines of the velocity, and in addition an equal relative error.
     size = response.magnitude / response.frequency_hz

@@ -125,7 +125,7 @@ class Leakage:
             self.segment_s * integral - slope_per_hz * 1j / (2 * np.pi) * (1 + scaled * integral)
         )
 
-    def rung(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
+    def ringing_sd(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
         """Return the standard deviation of a line's real or imaginary part due to ringing, along dH/df.
 
         Parameters
@@ -262,7 +262,7 @@ class Lines:
         """Share of cut-off ringing in each line's variance; 1 with a boxcar."""
         if self._leakage is not None and self.value.size:
             number = np.rint(self.frequency_hz * self._leakage.segment_s).astype(np.int64)
-            rung = self._leakage.rung(number, self.value, self._spread)
+            rung = self._leakage.ringing_sd(number, self.value, self._spread)
             bands = self._leakage.covariance(number, rung, self._spread)
             self.ringing_share += 1.0 if self.narrowest_hz else np.abs(rung / self._spread) ** 2
             self._root = np.asarray(scipy.linalg.cholesky_banded(bands, lower=True))

@@ -18,10 +18,10 @@ from ..signals.confidence import relative_sd, student_half_width
 from ..signals.quantity import Quantity
 from ..signals.window import Window
 from ..spectra.spectra import DensitySums
-from ..tables import Labelled, columns
+from ..tables import Tabular, columns
 from ..tones.sine_fit import NoiseDriveLevel, noise_drive_level
 from .distortion import Distortion, distortion, scatters_beyond_noise
-from .hits import Hits, HitSpectra, find_hits, hit_spectra, weighted_alike, without_bounds
+from .hits import Hits, HitSpectra, find_hits, hit_spectra, with_assumed_scatter, without_bounds
 from .modal_fit import Resonance
 from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .request import FrequencyResponseRequest, FrequencyResponseView
@@ -49,7 +49,7 @@ _ALIKE_LINES = 4
 
 
 @dataclass(frozen=True)
-class NoiseResponse(Labelled):
+class NoiseResponse(Tabular):
     """Transmission from base displacement to m0's displacement, with resonances and data quality."""
 
     OWN_UNITS: ClassVar = {**dict.fromkeys(("frequency_response", "h1", "h2"), "{0.unit}"), "periodic": "s"}
@@ -144,7 +144,7 @@ def repeated_response(
     order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
     sensors = channels.response_gain(periodic.frequency_response.frequency_hz)
 
-    def by(estimator: Estimator, given: PeriodicSums = sums) -> FrequencyResponse:
+    def estimate_by(estimator: Estimator, given: PeriodicSums = sums) -> FrequencyResponse:
         found = (
             periodic
             if given is sums
@@ -156,21 +156,21 @@ def repeated_response(
             found, given.motion()[..., order], estimator, channels, request.noise_ratio
         ).without_gain(sensors)
 
-    chosen = by(request.estimator)
+    chosen = estimate_by(request.estimator)
 
     def response() -> NoiseResponse:
         found = _resonances(chosen)
         if found and not repetitions and scatters_beyond_noise(periodic):
-            without = (_resonances(by(request.estimator, each)) for each in sums.without_each())
+            without = (_resonances(estimate_by(request.estimator, each)) for each in sums.without_each())
             found = scattered_resonances(found, tuple(without))
         band = {"low_hz": noise.band_start_hz, "high_hz": noise.band_stop_hz}
         return NoiseResponse(
             frequency_response=chosen,
-            h1=by(Estimator.H1),
-            h2=by(Estimator.H2),
+            h1=estimate_by(Estimator.H1),
+            h2=estimate_by(Estimator.H2),
             resonances=found,
             base_level=noise_drive_level(level.density(), **band),
-            bias=_bias(chosen, by(Estimator.DRIVE), found),
+            bias=_bias(chosen, estimate_by(Estimator.DRIVE), found),
             periodic=periodic,
             used_s=used / rate,
             left_out=len(stretches) - taken,
@@ -211,7 +211,7 @@ def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _U
     if periods < _LEAST_PERIODS:
         return None
     data = channels.read(stretch.start, stretch.stop)
-    valid = bad.valid(data, channels.overloaded(stretch.start, stretch.stop))
+    valid = bad.valid(data, channels.overload_flags(stretch.start, stretch.stop))
     return data if valid.all() else None
 
 
@@ -274,28 +274,28 @@ def streamed_response(
     for first in range(stretch.start, stretch.stop, _BLOCK):
         last = min(first + _BLOCK, stretch.stop)
         data = channels.read(first, last)
-        valid = bad.valid(data, channels.overloaded(first, last))
+        valid = bad.valid(data, channels.overload_flags(first, last))
         if not valid.all():
             data = np.where(valid, data, 0.0)
         # The sums expect base, response and reference (the drive), in this order.
         sums.add(data[[1, 2, 0]], valid)
         level.add(data[1], valid)
 
-    def by(estimator: Estimator) -> FrequencyResponse:
+    def estimate_by(estimator: Estimator) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
-        found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
+        found = sums.with_estimator(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band)
         return as_displacements(inside, channels).without_gain(channels.response_gain(inside.frequency_hz))
 
-    chosen = by(request.estimator)
+    chosen = estimate_by(request.estimator)
     found = _resonances(chosen)
     return NoiseResponse(
         frequency_response=chosen,
-        h1=by(Estimator.H1),
-        h2=by(Estimator.H2),
+        h1=estimate_by(Estimator.H1),
+        h2=estimate_by(Estimator.H2),
         resonances=found,
         base_level=noise_drive_level(level.density(), low_hz=band[0], high_hz=band[1]),
-        bias=_bias(chosen, by(Estimator.DRIVE), found),
+        bias=_bias(chosen, estimate_by(Estimator.DRIVE), found),
         periodic=None,
         used_s=stretch.samples / rate,
         left_out=chosen.segments_excluded,
@@ -312,7 +312,7 @@ def _response_to_hits(
     usable = []
     for start in hits.starts:
         data = channels.read(start, start + size)
-        if bad.valid(data, channels.overloaded(start, start + size)).all():
+        if bad.valid(data, channels.overload_flags(start, start + size)).all():
             usable.append(data)
     if not usable:
         raise NotEnoughData(f"all {len(hits.starts)} hits have a fault{bad.text}; measure again")
@@ -321,7 +321,7 @@ def _response_to_hits(
     spectra = hit_spectra(data, hits, settings, band_hz[1], fades=request.window is not Window.BOXCAR)
     decay_per_s = spectra.settings.decay_per_s or 0.0
 
-    def by(estimator: Estimator, given: HitSpectra = spectra) -> FrequencyResponse:
+    def estimate_by(estimator: Estimator, given: HitSpectra = spectra) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = given.response(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band_hz)
@@ -330,10 +330,10 @@ def _response_to_hits(
         gain = channels.response_gain(inside.frequency_hz) / shift
         return as_displacements(inside, channels).without_gain(gain)
 
-    chosen = by(request.estimator)
+    chosen = estimate_by(request.estimator)
     found = _resonances(chosen)
     if spectra.count > 1:
-        without = (_resonances(by(request.estimator, each)) for each in spectra.without_each())
+        without = (_resonances(estimate_by(request.estimator, each)) for each in spectra.without_each())
         found = scattered_resonances(found, tuple(without))
     power = 2 * np.mean(np.abs(np.fft.rfft(data[:, 1])) ** 2, axis=0) / size**2
     line_hz = np.fft.rfftfreq(size, 1 / rate)
@@ -341,11 +341,11 @@ def _response_to_hits(
     motion = np.sqrt([np.sum(power[inside] / (2 * np.pi * line_hz[inside]) ** each) for each in (0, 4)])
     return NoiseResponse(
         frequency_response=chosen,
-        h1=by(Estimator.H1),
-        h2=by(Estimator.H2),
+        h1=estimate_by(Estimator.H1),
+        h2=estimate_by(Estimator.H2),
         resonances=found,
         base_level=NoiseDriveLevel(*band_hz, float(motion[0]), float(motion[1]), np.nan),
-        bias=_bias(chosen, by(Estimator.DRIVE), found),
+        bias=_bias(chosen, estimate_by(Estimator.DRIVE), found),
         periodic=None,
         used_s=spectra.count * size / rate,
         left_out=hits.left_out + len(hits.starts) - spectra.count,
@@ -395,7 +395,7 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
     low, high = float(frequency_response.frequency_hz[0]), float(frequency_response.frequency_hz[-1])
     if frequency_response.n_eff > 1:
         return resonances(frequency_response, low_hz=low, high_hz=high)
-    found = resonances(weighted_alike(frequency_response), low_hz=low, high_hz=high)
+    found = resonances(with_assumed_scatter(frequency_response), low_hz=low, high_hz=high)
     return tuple(without_bounds(each) for each in found)
 
 
@@ -457,7 +457,7 @@ class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
         """The transmission in the requested quantities, as JSON."""
         view = self.view
         return columns(view, "quantity=name unit") | columns(
-            view.shown(self.response.frequency_response),
+            view.apply(self.response.frequency_response),
             "estimator=settings.estimator noise_ratio=settings.noise_ratio window=settings.window "
             "segment_s=settings.segment_s overlap=settings.overlap resolution_hz segments_used "
             "segments_excluded delay_removed_s=settings.delay_s confidence=settings.confidence "

@@ -19,7 +19,7 @@ from ..signals.arrays import Complexes, Flags, Integers, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance
 from ..signals.interpolation import REACH, TRUSTED_BAND, interpolate
 from ..signals.window import Window
-from ..tables import Labelled
+from ..tables import Tabular
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
@@ -385,7 +385,7 @@ class DetectionLines:
 
 
 @dataclass(frozen=True)
-class PeriodicFrequencyResponse(Labelled):
+class PeriodicFrequencyResponse(Tabular):
     """Best linear approximation of response over drive, with the sources of its scatter."""
 
     OWN_UNITS: ClassVar = {

@@ -51,7 +51,7 @@ class FrequencyResponseView:
 
     @property
     def name(self) -> str:
-        """Name of the quantities in the form that `quantities_named` reads: ``"velocity/acceleration"``."""
+        """Name of the quantities in the form that `parse_view` reads: ``"velocity/acceleration"``."""
         return "force/acceleration" if self.is_force else f"{self.response.value}/{self.base.value}"
 
     @property
@@ -80,7 +80,7 @@ class FrequencyResponseView:
         steps = (start, stop) if self.power >= 0 else (stop, start)
         return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
 
-    def shown(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
+    def apply(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
         """Convert displacement over displacement to the view's quantities, including bounds."""
         if self.is_force:
             return frequency_response
@@ -90,7 +90,7 @@ class FrequencyResponseView:
             response=(Quantity.DISPLACEMENT, self.response),
         )
 
-    def drawn(self, magnitude: Reals) -> Reals:
+    def place(self, magnitude: Reals) -> Reals:
         """Convert magnitudes to the drawn scale."""
         match self.scale:
             case MagnitudeScale.LOG:
@@ -100,7 +100,7 @@ class FrequencyResponseView:
                     return np.asarray(20 * np.log10(magnitude))
 
 
-def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
+def parse_view(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
     """Return the view for a text like ``"velocity/acceleration"``; one word stands for both quantities.
 
     Raises InvalidRequest for anything else.

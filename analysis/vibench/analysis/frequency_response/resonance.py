@@ -269,7 +269,8 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
 def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> ModalFit | None:
     """Fit all modes from each start and return the best fit."""
     fits = (
-        modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _outside) for each in starts
+        modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _background)
+        for each in starts
     )
     return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi_square, default=None)
 
@@ -285,7 +286,7 @@ def _poles(found: Sequence[Resonance]) -> Reals:
     return np.log([[each.frequency_hz, each.damping_ratio] for each in found])
 
 
-def _outside(frequency_hz: Reals) -> Complexes:
+def _background(frequency_hz: Reals) -> Complexes:
     """Return the background of modes outside the band and of phase errors: 1, i w and w^2."""
     scaled = frequency_hz / _USUAL_HZ
     return np.stack([np.ones_like(frequency_hz), 1j * scaled, scaled**2], axis=1)
@@ -294,7 +295,7 @@ def _outside(frequency_hz: Reals) -> Complexes:
 def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
     """Keep one fit of each pole, because ripples of one resonance give the same pole."""
     kept: list[Resonance] = []
-    for together in sorted(filter(None, found), key=lambda fit: min(map(_doubt, fit))):
+    for together in sorted(filter(None, found), key=lambda fit: min(map(_sort_key, fit))):
         known = tuple(kept)
         for each in together:
             half = 0.5 * each.half_power_bandwidth_hz
@@ -306,6 +307,6 @@ def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
     return sorted(kept, key=lambda one: one.frequency_hz)
 
 
-def _doubt(found: Resonance) -> tuple[bool, float]:
+def _sort_key(found: Resonance) -> tuple[bool, float]:
     """Return a sort key: fits that explain their lines first, then by relative uncertainty of damping."""
     return not found.is_explained, found.sd_damping_ratio / found.damping_ratio

@@ -10,7 +10,7 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import magnitude_bounds, phase_half_width
 from ..signals.quantity import Quantity, derivative_factor
-from ..tables import Labelled
+from ..tables import Tabular
 
 LEAST_COHERENCE = 0.1
 """Minimum coherence of a significant spectral line."""
@@ -56,7 +56,7 @@ class FrequencyResponseSettings:
 
 
 @dataclass(frozen=True)
-class FrequencyResponse(Labelled):
+class FrequencyResponse(Tabular):
     """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
 
     OWN_UNITS: ClassVar = dict.fromkeys(

@@ -72,7 +72,7 @@ class Scan:
         return tuple(self._shape(float(np.median(each))) for each in groups if each.size)
 
     def _shape(self, frequency_hz: float) -> ScanShape:
-        shown = [each.request.view.shown(each.response.frequency_response) for each in self.analyses]
+        shown = [each.request.view.apply(each.response.frequency_response) for each in self.analyses]
         lines = [int(np.argmin(np.abs(each.frequency_hz - frequency_hz))) for each in shown]
         values = [each.value[line] for each, line in zip(shown, lines, strict=True)]
         widths = [each.half_width[line] for each, line in zip(shown, lines, strict=True)]

@@ -231,9 +231,9 @@ class FrequencyResponseSums:
 
         Raises NotEnoughData for fewer than two valid segments, whose coherence would always be 1.
         """
-        return self.by(self._settings.estimator, self._settings.noise_ratio)
+        return self.with_estimator(self._settings.estimator, self._settings.noise_ratio)
 
-    def by(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
+    def with_estimator(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
         """Return the transmission by another estimator; raises the same errors as `transmissibility`."""
         settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
         _check(settings)

@@ -50,7 +50,7 @@ from ._prepared_motion import (
     ChannelNoise as ChannelNoise,
 )
 from ._tracking import (
-    NotFollowed as NotFollowed,
+    TrackGap as TrackGap,
 )
 from ._tracking_model import (
     TrackedSpecimen as TrackedSpecimen,

@@ -10,7 +10,7 @@ from vibench.sim.engine.run import native_engine
 
 from ..errors import NotEnoughData
 from ..signals.arrays import Flags, Reals, Samples
-from ..tables import Labelled
+from ..tables import Tabular
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start
 from ._parameters import PRIOR_SD, SEARCHES, Hidden, value_of, with_values
@@ -44,7 +44,7 @@ _WORST_SCATTER_OF_GAP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class FreeImpacts(Labelled):
+class FreeImpacts(Tabular):
     """Impacts found in the estimated contact force; every array has one value per impact."""
 
     OWN_UNITS: ClassVar = {
@@ -70,7 +70,7 @@ class FreeImpacts(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class FreeMotion(Labelled):
+class FreeMotion(Tabular):
     """Motion of m1 against m2, estimated without a contact model."""
 
     OWN_UNITS: ClassVar = {"p": "m", "p_sd": "m"}
@@ -159,7 +159,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
         middle = float(np.sum(weight * place[part]) / weight.sum())
         sample = int(np.clip(np.floor(middle), 0, force.size - 2))
         nearest = slice(sample, sample + 2)
-        p = _between(moved[nearest], rate[nearest] / sample_rate_hz, middle - sample)
+        p = _interpolate(moved[nearest], rate[nearest] / sample_rate_hz, middle - sample)
         side = -np.sign(impulse)
         rows.append(
             (
@@ -180,7 +180,7 @@ def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
     return float(values[near] + (values[near] - values[far]) * (place - near) / (near - far))
 
 
-def _between(values: Reals, slopes: Reals, t: float) -> float:
+def _interpolate(values: Reals, slopes: Reals, t: float) -> float:
     """Interpolate between two samples by the cubic with their values and slopes (per sample)."""
     (a, b), (da, db) = values, slopes
     return float(
@@ -342,7 +342,7 @@ _MOST_STEPS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Collisions(Labelled):
+class Collisions(Tabular):
     """Contacts of m1 with its stops in the order of time; every array has one value per contact."""
 
     OWN_UNITS: ClassVar = {"impulses": "N s", "speeds_before": "m s-1", "speeds_after": "m s-1"}

@@ -50,7 +50,7 @@ class Estimate:
 
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]
-    begun_at: Reals
+    start_values: Reals
     """Start values of the parameter search, shape (parameters,), SI."""
     prior_sd: Reals
     """Prior standard deviations of the parameters, shape (parameters,)."""
@@ -76,7 +76,7 @@ def estimate(
 
     ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
     """
-    return _Search(start, motion, relative_sd).over(first, stop)
+    return _Search(start, motion, relative_sd).track(first, stop)
 
 
 class _Search:
@@ -96,7 +96,7 @@ class _Search:
         self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
         self._followed, self._level = 0, math.nan
 
-    def over(self, first: int, stop: int) -> Estimate | str:
+    def track(self, first: int, stop: int) -> Estimate | str:
         """Track from ``first`` to ``stop`` and return the estimate; restart after every loss of the track."""
         rate = self._motion.sample_rate_hz
         block = round(REBUILT_S * rate)

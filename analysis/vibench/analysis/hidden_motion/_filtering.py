@@ -29,7 +29,7 @@ LOSS_LIMIT = 8.0
 """Mean squared normalised innovation above which a track is lost; about 1 is good."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
-"""Value of `Filtered.kinds` for a step without contact."""
+"""Value of `FilterPredictions.kinds` for a step without contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class FilterState:
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class FilterPredictions:
     """Predictions of the filter for each sample, before that sample was used."""
 
     first: int
@@ -108,13 +108,13 @@ class Filtered:
     impulses: Reals
 
     @property
-    def squared(self) -> Reals:
+    def nis(self) -> Reals:
         """Squared normalised innovations; NaN if a sample was not used."""
         value, variance = self.innovations.T
         return np.asarray(np.where(variance > 0, value**2 / np.where(variance > 0, variance, 1.0), np.nan))
 
     @classmethod
-    def room(cls, first: int, count: int) -> "Filtered":
+    def room(cls, first: int, count: int) -> "FilterPredictions":
         """Allocate arrays for the predictions of this many samples."""
         shapes = (STATES,), (STATES, STATES), (2,), (), (STATES, STATES), ()
         return cls(first, *(np.empty((count, *shape)) for shape in shapes))
@@ -124,9 +124,9 @@ class Filtered:
         """Return arrays by name, in the order of `TrackRecord` in native/structures.hpp."""
         return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
 
-    def samples(self, begin: int, end: int | None = None) -> "Filtered":
+    def samples(self, begin: int, end: int | None = None) -> "FilterPredictions":
         """Return the predictions for samples ``begin`` to before ``end``."""
-        return Filtered(self.first + begin, *(each[begin:end] for each in self.arrays.values()))
+        return FilterPredictions(self.first + begin, *(each[begin:end] for each in self.arrays.values()))
 
     @property
     def record(self) -> Structure:
@@ -142,12 +142,12 @@ def run_filter(
     *,
     loss_limit: float = np.inf,
     force_variance: Reals = _NOTHING,
-) -> Filtered:
+) -> FilterPredictions:
     """Advance ``at`` by ``count`` samples, or until the mean innovation exceeds the limit.
 
     ``force_variance`` is the variance of an unknown contact force held over each sample [N^2].
     """
-    kept = Filtered.room(at.sample + 1, min(count, motion.samples - 1 - at.sample))
+    kept = FilterPredictions.room(at.sample + 1, min(count, motion.samples - 1 - at.sample))
     done = move_filter(
         [model.tables],
         motion,
@@ -209,7 +209,7 @@ def move_filter(
 
 
 @dataclass(frozen=True, eq=False)
-class Smoothed:
+class RtsTrack:
     """A part of the motion after smoothing."""
 
     first: int
@@ -235,7 +235,7 @@ class Smoothed:
         return np.asarray(self.states[:, 4] - self.states[:, 5])
 
 
-def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) -> Smoothed:
+def smooth(model: MotionModel, run: FilterPredictions, force_variance: Reals = _NOTHING) -> RtsTrack:
     """Smooth a run of the filter backwards in time."""
     count = run.states.shape[0]
     states, variances = np.empty((count, STATES)), np.empty((count, 2))
@@ -254,7 +254,7 @@ def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) 
     )
     engine.call("smooth_motion", work)
     covariance = run.covariances[0] if count else np.empty((STATES, STATES))
-    return Smoothed(
+    return RtsTrack(
         run.first,
         states,
         variances,

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..signals.arrays import Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from ._filtering import FilterState, MotionModel, run_filter
 from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES, VX, W, X, Y, Z, equations, exact_flow
@@ -27,7 +27,7 @@ _NOT_MEASURED = 1e30
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast(Labelled):
+class Forecast(Tabular):
     """Forecast of p, one value per sample."""
 
     OWN_UNITS: ClassVar = {"p": "m", "error": "m"}

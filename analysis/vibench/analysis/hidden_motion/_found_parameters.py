@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..signals.arrays import Reals
-from ..tables import Labelled, plus_minus, unit_of
+from ..tables import Tabular, plus_minus, unit_of
 from ._estimation import Estimate, estimate, search_start, searched_parameters
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
 from ._parameters import NEAR, PRIOR_SD, SEARCHES, Hidden, scale_of, value_of, with_values
@@ -118,7 +118,7 @@ class FoundParameter:
 
 
 @dataclass(frozen=True, eq=False)
-class FoundSpecimen(Labelled):
+class FoundSpecimen(Tabular):
     """Parameters found from collisions, and the specimen for tracking."""
 
     tracked: TrackedSpecimen
@@ -131,7 +131,7 @@ class FoundSpecimen(Labelled):
 def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundSpecimen:
     """Return the parameters that collisions determine, and the specimen for tracking."""
     if described.steepness == 0.0:
-        return _nothing(described, "the specimen is described without stops")
+        return _undetermined(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
         refined = _refine(described, motion, described, searched_parameters(described, NEAR))
         if isinstance(refined, FoundSpecimen):
@@ -139,7 +139,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     stretches = _stretches(motion)
     start, near = search_start(described, motion, [first for first, _ in stretches])
     if isinstance(near, str):
-        return _nothing(described, near, searched=True)
+        return _undetermined(described, near, searched=True)
     first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
     if isinstance(first_look, Estimate):
         start = first_look.tracked
@@ -157,7 +157,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     return (
         replace(found, searched=True)
         if isinstance(found, FoundSpecimen)
-        else replace(_nothing(described, found, searched=True), tracked=start)
+        else replace(_undetermined(described, found, searched=True), tracked=start)
     )
 
 
@@ -227,7 +227,7 @@ def _restarts(
 
 
 @dataclass(frozen=True, eq=False)
-class _Combined:
+class _CombinedEstimate:
     """Parameters from the motion without the prior; all of shape (parameters,), SI."""
 
     values: Reals
@@ -241,7 +241,7 @@ class _Combined:
     """Distance between the values without and with the narrow prior."""
 
 
-def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
+def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _CombinedEstimate:
     """Return the mean of restarts and its half width, from the larger of scatter and claimed uncertainty.
 
     Restarts over the same samples are not independent: their scatter shows the influence of start values.
@@ -260,9 +260,9 @@ def combine(found: list[Estimate], described: TrackedSpecimen, independent: floa
         few = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, len(found) - 1))
         half = np.maximum(half, np.where(scatter > claimed, few, _Z) * scatter)
         sd = np.maximum(claimed, scatter)
-    looked = np.array([each.begun_at + each.prior_sd * each.moved for each in found])
+    looked = np.array([each.start_values + each.prior_sd * each.moved for each in found])
     beyond = np.abs(values.mean(axis=0) - looked.mean(axis=0))
-    return _Combined(values.mean(axis=0), half / np.sqrt(independent), sd, assumed, beyond)
+    return _CombinedEstimate(values.mean(axis=0), half / np.sqrt(independent), sd, assumed, beyond)
 
 
 def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
@@ -278,7 +278,7 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     information = (directions * np.maximum(rates, 0.0)) @ directions.T
     weak = np.diag((found.prior_sd / wide) ** 2)
     freed = np.linalg.inv(information + weak)
-    pull = weak @ ((centre - found.begun_at) / found.prior_sd)
+    pull = weak @ ((centre - found.start_values) / found.prior_sd)
     moved = freed @ (inverse @ found.moved + pull)
     variance = np.diag(freed)
     # For a well determined parameter, the random walk overstates the variance; for a weakly determined
@@ -287,7 +287,7 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     part = np.array([SEARCHES[each].claimed for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
     scale = found.prior_sd**2
-    return found.begun_at + found.prior_sd * moved, variance * scale, likely * scale
+    return found.start_values + found.prior_sd * moved, variance * scale, likely * scale
 
 
 def _parameter(
@@ -298,7 +298,7 @@ def _parameter(
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 
 
-def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
+def _undetermined(described: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
     nan, wanted = float("nan"), searched_parameters(described, PRIOR_SD)
     parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(described, each), why) for each in wanted)
     return FoundSpecimen(described, parameters, 0, searched)
@@ -345,5 +345,5 @@ def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
         if isinstance(begun, FilterState):
             left = min(count, motion.samples - 1 - begun.sample)
             run = run_filter(model, motion, begun, left, loss_limit=LOSS_LIMIT)
-            good += run.states.shape[0] == left and float(np.nanmean(run.squared)) < _FITTING_LEVEL
+            good += run.states.shape[0] == left and float(np.nanmean(run.nis)) < _FITTING_LEVEL
     return 2 * good > len(firsts)

@@ -17,7 +17,7 @@ from ..recordings.channels import BASE, RESPONSE
 from ..recordings.facts import require_checked, specimen_of
 from ..recordings.response import ResponseChannel, response_roles
 from ..signals.arrays import Reals, Samples
-from ..tables import Labelled
+from ..tables import Tabular
 from ._contact_free import (
     Collisions,
     FreeGap,
@@ -32,7 +32,7 @@ from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, wi
 from ._parameters import Hidden, Numbers
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
-from ._tracking import NotFollowed, TrackedPiece, follow
+from ._tracking import TrackedPiece, TrackGap, follow
 from ._tracking_model import VY, VZ, TrackedSpecimen, W, tracked_specimen
 
 _RATES = {"m1": VY, "m2": VZ}
@@ -146,7 +146,7 @@ _HIGHEST_LEVEL = 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedMotion(Labelled):
+class TrackedMotion(Tabular):
     """p tracked by the extended Kalman filter and smoothed; NaN where the track was lost."""
 
     OWN_UNITS: ClassVar = {"p": "m", "rate": "m s-1", "p_sd": "m"}
@@ -158,12 +158,12 @@ class TrackedMotion(Labelled):
     p_sd: Samples
     """Standard deviation of p [m]."""
     collisions: Collisions
-    not_followed: tuple[NotFollowed, ...]
+    not_followed: tuple[TrackGap, ...]
     innovation_level: float
     """Mean squared normalised innovation in flight; 1 if only noise remains."""
 
     @property
-    def share_followed(self) -> float:
+    def tracked_share(self) -> float:
         """Share of the samples that were tracked."""
         return float(np.mean(~np.isnan(self.p)))
 
@@ -175,7 +175,7 @@ class TrackedMotion(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class HiddenMotion(Labelled):
+class HiddenMotion(Tabular):
     """Hidden motion estimated from base acceleration and m0's velocity."""
 
     name: str
@@ -219,7 +219,7 @@ class HiddenMotion(Labelled):
     def to_dict(self) -> dict[str, object]:
         """Return the results as JSON, without the motion itself."""
         return {
-            "share_followed": self.tracked.share_followed,
+            "share_followed": self.tracked.tracked_share,
             "impacts": self.tracked.collisions.count,
             "innovation_level": finite(self.tracked.innovation_level),
             "p_sd_m": self.tracked.median_sd_m,
@@ -364,7 +364,7 @@ def hidden_motion_of(
     """Apply both methods to a prepared motion, and check the track against the sensors in ``masses``."""
     model = motion_model(tracked, motion)
     on_read = stage(observer, f"{name}: tracking the hidden motion")
-    followed = _tracked_motion(motion, model, found, lambda sample: on_read(sample, motion.samples), masses)
+    followed = _track_motion(motion, model, found, lambda sample: on_read(sample, motion.samples), masses)
     found_checks = (each.check(followed.innovation_level) for each in masses)
     checks = tuple(each for each in found_checks if each is not None)
     why_not = _fault_of_numbers(followed, checks)
@@ -402,7 +402,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 
 
-def _tracked_motion(
+def _track_motion(
     motion: PreparedMotion,
     model: MotionModel,
     found: FoundSpecimen | None,
@@ -412,7 +412,7 @@ def _tracked_motion(
     # Single precision is enough and halves the memory.
     p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(3))
     collisions: list[Collisions] = []
-    lost: list[NotFollowed] = []
+    lost: list[TrackGap] = []
     squared, used = 0.0, 0
     for part in follow(model, motion, on_progress):
         match part:
@@ -423,10 +423,10 @@ def _tracked_motion(
                 collisions.append(collisions_of(model, motion, part))
                 for each in masses:
                     each.add(part)
-                here = part.run.squared
+                here = part.run.nis
                 squared += float(np.nansum(here))
                 used += int(np.count_nonzero(~np.isnan(here)))
-            case NotFollowed():
+            case TrackGap():
                 lost.append(part)
     level = squared / used if used else float("nan")
     sd *= np.float32(np.sqrt(max(1.0, level if used else 1.0)))
@@ -481,7 +481,7 @@ def _free_sentence(motion: HiddenMotion) -> str:
 def _sentences(motion: HiddenMotion) -> Iterator[str]:
     tracked, rate = motion.tracked, motion.sample_rate_hz
     yield (
-        f"{motion.name}: p was tracked in {100 * tracked.share_followed:.4g} % of "
+        f"{motion.name}: p was tracked in {100 * tracked.tracked_share:.4g} % of "
         f"{tracked.p.size / rate:.3g} s, impacts: {tracked.collisions.count}"
         + (
             ""
@@ -524,16 +524,16 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
 
 
 def _channels(motion: HiddenMotion) -> dict[str, ResultArray]:
-    def along(values: Samples, unit: str) -> ResultArray:
+    def over_time(values: Samples, unit: str) -> ResultArray:
         return ResultArray(values.astype(np.float32, copy=False), unit, (_TIME,))
 
     return {
         _TIME: ResultArray(motion.time_s, "s"),
-        "p": along(motion.tracked.p, "m"),
-        "p_sd": along(motion.tracked.p_sd, "m"),
-        "p_rate": along(motion.tracked.rate, "m s-1"),
-        "p_without_contact_model": along(motion.free.p, "m"),
-        "p_without_contact_model_sd": along(motion.free.p_sd, "m"),
+        "p": over_time(motion.tracked.p, "m"),
+        "p_sd": over_time(motion.tracked.p_sd, "m"),
+        "p_rate": over_time(motion.tracked.rate, "m s-1"),
+        "p_without_contact_model": over_time(motion.free.p, "m"),
+        "p_without_contact_model_sd": over_time(motion.free.p_sd, "m"),
     }
 
 

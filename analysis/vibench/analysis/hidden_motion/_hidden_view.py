@@ -11,7 +11,7 @@ from vibench.sim import UnknownSpecimenError, load_specimen
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals, Samples
-from ..tables import Labelled
+from ..tables import Tabular
 from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
@@ -35,7 +35,7 @@ class HiddenViewRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class HiddenView(Labelled):
+class HiddenView(Tabular):
     """Data to plot."""
 
     OWN_UNITS: ClassVar = {"p": "m", "free_p": "m"}

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ..signals.arrays import Flags, Reals
-from ._filtering import Filtered, FilterState, MotionModel, Smoothed, run_filter, smooth
+from ._filtering import FilterPredictions, FilterState, MotionModel, RtsTrack, run_filter, smooth
 from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES
 
@@ -42,8 +42,8 @@ _START_SD = (1e-4, 0.3, 1.0, 0.5)
 class LatentMotion:
     """A part of a motion smoothed without a contact law."""
 
-    run: Filtered
-    smoothed: Smoothed
+    run: FilterPredictions
+    smoothed: RtsTrack
     is_open: Flags
     """Flags of samples with a possible contact force."""
     is_dropout: Flags
@@ -81,7 +81,7 @@ def latent_motion(
         if settled:
             break
         variance = following
-    squared = run.squared[_start_up(motion.sample_rate_hz, count) :]
+    squared = run.nis[_start_up(motion.sample_rate_hz, count) :]
     squared = np.sort(squared[~np.isnan(squared)])
     misfit = float(np.mean(squared[: int(0.999 * squared.size) or 1])) if squared.size else np.inf
     return LatentMotion(run, smoothed, windows, is_dropout, variance, misfit)
@@ -95,7 +95,7 @@ def latent_start(first: int) -> FilterState:
 
 def _filter_and_smooth(
     model: MotionModel, motion: PreparedMotion, first: int, variance: Reals
-) -> tuple[Filtered, Smoothed]:
+) -> tuple[FilterPredictions, RtsTrack]:
     run = run_filter(model, motion, latent_start(first), variance.size, force_variance=variance)
     return run, smooth(model, run, variance)
 
@@ -118,9 +118,9 @@ def _start_up(sample_rate_hz: float, count: int) -> int:
     return min(round(_START_UP_S * sample_rate_hz), count // 4)
 
 
-def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
+def _with_surprises(windows: Flags, run: FilterPredictions, sample_rate_hz: float) -> tuple[Flags, bool]:
     """Add a window just before every innovation that shows an overlooked impact."""
-    squared = run.squared
+    squared = run.nis
     # Wrong parameters raise innovations everywhere; only outliers are impacts.
     usual = max(1.0, float(np.nanmedian(squared)) / _MEDIAN_OF_SQUARE)
     surprise = squared > _SURPRISE * usual

@@ -18,15 +18,15 @@ from typing import ClassVar
 import numpy as np
 from pydantic import ValidationError
 
-from vibench.acquisition.recording import DROPOUT_DELAY_S, bridged, found_dropouts
+from vibench.acquisition.recording import DROPOUT_DELAY_S, bridge, find_dropouts
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..recordings.channels import BASE, RESPONSE
 from ..signals.arrays import Reals
-from ..tables import Labelled
-from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
+from ..tables import Tabular
+from ._filtering import LOSS_LIMIT, FilterPredictions, FilterState, MotionModel, motion_model, run_filter
 from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._parameters import Hidden, with_values
@@ -149,7 +149,7 @@ class LiveState(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class LiveMotion(Labelled):
+class LiveMotion(Tabular):
     """Newest part of the hidden motion, for a picture."""
 
     OWN_UNITS: ClassVar = {"p": "m"}
@@ -322,7 +322,7 @@ class LiveTwin:
         sentences: list[str] = []
         self._follow(sentences)
         self._find(sentences)
-        self._foresee(frequency_hz)
+        self._make_forecast(frequency_hz)
         return tuple(sentences)
 
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
@@ -331,9 +331,9 @@ class LiveTwin:
         first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUT_DELAY_S * self._rate)
         if stop <= first:
             return
-        dropouts = found_dropouts(self._raw[1], self._rate)
+        dropouts = find_dropouts(self._raw[1], self._rate)
         around = slice(first - HALF_LENGTH, stop + HALF_LENGTH)
-        seen = self._correction.corrected(self._raw[0, around], bridged(self._raw[1], dropouts)[around])
+        seen = self._correction.correct(self._raw[0, around], bridge(self._raw[1], dropouts)[around])
         new = [each[HALF_LENGTH:-HALF_LENGTH] for each in seen]
         is_dropout = dropout_samples(dropouts, first, stop)
         surplus = max(0, stop - round(_LOOKED_S * self._rate))
@@ -438,7 +438,7 @@ class LiveTwin:
         """Use the result of a finished parameter search; start the next search in parallel with tracking."""
         if self._finding is not None and self._finding.done():
             finding, self._finding = self._finding, None
-            self._take_found(finding.result(), sentences)
+            self._use_found(finding.result(), sentences)
         enough = self._motion.samples >= round(_FIND_S * self._rate)
         is_quiet = self._state is LiveState.WAITING
         if self._finding is None and enough and not is_quiet and self.next_sample >= self._find_at:
@@ -448,7 +448,7 @@ class LiveTwin:
             self._wait = round(_PATIENCE * self._wait)
             self._find_at = self.next_sample + self._wait
 
-    def _take_found(self, found: FoundSpecimen, sentences: list[str]) -> None:
+    def _use_found(self, found: FoundSpecimen, sentences: list[str]) -> None:
         parameters = {each.what: each for each in found.parameters if each.is_determined}
         if not parameters:
             return
@@ -487,11 +487,11 @@ class LiveTwin:
             self._model = motion_model(tracked, self._motion)
 
     @property
-    def known(self) -> dict[Hidden, KnownNumber]:
+    def numbers(self) -> dict[Hidden, KnownNumber]:
         """Parameters used for tracking that were found from collisions."""
         return dict(self._known)
 
-    def _foresee(self, frequency_hz: float | None) -> None:
+    def _make_forecast(self, frequency_hz: float | None) -> None:
         motion, at = self._motion, self._at
         self._forecaster.compare(motion.first_sample, self._states[:, 1] - self._states[:, 2])
         self._forecast = None
@@ -503,7 +503,7 @@ class LiveTwin:
             self._forecast = self._forecaster.forecast(self._model, motion, at, states, frequency_hz)
 
 
-def _clipped_innovations(run: Filtered) -> Reals:
+def _clipped_innovations(run: FilterPredictions) -> Reals:
     """Return the squared innovations in flight, clipped."""
-    squared = run.squared
+    squared = run.nis
     return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))

@@ -108,7 +108,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
         first, last = begin - HALF_LENGTH, end + HALF_LENGTH
         raw = [recording.read(BASE, first, last), response.read(first, last)]
         lost += _lost_samples(*raw)
-        for row, values in zip(kept, correction.corrected(*raw), strict=True):
+        for row, values in zip(kept, correction.correct(*raw), strict=True):
             row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]
     _require_finite(lost)
     dropouts = response.between(start - _DARK_MARGIN, stop + _DARK_MARGIN)
@@ -149,7 +149,7 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
     _require_finite(_lost_samples(acceleration, velocity))
     correction = ideal_sensors(sample_rate_hz)
-    corrected = np.array(correction.corrected(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
+    corrected = np.array(correction.correct(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
     light = np.zeros(corrected.shape[1], dtype=np.bool_)
     return _motion(corrected, light, sample_rate_hz, correction, HALF_LENGTH)
 

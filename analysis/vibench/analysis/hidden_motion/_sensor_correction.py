@@ -31,7 +31,7 @@ class SensorCorrection:
     coupling_rad_per_s: float
     """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""
 
-    def corrected(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
+    def correct(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
         """Return the motion of base and m0; values within HALF_LENGTH of an end are wrong."""
         return (
             np.convolve(acceleration, self.acceleration, "same"),

@@ -11,10 +11,10 @@ import numpy as np
 from ..signals.arrays import Flags
 from ._filtering import (
     LOSS_LIMIT,
-    Filtered,
+    FilterPredictions,
     FilterState,
     MotionModel,
-    Smoothed,
+    RtsTrack,
     run_filter,
     smooth,
 )
@@ -44,8 +44,8 @@ _WORST_SD_OF_GAP = 0.1
 class TrackedPiece:
     """Consecutive samples of a motion that were tracked."""
 
-    smoothed: Smoothed
-    run: Filtered
+    smoothed: RtsTrack
+    run: FilterPredictions
     """Run of the filter over these samples."""
 
     @property
@@ -60,7 +60,7 @@ class TrackedPiece:
 
 
 @dataclass(frozen=True)
-class NotFollowed:
+class TrackGap:
     """A stretch without a track, and the reason."""
 
     first: int
@@ -86,7 +86,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
     return FilterState(ahead.first, ahead.states[0].copy(), _ACQUIRED_EXCESS * ahead.first_covariance)
 
 
-def _calmest(model: MotionModel, smoothed: Smoothed, is_open: Flags, sample_rate_hz: float) -> int | None:
+def _calmest(model: MotionModel, smoothed: RtsTrack, is_open: Flags, sample_rate_hz: float) -> int | None:
     """Return the flight sample in the middle third with the least uncertain p; None if all are uncertain."""
     count = is_open.size
     margin = max(1, round(_FLIGHT_MARGIN_S * sample_rate_hz))
@@ -107,7 +107,7 @@ def follow(
     model: MotionModel,
     motion: PreparedMotion,
     on_sample: Callable[[int], None] = lambda _sample: None,
-) -> Iterator[TrackedPiece | NotFollowed]:
+) -> Iterator[TrackedPiece | TrackGap]:
     """Track a motion; yield tracked pieces and the stretches between them in the order of time."""
     window = round(ACQUISITION_S * motion.sample_rate_hz)
     last = motion.samples - 1 - window
@@ -117,7 +117,7 @@ def follow(
         match start:
             case str():
                 stop = min(looked + 2 * (window // 3), motion.samples)
-                yield NotFollowed(done, stop, start)
+                yield TrackGap(done, stop, start)
                 done = stop
             case FilterState():
                 began = start.sample
@@ -126,7 +126,7 @@ def follow(
                 piece = next(pieces, None)
                 if began > done:
                     why = "a track was being acquired" if piece else "a track was lost at its beginning"
-                    yield NotFollowed(done, began, why)
+                    yield TrackGap(done, began, why)
                     done = began
                 while piece:
                     yield piece
@@ -138,7 +138,7 @@ def follow(
         looked = last if looked < last < following else following
         on_sample(done)
     if done < motion.samples:
-        yield NotFollowed(done, motion.samples, "too few samples were left to begin a track")
+        yield TrackGap(done, motion.samples, "too few samples were left to begin a track")
 
 
 def _advance_to(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
@@ -172,7 +172,7 @@ def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iter
             return
 
 
-def _piece(smoothed: Smoothed, run: Filtered, kept: int) -> TrackedPiece:
+def _piece(smoothed: RtsTrack, run: FilterPredictions, kept: int) -> TrackedPiece:
     return TrackedPiece(
         replace(
             smoothed,
@@ -184,14 +184,14 @@ def _piece(smoothed: Smoothed, run: Filtered, kept: int) -> TrackedPiece:
     )
 
 
-def _join_runs(one: Filtered, other: Filtered) -> Filtered:
+def _join_runs(one: FilterPredictions, other: FilterPredictions) -> FilterPredictions:
     pairs = zip(one.arrays.values(), other.arrays.values(), strict=True)
-    return Filtered(one.first, *(np.concatenate(pair) for pair in pairs))
+    return FilterPredictions(one.first, *(np.concatenate(pair) for pair in pairs))
 
 
-def reliable_samples(run: Filtered, sample_rate_hz: float) -> int:
+def reliable_samples(run: FilterPredictions, sample_rate_hz: float) -> int:
     """Return the number of samples in a lost run up to the last good innovations."""
-    squared = run.squared
+    squared = run.nis
     used = ~np.isnan(squared)
     width = max(1, round(_LOOK_S * sample_rate_hz))
     total = np.convolve(np.where(used, squared, 0.0), np.ones(width))[: squared.size]

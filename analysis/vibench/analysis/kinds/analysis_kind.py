@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 from ..comparison.curve import Curve, CurveOrigin
 from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import FrequencyResponseRequest
-from ..overlay.draws import Draw, Drawn
+from ..overlay.draws import Draw, DrawSet
 from ..overlay.ensemble import Quantity
 from ..overlay.overlay import AbstractOverlay, DwellOverlay, NoiseOverlay, SteppedSineOverlay, SweepOverlay
 from ..overlay.simulated_channels import SimulatedChannels
@@ -17,7 +17,7 @@ from ..recordings.facts import RecordingFacts
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.stepped_response import SteppedSineAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
-from ..tables import Labelled
+from ..tables import Tabular
 from ..uncertainty.budget import Budget
 
 Json = dict[str, Any]
@@ -27,7 +27,7 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 
 @dataclass(frozen=True, eq=False)
-class Result(Labelled, Generic[A, L]):
+class Result(Tabular, Generic[A, L]):
     """Analysis of a measurement and its comparison with the simulation."""
 
     analysis: A
@@ -57,7 +57,7 @@ class AnalysisKind(Generic[P, A, L]):
     """Return the function that estimates the measured quantities from simulated channels."""
     compared: Callable[[A], tuple[Quantity, ...]]
     """Return the measured quantities that are compared with the simulated records (draws)."""
-    lay: Callable[[A, Drawn[Any]], L]
+    lay: Callable[[A, DrawSet[Any]], L]
     """Return the overlay: the comparison of the analysis with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
     """Yield curves of the measured or simulated response of the recording with this name."""

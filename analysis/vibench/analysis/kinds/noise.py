@@ -79,10 +79,10 @@ def _estimate_for_draws(analysis: NoiseAnalysis) -> Estimate:
     return partial(repeated_response, repetitions=found.periodic.repetitions)
 
 
-def _streamed(channels: Channels, plan: Any, request: FrequencyResponseRequest) -> Estimated:
+def _estimate_streamed(channels: Channels, plan: Any, request: FrequencyResponseRequest) -> Estimated:
     found = streamed_response(channels, plan, request)
     return found.frequency_response, lambda: found
 
 
 REPEATED_NOISE = _noise(repeated_response, again=_estimate_for_draws)
-STREAMED_NOISE = _noise(_streamed, again=lambda _: _streamed)
+STREAMED_NOISE = _noise(_estimate_streamed, again=lambda _: _estimate_streamed)

@@ -173,12 +173,12 @@ def widen_extremes(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tup
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
         here = reach == each
-        lowest[here] = _widened(low, int(each), np.fmin)[here]
-        highest[here] = _widened(high, int(each), np.fmax)[here]
+        lowest[here] = _spread_extremes(low, int(each), np.fmin)[here]
+        highest[here] = _spread_extremes(high, int(each), np.fmax)[here]
     return lowest, highest
 
 
-def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
+def _spread_extremes(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
     """Return, for every column, the extreme over ``reach`` columns around it."""
     before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
@@ -318,7 +318,7 @@ def overview_levels(
     for number, channel in enumerate(recording.channels):
         kept = recording.read_overview(channel.role)
         if kept is None:
-            kept = _made(recording, channel.role, number * recording.samples, values, on_read)
+            kept = _build(recording, channel.role, number * recording.samples, values, on_read)
         levels[channel.role] = _levels(kept, channel)
     return levels
 
@@ -334,7 +334,7 @@ def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     return _levels(kept, recording.channel(role))
 
 
-def _made(recording: Recording, role: str, before: int, values: int, on_read: OnRead) -> CountOverview:
+def _build(recording: Recording, role: str, before: int, values: int, on_read: OnRead) -> CountOverview:
     sums = OverviewSums()
     for first in range(0, recording.samples, _PIECE_SAMPLES):
         last = min(first + _PIECE_SAMPLES, recording.samples)
@@ -344,7 +344,7 @@ def _made(recording: Recording, role: str, before: int, values: int, on_read: On
 
 
 def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[OverviewLevel, ...]:
-    low, high = _scaled(kept.low, channel), _scaled(kept.high, channel)
+    low, high = _scale(kept.low, channel), _scale(kept.high, channel)
     if channel.scale_factor < 0:
         low, high = high, low
     levels = [OverviewLevel(BIN_SAMPLES, low, high)]
@@ -361,7 +361,7 @@ def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[OverviewLevel,
     return tuple(levels)
 
 
-def _scaled(counts: Counts, channel: ChannelHeader) -> NDArray[np.float32]:
+def _scale(counts: Counts, channel: ChannelHeader) -> NDArray[np.float32]:
     values = counts * np.float64(channel.scale_factor) + channel.add_offset
     values[counts == MISSING_COUNT] = np.nan
     return values.astype(np.float32)

@@ -7,7 +7,7 @@ from scipy import fft
 
 from ..signals.arrays import Reals
 from ..signals.quantity import Quantity
-from ..tables import Labelled
+from ..tables import Tabular
 from ._ring import RingWindow
 from ._sine_response import drive_tone, drive_turns, look_samples, motion_of
 
@@ -21,7 +21,7 @@ MOST_POINTS = 3000
 
 
 @dataclass(frozen=True, eq=False)
-class Portrait(Labelled):
+class Portrait(Tabular):
     """Orbit of the newest periods, with one Poincaré point per drive period."""
 
     drive_hz: float

@@ -43,7 +43,7 @@ class Ring:
         """Index of the next sample to add."""
 
     @property
-    def held(self) -> int:
+    def available(self) -> int:
         """Number of samples available."""
         return 0 if self._begun is None else min(self.next_sample - self._begun, self._capacity)
 
@@ -65,11 +65,11 @@ class Ring:
 
     def newest(self, samples: int) -> RingWindow:
         """Return the newest ``samples`` samples, or all if there are fewer."""
-        count = min(max(samples, 0), self.held)
+        count = min(max(samples, 0), self.available)
         end = self.next_sample % self._capacity + self._capacity
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
-    def since(self, sample: int) -> RingWindow:
+    def samples_since(self, sample: int) -> RingWindow:
         """Return the samples from index ``sample``, as far as they are still available."""
         return self.newest(self.next_sample - sample)
 

@@ -24,7 +24,7 @@ from ..signals.confidence import DEFAULT_CONFIDENCE
 from ..signals.quantity import Quantity
 from ..signals.window import Window, effective_averages, hop_samples, taper
 from ..spectra.spectra import SpectralAverages, Spectrogram, SpectrogramSums
-from ..tables import Labelled
+from ..tables import Tabular
 from ._ring import Values
 
 _LEAST_SEGMENTS = 2
@@ -50,7 +50,7 @@ class SpectrumSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class LiveSpectrum(Labelled):
+class LiveSpectrum(Tabular):
     """Amplitude spectral density of every channel."""
 
     frequency_hz: Reals
@@ -112,7 +112,7 @@ class LiveSpectra:
 
     def spectrum(self) -> LiveSpectrum | None:
         """Return the spectral density of every channel; None before the first complete segment."""
-        used = self._used()
+        used = self._valid_entries()
         if not used.any():
             return None
         power = np.mean(self._power[used], axis=0).astype(np.float64)
@@ -149,7 +149,7 @@ class LiveSpectra:
         delay_s
             Lag of the response channel behind the base channel [s].
         """
-        used = self._used()
+        used = self._valid_entries()
         if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
             return None
         estimator = Estimator.DRIVE if len(rows) == 3 else Estimator.H1
@@ -184,7 +184,7 @@ class LiveSpectra:
             window_energy=float(self._taper @ self._taper),
         )
 
-    def _used(self) -> Flags:
+    def _valid_entries(self) -> Flags:
         """Return flags of the stored segments that are valid."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)

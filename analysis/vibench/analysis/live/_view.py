@@ -273,9 +273,9 @@ class LiveView:
 
     def add(self, first_sample: int, volts: NDArray[np.float32]) -> None:
         """Add samples [V], shape (channels, samples); samples that were already added are skipped."""
-        begun = self._ring.next_sample if self._ring.held else first_sample
+        begun = self._ring.next_sample if self._ring.available else first_sample
         self._ring.add(first_sample, volts * self._units_per_volt)
-        fresh = self._ring.since(begun).values
+        fresh = self._ring.samples_since(begun).values
         if fresh.shape[1] == 0:
             return
         self._spectra.add(fresh)
@@ -283,7 +283,7 @@ class LiveView:
         if self._response in self._rows:
             self._impacts.add(fresh[self._rows[self._response]])
         is_point_due = self._ring.next_sample - self._pointed >= _POINT_EVERY_S * self._rate_hz
-        if self._has(DRIVE, BASE, self._response) and is_point_due:
+        if self._has_roles(DRIVE, BASE, self._response) and is_point_due:
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
@@ -301,7 +301,7 @@ class LiveView:
 
     def frequency_response(self) -> FrequencyResponse | None:
         """Return |x / U| of the newest segments, with coherence and bounds; None before two segments."""
-        if not self._has(BASE, self._response):
+        if not self._has_roles(BASE, self._response):
             return None
         if self._frequency_response[0] != self._spectra.segments:
             wanted = (BASE, self._response, DRIVE)
@@ -320,7 +320,7 @@ class LiveView:
 
     def portrait(self) -> Portrait | None:
         """Return the newest orbit, and collect its Poincaré points; None without a sine drive."""
-        if not self._has(DRIVE, self._response):
+        if not self._has_roles(DRIVE, self._response):
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
             return self._portrait[1]
@@ -348,7 +348,7 @@ class LiveView:
         """Number of impacts since the start of the run."""
         return self._impacts.count
 
-    def _has(self, *roles: str) -> bool:
+    def _has_roles(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)
 
     def _add_point(self) -> None:

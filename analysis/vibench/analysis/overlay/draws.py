@@ -110,7 +110,7 @@ class UnseenNoise:
     sd: float = 0.0
     """Standard deviation of the estimated variance [V²]."""
 
-    def drawn(self, rng: np.random.Generator) -> float:
+    def random_rms_v(self, rng: np.random.Generator) -> float:
         """Return a random rms of the noise per sample, within its uncertainty [V]."""
         return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
 
@@ -226,9 +226,9 @@ class PlayedVoltage:
                 fft.irfft(share * lines, self._window.size, overwrite_x=True) * back, np.float32
             )
 
-        return self._joined(likely), roots
+        return self._overlap_add(likely), roots
 
-    def drawn(self, rng: np.random.Generator) -> Samples:
+    def random_voltage(self, rng: np.random.Generator) -> Samples:
         """Return a random voltage compatible with the recording, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
@@ -237,17 +237,17 @@ class PlayedVoltage:
         size = np.float32(self._own_v * np.sqrt(self._hop))
         roots = iter(self._roots)
 
-        def unknown(_first: int, _last: int) -> Samples:
+        def random_frames(_first: int, _last: int) -> Samples:
             root = next(roots)
             lines = rng.standard_normal((*root.shape, 2), np.float32).view(np.complex64)[..., 0]
             lines *= size * root
             return np.asarray(fft.irfft(lines, self._window.size, overwrite_x=True) * fade)
 
-        drawn = self._joined(unknown)
+        drawn = self._overlap_add(random_frames)
         drawn += self._likely
         return drawn
 
-    def _joined(self, frames: Callable[[int, int], Samples]) -> Samples:
+    def _overlap_add(self, frames: Callable[[int, int], Samples]) -> Samples:
         """Return the sum of half-overlapping frames; ``frames`` returns the frames of one batch."""
         hop = self._hop
         result = np.zeros((self._frames + 1, hop), np.float32)
@@ -332,7 +332,7 @@ class Draw(Generic[R]):
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn(Generic[R]):
+class DrawSet(Generic[R]):
     """All draws: the full estimate of the first draw, and the compared quantities of each draw."""
 
     run: SimulatedRun
@@ -380,7 +380,7 @@ def voltage_source(
     unseen, noise = known or (UnseenNoise(), noise)
     why = ["" if fitted is None else fitted.sentence, "" if known else UNKNOWN_NOISE]
     run = SimulatedRun(specimen, rig.driven, Accuracy.STANDARD, None, ". ".join(filter(None, why)))
-    drawn_channels = partial(_drawn_channels, channels, rig, fitted, voltage, noise, unseen)
+    drawn_channels = partial(_random_channels, channels, rig, fitted, voltage, noise, unseen)
     return DrawSource(run, draws, recording.samples, drawn_channels)
 
 
@@ -395,9 +395,9 @@ def base_source(
     return DrawSource(run, 1, channels.samples, lambda _: channels)
 
 
-def drawn(
+def all_draws(
     source: DrawSource, estimate: Callable[[SimulatedChannels], Draw[R]], measured: Sequence[Quantity]
-) -> Drawn[R]:
+) -> DrawSet[R]:
     """Return all draws of a source, each analysed like the recording.
 
     Fewer draws are made if the first draws agree clearly. Up to three times as many are made if few draws
@@ -407,7 +407,7 @@ def drawn(
 
     estimating = Lock()
 
-    def estimated(number: int) -> Draw[None]:
+    def estimate_draw(number: int) -> Draw[None]:
         channels = source.channels(number)
         # One estimate at a time: it is at most half of the work, but takes twice the simulation's memory.
         with estimating:
@@ -418,7 +418,7 @@ def drawn(
 
     workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * source.samples))))
     with ThreadPoolExecutor(workers) as pool:
-        found = list(pool.map(estimated, range(min(FIRST_DRAWS, source.most))))
+        found = list(pool.map(estimate_draw, range(min(FIRST_DRAWS, source.most))))
         usual = source.most if found[0].impacts else len(found)
         most = usual if source.most == 1 else _MORE * usual
         while len(found) < most:
@@ -429,15 +429,15 @@ def drawn(
             ):
                 break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
-            found += pool.map(estimated, range(len(found), stop))
+            found += pool.map(estimate_draw, range(len(found), stop))
     impacts = float(np.mean([each.impacts for each in found]))
     run = replace(source.run, draws=len(found), impacts=impacts, played_s=found[0].played_s)
-    return Drawn(
+    return DrawSet(
         run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
     )
 
 
-def _drawn_channels(
+def _random_channels(
     recorded: RecordedChannels,
     rig: DrivenRig,
     fitted: FittedShaker | None,
@@ -447,12 +447,12 @@ def _drawn_channels(
     number: int,
 ) -> SimulatedChannels:
     rng = np.random.default_rng([_SEED, number])
-    table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
-    volts = voltage.drawn(rng)
-    rms_v = unseen.drawn(rng)
+    table = rig.table if fitted is None else replace(rig.table, shaker=fitted.random_shaker(rng))
+    volts = voltage.random_voltage(rng)
+    rms_v = unseen.random_rms_v(rng)
     if rms_v > 0.0:
         volts = _with_noise(volts.copy(), rig.role, rms_v, recorded.sample_rate_hz, rng)
-    motion = _moved(replace(rig, table=table), volts, recorded.recording, noise, rng)
+    motion = _simulate_motion(replace(rig, table=table), volts, recorded.recording, noise, rng)
     return SimulatedChannels(
         recorded,
         motion.m0_velocity,
@@ -463,7 +463,7 @@ def _drawn_channels(
     )
 
 
-def _moved(
+def _simulate_motion(
     rig: DrivenRig, volts: Samples, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
 ) -> SampledMotion:
     """Simulate rig and specimen from a random initial state, with noise on the channels of base and m0."""
@@ -509,7 +509,7 @@ class StretchDraws:
     """Slice of ``volts`` with the simulated part of the recording."""
 
     @property
-    def measured(self) -> Reals:
+    def recorded_motion(self) -> Reals:
         """Recorded base acceleration and velocity of m0 over the samples of a draw, shape (2, samples)."""
         start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
         velocity = BridgedChannel(self.recording, VELOCITY).read(start, stop)
@@ -525,11 +525,11 @@ class StretchDraws:
 
         Raises UnusableData when the simulation did not reach its end.
         """
-        shaker = self.rig.table.shaker if self.fitted is None else self.fitted.drawn(rng)
+        shaker = self.rig.table.shaker if self.fitted is None else self.fitted.random_shaker(rng)
         rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
         rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
         noise = ChannelNoise(rms, self.noise.converter_v)
-        motion = _moved(rig, self.volts, self.recording, noise, rng)
+        motion = _simulate_motion(rig, self.volts, self.recording, noise, rng)
         return np.stack(
             [motion.base_acceleration[self.kept], motion.m0_velocity[self.kept]], dtype=np.float64
         )

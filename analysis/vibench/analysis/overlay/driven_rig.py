@@ -62,7 +62,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         Fitted shaker; by default the shaker of the bench configuration.
     """
     response = ResponseChannel(recording).role
-    rig = _configured(recording)
+    rig = _bench_rig(recording)
     if AMPLIFIER in recording.roles:
         amplifier, driven, role = Amplifier(), Driven.AMPLIFIER, AMPLIFIER
     else:
@@ -106,11 +106,11 @@ def acceleration_per_volt(shaker: Shaker, s: Complexes, carried_kg: Complexes) -
 
 def described_shaker(recording: Recording) -> Shaker | None:
     """Return the shaker of a recording's bench configuration; None if not described."""
-    rig = _configured(recording)
+    rig = _bench_rig(recording)
     return None if rig is None else shaker_of(rig)
 
 
-def _configured(recording: Recording) -> Rig | None:
+def _bench_rig(recording: Recording) -> Rig | None:
     try:
         return Rig.model_validate(dict(recording.bench))
     except ValidationError:

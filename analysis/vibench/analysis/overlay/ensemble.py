@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from ..signals.arrays import Flags, Integers, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 AGREEMENT = 0.99
 """Probability that a correct simulation has all |z| within the limit, however many values there are."""
@@ -42,7 +42,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleCurve(Labelled):
+class EnsembleCurve(Tabular):
     """One quantity, measured and in every draw.
 
     Square roots are compared because they are nearly normal, both for accurate and for random magnitudes
@@ -247,13 +247,13 @@ def ensemble_curves(
     """Return each measured quantity with its draws; quantities without draws are left out."""
     found = []
     for each in measured:
-        rows = [_alike(each, one) for draw in draws for one in draw if one.name == each.name]
+        rows = [_comparable(each, one) for draw in draws for one in draw if one.name == each.name]
         if rows:
             found.append(EnsembleCurve(each.name, each.frequency_hz, each.value, np.array(rows)))
     return tuple(found)
 
 
-def _alike(measured: Quantity, drawn: Quantity) -> Reals:
+def _comparable(measured: Quantity, drawn: Quantity) -> Reals:
     """Return a draw's values; NaN where its points or its kind of motion differ from the measured ones."""
     if drawn.value.shape != measured.value.shape:
         return np.full(measured.value.shape, np.nan)
@@ -276,7 +276,7 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
-class CurveDifference(Labelled):
+class CurveDifference(Tabular):
     """Ratio of measured to simulated magnitude; arrays of shape (points,)."""
 
     DOCUMENT: ClassVar = "median_abs_db rms_db share_within_two_standard_errors=share_within_two"

@@ -9,7 +9,7 @@ from vibench.acquisition.plan import Approach, Measurement, base_motion
 from vibench.acquisition.rig import Rig
 
 from ..signals.arrays import Flags, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
 
@@ -23,7 +23,7 @@ FOLLOWED_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class MeasurementPrediction(Labelled):
+class MeasurementPrediction(Tabular):
     """Responses to sines with the base amplitude of the plan or of the rig's model."""
 
     measurement: Measurement

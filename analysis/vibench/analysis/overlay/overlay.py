@@ -26,8 +26,8 @@ from ..sine.dwell_analysis import (
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweptMotion
 from ..sine.sweep_analysis import SweepAnalysis
-from ..tables import Labelled
-from .draws import Drawn, SimulatedRun
+from ..tables import Tabular
+from .draws import DrawSet, SimulatedRun
 from .ensemble import (
     MIXED,
     CurveDifference,
@@ -50,7 +50,7 @@ R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
-class AbstractOverlay(Labelled, Generic[R]):
+class AbstractOverlay(Tabular, Generic[R]):
     """A measurement with its simulation."""
 
     DOCUMENT: ClassVar = "*run difference ensemble escape"
@@ -68,7 +68,7 @@ class AbstractOverlay(Labelled, Generic[R]):
     """Predicted response to sines of the measured base amplitude A0."""
 
     @property
-    def shown(self) -> tuple[EnsembleCurve, ...]:
+    def extra_curves(self) -> tuple[EnsembleCurve, ...]:
         """Quantities that are simulated in all draws but not compared."""
         return ()
 
@@ -83,7 +83,7 @@ class AbstractOverlay(Labelled, Generic[R]):
 
     def quantity(self, name: str) -> EnsembleCurve | None:
         """Return the quantity with this name, measured and in all draws; None if it has no draws."""
-        return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
+        return next((each for each in (*self.ensemble, *self.extra_curves) if each.name == name), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
     @property
-    def shown(self) -> tuple[EnsembleCurve, ...]:
+    def extra_curves(self) -> tuple[EnsembleCurve, ...]:
         """Spectrum of the displacement, which is not compared with draws."""
         return (self.spectrum,)
 
@@ -142,7 +142,7 @@ TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", 
 
 
 def _difference(
-    drawn: Drawn[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
+    drawn: DrawSet[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
 ) -> CurveDifference:
     """Compare the measurement with the median of the draws, or with a single draw and its deviation."""
     (found,) = ensemble_curves([measured], drawn.quantities)
@@ -156,7 +156,7 @@ def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
 
-def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> NoiseOverlay:
+def noise_overlay(analysis: NoiseAnalysis, drawn: DrawSet[NoiseResponse]) -> NoiseOverlay:
     """Compare a transmission with the draws."""
     noise = analysis.excitation
     measured, simulated = analysis.response.frequency_response, drawn.response.frequency_response
@@ -200,7 +200,7 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
 
 
 def _sine_difference(
-    drawn: Drawn[R],
+    drawn: DrawSet[R],
     compared: Sequence[Quantity],
     measured: SweptMotion | DwellResponse | SteppedResponse,
     simulated: SweptMotion | DwellResponse | SteppedResponse,
@@ -239,7 +239,7 @@ def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
     return (Ending("collisions", longest.start.time_s, longest.stop.time_s, not longest.reaches_stop),)
 
 
-def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOverlay:
+def sweep_overlay(analysis: SweepAnalysis, drawn: DrawSet[SweptMotion]) -> SweepOverlay:
     """Compare a sweep with the draws."""
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
@@ -288,7 +288,7 @@ def dwell_quantities(
 
 
 def dwell_overlay(
-    analysis: DwellAnalysis, drawn: Drawn[DwellResponse], endings: Sequence[Ending]
+    analysis: DwellAnalysis, drawn: DrawSet[DwellResponse], endings: Sequence[Ending]
 ) -> DwellOverlay:
     """Compare a dwell with the draws; ``endings`` are the measured ends of the motion."""
     towards_hz = bound_frequencies_hz(analysis.facts)
@@ -321,7 +321,7 @@ def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
     )
 
 
-def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]) -> SteppedSineOverlay:
+def stepped_overlay(analysis: SteppedSineAnalysis, drawn: DrawSet[SteppedResponse]) -> SteppedSineOverlay:
     """Compare the measured responses of all steps with the draws."""
     measured = analysis.response
     compared = stepped_quantities(measured)

@@ -19,7 +19,7 @@ from vibench.sim import (
 )
 
 from ..signals.arrays import Flags, Integers, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 """Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
@@ -33,7 +33,7 @@ WINDOW_S = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class ResponsePrediction(Labelled):
+class ResponsePrediction(Tabular):
     """Responses of m0 to sines; arrays of shape (points,)."""
 
     specimen: Specimen

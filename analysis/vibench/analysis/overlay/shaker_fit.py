@@ -60,7 +60,7 @@ class FittedShaker:
             f"of freedom): {values}"
         )
 
-    def drawn(self, rng: np.random.Generator) -> Shaker:
+    def random_shaker(self, rng: np.random.Generator) -> Shaker:
         """Return a random shaker within this uncertainty."""
         logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
         return _shaker(logarithms)
@@ -145,7 +145,7 @@ class _VoltageAndBase(RecordedChannels):
     def read(self, start: int, stop: int) -> Reals:
         return np.stack([self.recording.read(each, start, stop) for each in (DRIVE, self.role, BASE)])
 
-    def bridged(self, start: int, stop: int) -> Flags:
+    def bridge_flags(self, start: int, stop: int) -> Flags:
         return np.zeros(stop - start, dtype=np.bool_)
 
 

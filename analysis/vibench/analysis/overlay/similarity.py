@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 SIMILARITY_THRESHOLD = 0.1
 """Largest `Similarity.difference` of similar points (Gong et al. 2025, section 4)."""
@@ -78,7 +78,7 @@ class SimilarityCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class Similarity(Labelled):
+class Similarity(Tabular):
     """Similarity of a model's response to the reference; arrays of shape (points,)."""
 
     frequency_hz: Reals

@@ -133,13 +133,13 @@ class SimulatedChannels:
             [drive_v, self.base_acceleration[start:stop], self.velocity[start:stop]], dtype=np.float64
         )
 
-    def overloaded(self, start: int, stop: int) -> Flags:
+    def overload_flags(self, start: int, stop: int) -> Flags:
         """Return flags of overloaded samples in the recording; the simulation is analysed without them."""
-        return self.recorded.overloaded(start, stop)
+        return self.recorded.overload_flags(start, stop)
 
-    def bridged(self, start: int, stop: int) -> Flags:
+    def bridge_flags(self, start: int, stop: int) -> Flags:
         """Return flags of samples that were bridged (drop-outs) in the recording."""
-        return self.recorded.bridged(start, stop)
+        return self.recorded.bridge_flags(start, stop)
 
     def played_impacts(self, label: str) -> tuple[float, float]:
         """Return the number of impacts in all segments with this label, and the segments' duration [s]."""
@@ -162,7 +162,7 @@ def under_base_motion(
     Raises UnusableData when samples were lost, or the simulation did not finish.
     """
     base = recorded_base_motion(recording, measurement)
-    velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
+    velocity, impacts = shake_specimen(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
     counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
     # The simulated response has no delay, but the recorded base may have one.
     return SimulatedChannels(
@@ -176,7 +176,7 @@ def under_base_motion(
     )
 
 
-def shaken(
+def shake_specimen(
     specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
 ) -> tuple[Reals, Integers]:
     """Return m0's velocity and the number of impacts at every sample of the base displacement."""

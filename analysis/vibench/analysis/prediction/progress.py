@@ -177,7 +177,7 @@ def map_pictures(
 
 def picture_of(results: MapResults) -> MapPicture:
     """Return the picture of a map over frequency and amplitude."""
-    frequency, amplitude = (results.plan.range_of(each).edges for each in results.plan.varied)
+    frequency, amplitude = (results.plan.range_of(each).edges for each in results.plan.varying)
     classes = motion_classes(results)
     is_known = np.isfinite(classes)
     if is_known.any():
@@ -185,12 +185,12 @@ def picture_of(results: MapResults) -> MapPicture:
         there = tuple(nearest)
     else:
         there = tuple(np.indices(classes.shape))
-    text = map_caption(results) if results.is_complete else f"{results.computed} points computed so far."
+    text = map_caption(results) if results.is_complete else f"{results.points} points computed so far."
     return MapPicture(
         frequency_hz=(frequency[0], frequency[-1]),
         amplitude_m=(amplitude[0], amplitude[-1]),
         classes=np.nan_to_num(classes[there], nan=-1.0).astype(np.int8),
-        response_i=results.shown("response_i")[there].astype(np.float32),
+        response_i=results.map_values("response_i")[there].astype(np.float32),
         motions=results.motion_counts[there].astype(np.float32),
         text=text,
     )
@@ -486,7 +486,7 @@ class SimulationProgress:
         )
 
     @property
-    def forgotten(self) -> int:
+    def sensitive(self) -> int:
         """Number of points whose motion depends sensitively on the initial state."""
         points = (point for found in self._found.values() for point in found.values())
         return sum(point.memory is StartMemory.LOST for point in points)

@@ -143,11 +143,11 @@ def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
             case SimulationRequest():
                 simulate(request, tell, cancelled)
             case BranchRequest():
-                _tell_each(branch_lines(request), tell, cancelled)
+                _send_each(branch_lines(request), tell, cancelled)
             case SpectrumRequest():
-                _tell_each(spectrum_points(request), tell, cancelled)
+                _send_each(spectrum_points(request), tell, cancelled)
             case ChainRequest():
-                _tell_each(chain_runs(request), tell, cancelled)
+                _send_each(chain_runs(request), tell, cancelled)
             case MapRequest():
                 map_pictures(request, lambda picture: tell((picture,)), cancelled)
             case MotionRequest():
@@ -156,7 +156,7 @@ def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
         tell((Trouble(str(error)),))
 
 
-def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
+def _send_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
     for part in parts:
         if cancelled():
             return

@@ -140,7 +140,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
     top, middle = int(filled[-1]), int(np.searchsorted(total, total[-1] / 2))
     height, at_top = top - middle, int(counts[top - 1 :].sum())
 
-    def above(value: float) -> int:
+    def count_above(value: float) -> int:
         return int(total[-1] - total[max(0, int(value))])
 
     if height < _LEAST_HEIGHT * (top - filled[0]) or at_top == total[-1]:
@@ -149,17 +149,17 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
     resolution = max(1.0, step / full_scale * _COUNTED / 2)
     gap = max(0, int(np.diff(filled[filled >= lasting]).max(initial=0)) - resolution)
     if height > _FEWEST_STEPS * resolution and at_top >= max(
-        _FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)
+        _FEWEST_AT_TOP, _FLAT_VALUE * count_above(top - height / 2)
     ):
         other = int(counts[middle + 1 : top - 1].max(initial=0))
         if gap <= _GAP * height or 0 < other <= _AS_FREQUENT * at_top:
             return top
     for share in _TOPS:
-        whole = above(top - share * height)
+        whole = count_above(top - share * height)
         values = int(np.count_nonzero(counts[int(top - share * height) :]))
         is_resolved = share * height > _FEWEST_VALUES * resolution and gap <= _GAP_IN_TOP * share * height
         is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
-        if is_resolved and is_counted and above(top - share * height / 2) > _FLAT * whole:
+        if is_resolved and is_counted and count_above(top - share * height / 2) > _FLAT * whole:
             return top
     return None
 

@@ -125,10 +125,10 @@ class Channels(Protocol):
     def read(self, start: int, stop: int) -> Reals:
         """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
 
-    def overloaded(self, start: int, stop: int) -> Flags:
+    def overload_flags(self, start: int, stop: int) -> Flags:
         """Return the samples at which one of the channels was near full scale, shape (samples,)."""
 
-    def bridged(self, start: int, stop: int) -> Flags:
+    def bridge_flags(self, start: int, stop: int) -> Flags:
         """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
 
 
@@ -201,7 +201,7 @@ class RecordedChannels:
         self.on_read(stop, self.samples)
         return read
 
-    def overloaded(self, start: int, stop: int) -> Flags:
+    def overload_flags(self, start: int, stop: int) -> Flags:
         """Return the samples at which one of the channels was near full scale, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
@@ -214,7 +214,7 @@ class RecordedChannels:
             marks[max(0, dropout.first - start) : dropout.stop - start] = False
         return marks
 
-    def bridged(self, start: int, stop: int) -> Flags:
+    def bridge_flags(self, start: int, stop: int) -> Flags:
         """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for dropout in self._response.dropouts(start, stop):

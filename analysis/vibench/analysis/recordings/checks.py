@@ -13,7 +13,7 @@ from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
 from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig
 
-from ..tables import Labelled
+from ..tables import Tabular
 from .channels import DRIVE
 from .facts import RecordingFacts
 
@@ -53,7 +53,7 @@ R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
-class AbstractAnalysis(Labelled, Generic[P, R]):
+class AbstractAnalysis(Tabular, Generic[P, R]):
     """Result of the analysis of one recording: facts, checks, plan and response."""
 
     facts: RecordingFacts

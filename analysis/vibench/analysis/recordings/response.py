@@ -166,12 +166,12 @@ class ResponseChannel:
             given = np.where(lost, 0.0, given - (0.0 if lost.all() else np.nanmean(given)))
             before, behind = first - (start - reach), (stop + reach) - last
             about = _CONVERSIONS[self.quantity][1]
-            ends = _mirrored(given, before, about)[::-1], _mirrored(given[::-1], behind, about)
+            ends = _mirror(given, before, about)[::-1], _mirror(given[::-1], behind, about)
             given = np.concatenate((ends[0], given, ends[1]))
-            found = _convolved(given, self._kernel)
+            found = _convolve(given, self._kernel)
             if lost.any():
                 marks = np.pad(lost.astype(np.float64), (before, behind))
-                found[_convolved(marks, np.ones(self._kernel.size)) > 0.5] = np.nan
+                found[_convolve(marks, np.ones(self._kernel.size)) > 0.5] = np.nan
             self._block = (number, found)
         return self._block[1]
 
@@ -185,16 +185,16 @@ def noise_as_read(
     before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
     for first in range(0, count, block):
         white = np.concatenate((before, rng.standard_normal(min(block, count - first), np.float32)))
-        yield white if kernel.size == 1 else _convolved(white, kernel)
+        yield white if kernel.size == 1 else _convolve(white, kernel)
         before = white[white.size - kernel.size + 1 :]
 
 
-def _mirrored(samples: Reals, count: int, about: float) -> Reals:
+def _mirror(samples: Reals, count: int, about: float) -> Reals:
     """Return ``count`` mirrored samples beyond the first sample, the nearest first."""
     return np.asarray(about * samples[:1] - samples[1 : count + 1])
 
 
-def _convolved(samples: Samples, kernel: Reals) -> Reals:
+def _convolve(samples: Samples, kernel: Reals) -> Reals:
     """Return the part of a convolution that needs no sample beyond the ends."""
     # numpy.fft is used, because importing scipy.signal would delay the start of the window.
     size = next_fast_len(samples.size + kernel.size - 1, real=True)

@@ -30,12 +30,12 @@ from ._figures import (
     curve_figure as curve_figure,
     draw_line as draw_line,
     exponent_spectrum_figure as exponent_spectrum_figure,
+    figure_style as figure_style,
     frequency_axis as frequency_axis,
     legend_above as legend_above,
     magnitude_axis as magnitude_axis,
     map_figure as map_figure,
     new_figure as new_figure,
-    styled as styled,
 )
 from ._page import (
     Agreement as Agreement,

@@ -12,8 +12,8 @@ from vibench.sim.operating_system.this import replace_file
 from ..comparison.curve import Curve, curve_difference
 from ..errors import InvalidRequest
 from ..figures.comparison import comparison_figure
-from ..results.campaign_results import CampaignResults, counted_once
-from ..results.compared_recording import ComparedRecording, kept_result
+from ..results.campaign_results import CampaignResults, without_copies
+from ..results.compared_recording import ComparedRecording, stored_result
 from ..tables import Table, write_csv
 from ._report import write_report
 
@@ -77,9 +77,9 @@ def write_comparison(
 def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     if not recordings:
         raise InvalidRequest("a report without recordings was requested; add one to the comparison")
-    kept = [kept_result(each) for each in recordings]
+    kept = [stored_result(each) for each in recordings]
     failures = tuple(failure for _, failed in kept for failure in failed)
-    results = counted_once([result for result, _ in kept])
+    results = without_copies([result for result, _ in kept])
     write_report(CampaignResults(target.stem, results, failures), target)
 
 

@@ -13,11 +13,11 @@ from ..figures.style import (
     SIMULATED,
     TERMINAL,
     DrawnFigure,
+    figure_style,
     frequency_axis,
     legend_above,
     magnitude_axis,
     new_figure,
-    styled,
 )
 
 __all__ = [
@@ -35,10 +35,10 @@ __all__ = [
     "curve_figure",
     "draw_line",
     "exponent_spectrum_figure",
+    "figure_style",
     "frequency_axis",
     "legend_above",
     "magnitude_axis",
     "map_figure",
     "new_figure",
-    "styled",
 ]

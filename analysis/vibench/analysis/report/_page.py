@@ -93,7 +93,7 @@ class Page:
 
 
 @dataclass(frozen=True)
-class _Embedded:
+class _EmbeddedFigure:
     number: int
     source: str
     """A ``data:`` address that contains the whole image."""
@@ -145,16 +145,16 @@ def _escape(content: object) -> object:
     return printable(content) if type(content) is str else content
 
 
-def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
+def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _EmbeddedFigure:
     if folder is not None:
         drawn.save(folder)
     svg = drawn.svg
     kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
     source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-    return _Embedded(number, source, *divided_caption(drawn))
+    return _EmbeddedFigure(number, source, *split_caption(drawn))
 
 
-def divided_caption(drawn: DrawnFigure) -> tuple[str, str]:
+def split_caption(drawn: DrawnFigure) -> tuple[str, str]:
     """Split a caption into its first sentences, which fill at most three lines, and the rest."""
     sentences = _SENTENCE_ENDS.split(drawn.caption)
     lengths = [len(drawn.title) + len(" ".join(sentences[:end])) for end in range(len(sentences) + 1)]

@@ -18,7 +18,7 @@ from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES, family_of
 from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
 from ..kinds.noise import NOISE_FAMILY
-from ..overlay.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
+from ..overlay.draws import DRAWS, DrawSource, all_draws, base_source, voltage_source
 from ..overlay.driven_rig import described_shaker
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..overlay.shaker_fit import FittedShaker, fit_shaker
@@ -77,7 +77,7 @@ def overlay(
     stage(f"simulating {simulation.value}")
     source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
     row = ANALYSES[analysis.excitation.kind]
-    found = drawn(source, row.draws(analysis), row.compared(analysis))
+    found = all_draws(source, row.draws(analysis), row.compared(analysis))
     stage("comparing with the simulation")
     model_overlay: AbstractOverlay[Any] = row.lay(analysis, found)
     return model_overlay
@@ -157,19 +157,19 @@ class CampaignResults:
     @property
     def noise(self) -> tuple[NoiseResult, ...]:
         """Results of noise measurements, weak to strong."""
-        return self._with(NoiseAnalysis)
+        return self._results_of(NoiseAnalysis)
 
     @property
     def sweeps(self) -> tuple[SweepResult, ...]:
         """Results of sweeps, in the order given."""
-        return self._with(SweepAnalysis)
+        return self._results_of(SweepAnalysis)
 
     @property
     def dwells(self) -> tuple[DwellResult, ...]:
         """Results of dwells, sorted by frequency, then weak to strong."""
-        return self._with(DwellAnalysis)
+        return self._results_of(DwellAnalysis)
 
-    def _with(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:
+    def _results_of(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:
         return tuple(each for each in self.in_order if isinstance(each.analysis, analysis))
 
 
@@ -231,10 +231,10 @@ def analyse_files(
             continue
         results.append(result)
         failures.extend(failed)
-    return CampaignResults(name, counted_once(results), tuple(failures))
+    return CampaignResults(name, without_copies(results), tuple(failures))
 
 
-def counted_once(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
+def without_copies(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
     """Return the results without copies of a recording; a warning in the kept result names the copies."""
     firsts = first_copies([each.analysis.facts for each in results])
     kept = {first: results[first] for first in firsts}
@@ -290,7 +290,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
     return None
 
 
-def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
+def merge_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
     """Merge the results of separate recordings into one campaign called ``name``."""
     return CampaignResults(
         name,
@@ -374,11 +374,11 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
     -------
     Budgets (JCGM 100:2008). A dwell has budgets for A0 and Responses I and II, a sweep or stepped sine for
     its largest responses, noise for frequency, damping and transmissibility at each resonance. If the
-    recording lasted until a bound was met, budgets are widened: see `Budget.widened`.
+    recording lasted until a bound was met, budgets are widened: see `Budget.widen`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.overlay)
     has_chosen_end = result.analysis.facts.measurement.until is not None
-    return tuple(each.widened() for each in found) if has_chosen_end else found
+    return tuple(each.widen() for each in found) if has_chosen_end else found
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:

@@ -21,12 +21,12 @@ from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.checks import Verdict
 from ..sine.stepped_response import SteppedResponse
 from ..sine.sweep import SweepResponse
-from ..tables import Labelled
+from ..tables import Tabular
 from .campaign_results import AnalysisFailure, result_of
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedRecording(Labelled):
+class ComparedRecording(Tabular):
     """Curves and findings of a recording, small enough to be passed between processes."""
 
     path: Path
@@ -39,7 +39,7 @@ class ComparedRecording(Labelled):
     warnings: tuple[str, ...]
     """Warnings from the checks of the recording."""
     kept: bytes
-    """The whole result, pickled for reports; `kept_result` restores it."""
+    """The whole result, pickled for reports; `stored_result` restores it."""
 
 
 def compare_recording(
@@ -74,7 +74,7 @@ def compare_recording(
     )
 
 
-def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
+def stored_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Return the whole result and its failures; unpickling is safe, as the bytes never come from a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
@@ -88,7 +88,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
     Raises NotEnoughData when the recording is of another kind, or has a single frequency.
     """
-    result, _ = kept_result(compared)
+    result, _ = stored_result(compared)
     found = drive_level(result)
     if not found:
         raise NotEnoughData(_NO_LEVEL.format(compared.path.name))

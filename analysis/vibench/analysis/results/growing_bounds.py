@@ -63,14 +63,14 @@ def bounds_of(result: AnyResult) -> dict[str, float | None]:
     """
     found: dict[str, float | None] = {}
     for name, pattern in RESULT_PATTERNS.items():
-        bounds = [bound_of(each) for each in budgets_of(result) if re.search(pattern, each.quantity)]
+        bounds = [random_bound(each) for each in budgets_of(result) if re.search(pattern, each.quantity)]
         if bounds:
             known = [each for each in bounds if each is not None]
             found[name] = max(known) if len(known) == len(bounds) else None
     return found
 
 
-def bound_of(budget: Budget) -> float | None:
+def random_bound(budget: Budget) -> float | None:
     """Return the relative 95 % random bound of one quantity; None if its budget states no bound."""
     parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
     stated = [each for each in parts if each is not None]

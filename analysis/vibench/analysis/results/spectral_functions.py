@@ -111,7 +111,7 @@ def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction
 
 def _responses(analysis: NoiseAnalysis, node: int | None = None) -> tuple[UniversalFunction, ...]:
     response, view, point = analysis.response, analysis.request.view, analysis.facts.measurement.point
-    found = view.shown(response.frequency_response)
+    found = view.apply(response.frequency_response)
     moved = _axis(Role(analysis.facts.response), analysis.facts.mass, view.response)
     reference = _axis(Role.BASE_ACCELERATION, "base", view.base)
     if point is not None:
@@ -135,7 +135,7 @@ def _axis(role: Role, body: str, quantity: Quantity) -> FunctionAxis:
 
 
 @dataclass(frozen=True, eq=False)
-class _Played:
+class _PlayedParts:
     """The parts of an excerpt over which densities are averaged."""
 
     stretches: tuple[Excerpt, ...]
@@ -152,7 +152,7 @@ class _Played:
         return f"over {seconds:.6g} s of {' and '.join(self.labels)}"
 
 
-def _played_parts(excerpt: Excerpt) -> _Played:
+def _played_parts(excerpt: Excerpt) -> _PlayedParts:
     """Return the parts with excitation; a recording without labelled parts counts as one part."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
@@ -170,10 +170,10 @@ def _played_parts(excerpt: Excerpt) -> _Played:
             f"but {max(chosen_s, 0.0):.3g} s were chosen; choose a longer excerpt"
         )
     stretches = tuple(replace(excerpt, start=start, stop=stop) for _, start, stop in used)
-    return _Played(stretches, tuple(dict.fromkeys(label for label, _, _ in used)), segment)
+    return _PlayedParts(stretches, tuple(dict.fromkeys(label for label, _, _ in used)), segment)
 
 
-def _density(played: _Played, channel: ChannelHeader) -> UniversalFunction:
+def _density(played: _PlayedParts, channel: ChannelHeader) -> UniversalFunction:
     first, *_ = played.stretches
     hop = hop_samples(played.segment, _OVERLAP)
     sums = DensitySums(first.recording.sample_rate_hz, segment_samples=played.segment, overlap=_OVERLAP)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..tables import Labelled
+from ..tables import Tabular
 from .arrays import Reals
 
 DEFAULT_BINS = 1500
@@ -13,7 +13,7 @@ DEFAULT_BINS = 1500
 
 
 @dataclass(frozen=True)
-class Envelope(Labelled):
+class Envelope(Tabular):
     """Extremes of a signal in equal intervals of time (bins); arrays of shape (bins,)."""
 
     OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}

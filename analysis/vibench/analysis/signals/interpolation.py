@@ -126,18 +126,18 @@ class Decimator:
         self._received += block.shape[1]
         if self._factor == 1:
             return block
-        return self._filtered(np.concatenate((self._pending, block), axis=1))
+        return self._filter(np.concatenate((self._pending, block), axis=1))
 
     def finish(self) -> Reals:
         """Return the last output samples, assuming zeros after the record."""
         if self._factor == 1:
             return self._pending
         zeros = np.zeros((self._pending.shape[0], self._half))
-        data = self._filtered(np.concatenate((self._pending, zeros), axis=1))
+        data = self._filter(np.concatenate((self._pending, zeros), axis=1))
         left = -(-self._received // self._factor) - (self._given - data.shape[1])
         return data[:, : max(left, 0)]
 
-    def _filtered(self, data: Reals) -> Reals:
+    def _filter(self, data: Reals) -> Reals:
         count = (data.shape[1] - self._taps.size) // self._factor + 1
         if count <= 0:
             self._pending = data

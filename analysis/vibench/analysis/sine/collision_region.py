@@ -8,7 +8,7 @@ from scipy.ndimage import binary_opening, maximum_filter1d
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from .sweep import SweptMotion
 
 _NOISE_FACTOR = 4.0
@@ -72,7 +72,7 @@ class CollisionRegion:
 
 
 @dataclass(frozen=True)
-class Collisions(Labelled):
+class Collisions(Tabular):
     """All collision regions of a sweep in the order of time, with the residual and thresholds."""
 
     OWN_UNITS: ClassVar = {"residual_rms": "m s-1", "threshold": "m s-1", "noise_rms": "m s-1"}

@@ -18,14 +18,14 @@ from ..signals.confidence import standard_uncertainty
 from ..signals.interpolation import sizes_with_maxima
 from ..signals.quantity import ConvertedSignal, Quantity, converted_signal, disturbed_samples
 from ..spectra.spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
-from ..tables import Labelled
+from ..tables import Tabular
 from ..tones.order_tracking import (
     ALL_ORDERS,
     TrackedOrders,
     cycles_needed,
     order_label,
     order_turns,
-    tracked_together,
+    track_signals,
 )
 from ..tones.sine_fit import DriveLevel, drive_level, noise_lift, peaks, steady_phase
 
@@ -116,7 +116,7 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
     if rest.rms_m <= max(_EXPLAINED * sensor.rms_m, _SILENT * heard_m, SMALL * motion_m):
         return rest
     if silent.is_known:
-        return louder(silent, sensor)
+        return larger_noise(silent, sensor)
     return Background(
         np.nan,
         np.nan,
@@ -125,7 +125,7 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
     )
 
 
-def louder(silent: Background, sensor: Background) -> Background:
+def larger_noise(silent: Background, sensor: Background) -> Background:
     """Return the larger of the noise in the silence and the sensor noise."""
     return silent if silent.rms_m > sensor.rms_m else sensor
 
@@ -218,7 +218,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class DwellResponse(Labelled):
+class DwellResponse(Tabular):
     """Results of one dwell over its analysed window."""
 
     OWN_UNITS: ClassVar = {
@@ -347,7 +347,7 @@ def dwell_response(
     is_clear = _clear(bridged, displacement, near_hz, window)
     phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
     motion = displacement.samples[window]
-    whole, base_whole, repeating = tracked_together(
+    whole, base_whole, repeating = track_signals(
         (response[window], base[window], motion), phase, interval_samples=motion.size, orders=orders
     )
     parts, base_parts = _tenths((response[window], base[window]), phase, orders)
@@ -364,13 +364,13 @@ def dwell_response(
     repeated = np.asarray(np.real(repeating.value[:, 0] @ np.stack(order_turns(phase, orders))))
     rest = background_between_lines(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
-    most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
+    most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * larger_noise(silent, sensor).rms_m)
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
     repeated = sizes_with_maxima(repeated)
     rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
     lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
-    spectrum = spectrum.converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    spectrum = spectrum.convert(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     return DwellResponse(
         drive=level,
         window_s=window_s,
@@ -390,7 +390,7 @@ def dwell_response(
         orders=orders,
         order_displacement=whole.value[:, 0] / (1j * omega * np.asarray(orders)),
         noise_density=noise_density,
-        noise_displacement_m=louder(silent, sensor).rms_m,
+        noise_displacement_m=larger_noise(silent, sensor).rms_m,
         displacement=displacement,
         is_clear=is_clear,
         spectrum=spectrum,
@@ -439,7 +439,7 @@ def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -
     """
     cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
     blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
-    return tracked_together(signals, phase, interval_samples=phase.size // blocks, orders=orders)
+    return track_signals(signals, phase, interval_samples=phase.size // blocks, orders=orders)
 
 
 def _slow_changes(

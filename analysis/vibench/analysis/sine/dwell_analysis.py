@@ -20,7 +20,7 @@ from ..signals.envelope import Envelope, envelope
 from ..signals.interpolation import REACH, interpolate
 from ..signals.quantity import Quantity, converted_signal
 from ..spectra.spectra import spectral_density
-from ..tables import Labelled
+from ..tables import Tabular
 from ..tones.sine_fit import fit_sine
 from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
@@ -124,7 +124,7 @@ def stroboscope(
 
 
 @dataclass(frozen=True, eq=False)
-class DwellMotion(Labelled):
+class DwellMotion(Tabular):
     """Poincaré points of a dwell, with the verdict."""
 
     section: Section
@@ -139,7 +139,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     section = _section(channels, response)
     verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
     stretch = only_stretch(channels, SegmentLabel.DWELL)
-    bridged = channels.bridged(stretch.start, stretch.stop)
+    bridged = channels.bridge_flags(stretch.start, stretch.stop)
     is_clear = clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz)
     clear = np.mean(is_clear)
     # The few points of a short burst look like noise, and its maximum may lie outside the window.
@@ -328,7 +328,7 @@ def measured_dwell(
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
         silence=silence_before(channels)[-1],
-        bridged=channels.bridged(stretch.start, stretch.stop),
+        bridged=channels.bridge_flags(stretch.start, stretch.stop),
     )
 
 

@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
 
@@ -260,7 +260,7 @@ _PER_BEL_DB = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Hysteresis(Labelled):
+class Hysteresis(Tabular):
     """Difference between an up sweep and a down sweep; arrays of shape (points,)."""
 
     frequency_hz: Reals

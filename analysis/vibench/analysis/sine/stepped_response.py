@@ -20,7 +20,7 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import (
     FeedbackNote,
-    Held,
+    Hold,
     JumpNote,
     JumpSearchEnd,
     NoiseNote,
@@ -35,7 +35,7 @@ from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
 from ..signals.quantity import steady_line
-from ..tables import Labelled, columns, plus_minus
+from ..tables import Tabular, columns, plus_minus
 from ..tones.sine_fit import fit_sine
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
@@ -51,7 +51,7 @@ _OF_A_STEP = (
 
 
 @dataclass(frozen=True)
-class SteppedResponse(Labelled):
+class SteppedResponse(Tabular):
     """Results of a stepped sine, one value per step in the order of playing; arrays of shape (steps,)."""
 
     DOCUMENT: ClassVar = (
@@ -127,7 +127,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     response += line - inside[places]
-    bridged = channels.bridged(stretch.start, stretch.stop)[places]
+    bridged = channels.bridge_flags(stretch.start, stretch.stop)[places]
     if np.mean(clear_of_dropouts(bridged, rate, near_hz)[edge:-edge]) < LEAST_CLEAR:
         return None
     return dwell_response(
@@ -231,7 +231,7 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
         kinds += [f"{word}: {motions[motion]}"] * bool(motions[motion])
     if kinds:
         yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
-    outside = sum(each.level is Held.OUTSIDE for each in steps)
+    outside = sum(each.level is Hold.OUTSIDE for each in steps)
     if outside:
         yield f"The base level was out of tolerance in {outside} of {len(steps)} recorded motions."
 
@@ -308,7 +308,7 @@ class TrackedResonance:
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
     """Return the resonances that were found, sorted from the weakest base level."""
-    return tuple(sorted(_found_levels(notes), key=lambda each: each.base_m_per_s2))
+    return tuple(sorted(_tracked_levels(notes), key=lambda each: each.base_m_per_s2))
 
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
@@ -317,7 +317,7 @@ def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
     return tuple(sorted(each.asked_m_per_s2 for each in lost))
 
 
-def _found_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
+def _tracked_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
     for each in notes:
         if not isinstance(each, ResonanceNote) or each.frequency_hz is None or each.frequency_u_hz is None:
             continue

@@ -17,14 +17,14 @@ from ..recordings.channels import far_from
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.interpolation import Decimator, decimation_factor
 from ..signals.quantity import Quantity, converted_signal, disturbed_samples
-from ..tables import Labelled
+from ..tables import Tabular
 from ..tones.order_tracking import (
     ALL_ORDERS,
     ORDERS,
     TrackedOrders,
     cycles_needed,
-    tracked_orders,
-    tracked_together,
+    track_orders,
+    track_signals,
 )
 from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
@@ -128,7 +128,7 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 
 @dataclass(frozen=True)
-class SweptMotion(Labelled):
+class SweptMotion(Tabular):
     """Quantities of a recorded or simulated sweep (draw); arrays of shape (intervals,) unless stated."""
 
     OWN_UNITS: ClassVar = {
@@ -314,7 +314,7 @@ class SweepSums:
         linear
             Transmission of the specimen without contact, for comparison in the same sweep.
         """
-        motion, swept, velocity, phase = self._analysed(delay_s, linear)
+        motion, swept, velocity, phase = self._evaluate(delay_s, linear)
         harmonics, harmonics_hz = self._harmonics(velocity, phase)
         low_hz, high_hz = self._band_hz
         noise_density = motion.noise_rms / np.sqrt(self._rate_hz / 2)
@@ -331,7 +331,7 @@ class SweepSums:
 
     def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
         """Return the quantities that simulated records (draws) need; see `response`."""
-        return self._analysed(delay_s, linear)[0]
+        return self._evaluate(delay_s, linear)[0]
 
     @property
     def clock(self) -> DrivePhase:
@@ -344,7 +344,7 @@ class SweepSums:
         """Frequency band of the displacement [Hz]."""
         return _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
 
-    def _analysed(
+    def _evaluate(
         self, delay_s: float, linear: Transmission | None
     ) -> tuple[SweptMotion, Reals, Reals, DrivePhase]:
         """Return the motion, x of shape (intervals, samples) [m], the velocity [m/s] and the drive phase."""
@@ -361,7 +361,7 @@ class SweepSums:
         if self._clock is None:
             self._clock = drive_phase(data[0], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
         phase = self._clock
-        track = partial(tracked_together, phase_rad=phase.phase_rad, interval_samples=self._interval)
+        track = partial(track_signals, phase_rad=phase.phase_rad, interval_samples=self._interval)
         base, velocity = track((data[-2], data[-1]))
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         omega = 2 * np.pi * frequency_hz
@@ -456,7 +456,7 @@ class SweepSums:
         cycles = self._low_hz * self._interval / self._rate_hz
         longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
         longer = min(longer, response.size)
-        tracked = tracked_orders(response, phase.phase_rad, interval_samples=longer, orders=ALL_ORDERS)
+        tracked = track_orders(response, phase.phase_rad, interval_samples=longer, orders=ALL_ORDERS)
         count = tracked.residual_rms.size
         frequency_hz = _means(phase.frequency_hz[: count * longer], longer)
         omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]

@@ -116,7 +116,7 @@ def measured_sweep(
     sums = _sums(sweep, channels, None)
     first = _read_sweep(channels, sums, picture.add)
     found = sums.response(delay_s=channels.response_delay_s, linear=_without_contact(specimen))
-    return _corrected(found, channels, first), picture.spectrogram()
+    return _correct(found, channels, first), picture.spectrogram()
 
 
 class SweepDraws:
@@ -132,7 +132,7 @@ class SweepDraws:
         first = _read_sweep(channels, sums, lambda _: None)
         found = sums.motion(delay_s=channels.response_delay_s, linear=_without_contact(self._specimen))
         self._clock = sums.clock
-        return _corrected(found, channels, first)
+        return _correct(found, channels, first)
 
 
 def _sums(sweep: Sweep, channels: Channels, clock: DrivePhase | None) -> SweepSums:
@@ -168,12 +168,12 @@ def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], Non
                     f"samples were lost after {lost_s:.3g} s of the sweep, so its phase cannot be tracked; "
                     "measure again"
                 )
-            add(block, channels.bridged(first, min(first + _BLOCK, end)))
+            add(block, channels.bridge_flags(first, min(first + _BLOCK, end)))
             show(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
     return (start - stretch.start) / rate
 
 
-def _corrected(found: M, channels: Channels, first_s: float) -> M:
+def _correct(found: M, channels: Channels, first_s: float) -> M:
     """Count time from the first sample of the sweep, and correct for the sensors' gains."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(

@@ -13,7 +13,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, chi_square_bounds
 from ..signals.quantity import Quantity, derivative_factor
 from ..signals.window import Window, effective_averages, hop_samples, taper, window_by_name
-from ..tables import Labelled
+from ..tables import Tabular
 
 _BATCH_SAMPLES = 1 << 19
 """Samples (all channels) transformed at once: 4 MB, so that a batch fits into the cache."""
@@ -159,7 +159,7 @@ def pieces(signals: tuple[Reals, ...], valid: Flags | None) -> Iterator[tuple[Re
 
 
 @dataclass(frozen=True)
-class SpectralDensity(Labelled):
+class SpectralDensity(Tabular):
     """One-sided spectral density with bounds; arrays of shape (lines,)."""
 
     OWN_UNITS: ClassVar = {
@@ -246,7 +246,7 @@ def spectral_density(
 
 
 @dataclass(frozen=True)
-class AmplitudeSpectrum(Labelled):
+class AmplitudeSpectrum(Tabular):
     """Amplitude spectrum: a sine of amplitude 1 shows as 1."""
 
     OWN_UNITS: ClassVar = {"value": "{unit}", "amplitude": "{unit}"}
@@ -269,7 +269,7 @@ class AmplitudeSpectrum(Labelled):
         """Spacing of the spectral lines [Hz]."""
         return self.sample_rate_hz / self.samples
 
-    def converted(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
+    def convert(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
         """Return the spectrum of another quantity, such as velocity / (i w); integrals are NaN at 0 Hz."""
         return replace(self, value=self.value * derivative_factor(self.frequency_hz, given, wanted))
 
@@ -312,7 +312,7 @@ _TAPER = Window.HANN
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrogram(Labelled):
+class Spectrogram(Tabular):
     """Amplitude of a signal over time and frequency."""
 
     OWN_UNITS: ClassVar = {"amplitude": "{unit}", "density": "({unit})2 Hz-1"}

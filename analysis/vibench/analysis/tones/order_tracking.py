@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Complexes, Reals
-from ..tables import Labelled
+from ..tables import Tabular
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
 """Default orders; impacting systems respond at half orders too."""
@@ -32,7 +32,7 @@ def cycles_needed(orders: tuple[float, ...]) -> float:
 
 
 @dataclass(frozen=True)
-class TrackedOrders(Labelled):
+class TrackedOrders(Tabular):
     """Components of a signal at orders of the drive; signal = Re(sum value_k exp(i k phase)) + residual."""
 
     OWN_UNITS: ClassVar = {"value": "{unit}", "sd": "{unit}", "residual_rms": "{unit}", "amplitude": "{unit}"}
@@ -63,15 +63,15 @@ class TrackedOrders(Labelled):
         return np.asarray(np.hypot(*np.abs([self.order(2.0), self.order(3.0)])) / np.abs(self.order(1.0)))
 
 
-def tracked_orders(
+def track_orders(
     samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
 ) -> TrackedOrders:
-    """Track one signal; see `tracked_together`."""
-    (tracked,) = tracked_together((samples,), phase_rad, interval_samples=interval_samples, orders=orders)
+    """Track one signal; see `track_signals`."""
+    (tracked,) = track_signals((samples,), phase_rad, interval_samples=interval_samples, orders=orders)
     return tracked
 
 
-def tracked_together(
+def track_signals(
     signals: Sequence[Reals],
     phase_rad: Reals,
     *,

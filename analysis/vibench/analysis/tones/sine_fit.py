@@ -15,7 +15,7 @@ from ..signals.confidence import standard_uncertainty
 from ..signals.quantity import Quantity, derivative_factor
 from ..signals.window import Window
 from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spectrum
-from .order_tracking import tracked_orders
+from .order_tracking import track_orders
 
 _NOISE_NEIGHBOURS = 50
 """Number of spectral lines on each side of a peak whose median is the noise floor."""
@@ -123,11 +123,11 @@ def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSin
     near_hz
         Expected frequency, within 20 %.
     """
-    return _kept_sine(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), sample_rate_hz, near_hz)
+    return _fit_cached(np.ascontiguousarray(samples, dtype=np.float64).tobytes(), sample_rate_hz, near_hz)
 
 
 @lru_cache(maxsize=4)
-def _kept_sine(recorded: bytes, sample_rate_hz: float, near_hz: float) -> FittedSine:
+def _fit_cached(recorded: bytes, sample_rate_hz: float, near_hz: float) -> FittedSine:
     """Fit a sine, with a cache, because all draws of a recording share its drive."""
     samples = np.frombuffer(recorded)
     spectrum = amplitude_spectrum(samples, sample_rate_hz)
@@ -211,8 +211,8 @@ def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: fl
     """Measure A0 of a dwell from drive voltage and base acceleration [m/s2], each of shape (samples,)."""
     sine = fit_sine(drive, sample_rate_hz, near_hz)
     phase = steady_phase(base.size, sine.frequency_hz / sample_rate_hz, sine.phase_rad)
-    whole = tracked_orders(base, phase, interval_samples=base.size, orders=_ORDERS)
-    parts = tracked_orders(base, phase, interval_samples=base.size // _SCATTER_BLOCKS, orders=_ORDERS)
+    whole = track_orders(base, phase, interval_samples=base.size, orders=_ORDERS)
+    parts = track_orders(base, phase, interval_samples=base.size // _SCATTER_BLOCKS, orders=_ORDERS)
     omega = 2 * np.pi * sine.frequency_hz
     scatter = standard_uncertainty(np.abs(parts.order(1.0)))
     displacement = whole.amplitude[:, 0] / (omega * np.asarray(_ORDERS)) ** 2

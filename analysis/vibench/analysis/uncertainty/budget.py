@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..recordings.channels import BASE, described_sensor
-from ..tables import Labelled, plus_minus
+from ..tables import Tabular, plus_minus
 
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Factor on the scatter of a recording that ended when its scatter was small enough: `Budget.widened`."""
+"""Factor on the scatter of a recording that ended when its scatter was small enough: `Budget.widen`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = {
@@ -67,7 +67,7 @@ def from_scatter(cause: Cause, sd: float, value: float, source: str) -> Contribu
 
 
 @dataclass(frozen=True)
-class Budget(Labelled):
+class Budget(Tabular):
     """Uncertainty budget of one quantity of one measurement."""
 
     OWN_UNITS: ClassVar = {"value": "{0.unit}"}
@@ -109,7 +109,7 @@ class Budget(Labelled):
         stated = [each for each in mine if each is not None]
         return None if len(stated) < len(mine) else hypot(*stated)
 
-    def widened(self) -> "Budget":
+    def widen(self) -> "Budget":
         """Return the widened budget of a recording that ended when its scatter was small enough.
 
         Such a recording often ends because its scatter is underestimated. The factor gives 95 % coverage for
@@ -156,7 +156,7 @@ _SENSORS = {
 
 
 @dataclass(frozen=True)
-class Stated:
+class ChannelSd:
     """Relative standard uncertainties of the channels from a bench configuration."""
 
     response: tuple[Contribution, ...]
@@ -172,13 +172,13 @@ class Stated:
         stated = [each.relative for each in (*self.response, *self.base) if each.relative is not None]
         return float(np.sqrt(np.sum(np.square(stated))))
 
-    def timed(self, power: int) -> tuple[Contribution, ...]:
+    def timing(self, power: int) -> tuple[Contribution, ...]:
         """Return the clock's contribution to a quantity proportional to a power of frequency."""
         relative = None if self.clock.relative is None else abs(power) * self.clock.relative
         return (Contribution(Cause.CLOCK, relative, self.clock.source),)
 
 
-def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
+def stated_uncertainties(bench: Mapping[str, Any], response: str) -> ChannelSd:
     """Return the stated uncertainties of a recording's bench; ``response`` is the channel of m0.
 
     Calibration errors are normal with their coverage factor, clock errors uniform within bounds. Misalignment
@@ -186,7 +186,7 @@ def stated_uncertainties(bench: Mapping[str, Any], response: str) -> Stated:
     """
     inputs = {each.get("role"): each for each in (bench.get("daq") or {}).get("channels") or ()}
     of_response, of_base = (tuple(_channel(bench, role, inputs.get(role, {}))) for role in (response, BASE))
-    return Stated(of_response, of_base, _clock(bench))
+    return ChannelSd(of_response, of_base, _clock(bench))
 
 
 def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> Iterator[Contribution]:

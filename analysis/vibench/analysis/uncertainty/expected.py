@@ -25,7 +25,7 @@ from vibench.acquisition.plan import (
     Until,
     WhiteNoise,
     base_motion,
-    measured_s,
+    measuring_s,
     preview_measurement,
 )
 from vibench.acquisition.recording import UntilNote
@@ -43,8 +43,8 @@ from ..signals.arrays import Reals
 from ..signals.quantity import Quantity
 from ..signals.window import Window
 from ..sine.dwell import DwellResponse, dwell_response
-from ..tables import Labelled
-from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, Contribution, Stated, stated_uncertainties
+from ..tables import Tabular
+from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, ChannelSd, Contribution, stated_uncertainties
 from .quantities import of_one_draw
 
 STEADY = 1e-4
@@ -139,7 +139,7 @@ _HALF_BAND_HZ = 25_600.0
 
 
 @dataclass(frozen=True)
-class Expected(Labelled):
+class ExpectedResult(Tabular):
     """One quantity of a plan with its expected uncertainty."""
 
     DOCUMENT: ClassVar = (
@@ -173,10 +173,10 @@ class Expected(Labelled):
     def sentence(self) -> str:
         """Expected uncertainty in words."""
         missing = ", ".join(self.not_stated)
-        return f"{self.quantity}: {self._how}" + (f"; not stated: {missing}" if missing else "")
+        return f"{self.quantity}: {self._noise_text}" + (f"; not stated: {missing}" if missing else "")
 
     @property
-    def _how(self) -> str:
+    def _noise_text(self) -> str:
         if self.scatter is None:
             return f"not known beforehand, because {self._hindrance}"
         if self.scatter == 0.0:
@@ -202,7 +202,7 @@ class Expected(Labelled):
                 return "this noise may make the masses collide"
 
 
-def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
+def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedResult, ...]:
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
@@ -295,10 +295,10 @@ def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | Non
         yield needed_s(expected_uncertainty(alone, rig), until), until.shortest_s, step.record_s
 
 
-def needed_s(expected: tuple[Expected, ...], until: Until) -> float | None:
+def needed_s(expected: tuple[ExpectedResult, ...], until: Until) -> float | None:
     """Return the recorded time after which the expected bounds reach the targets [s]; None if unknown."""
     needs = []
-    for name, wish in until.wishes.items():
+    for name, wish in until.required_bounds.items():
         found = [each for each in expected if re.search(RESULT_PATTERNS[name], each.quantity)]
         if not found:
             return None
@@ -364,14 +364,14 @@ def _density(rig: Rig, role: Role) -> float | None:
     return simulated.get(role, 0.0)
 
 
-def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
+def _of_noise(measurement: Measurement, rig: Rig, stated: ChannelSd) -> Iterator[ExpectedResult]:
     """Yield the expected results of a modal fit to the lines of the linear specimen with sensor noise."""
     excitation, specimen = measurement.excitation, specimen_of(rig)
     time_s = recorded_s(measurement)
     low_hz, high_hz = excitation.band_hz
     rms_v = preview_measurement(measurement, rig).rms_v * rig.generator.terminal_factor()
     if _fills_gap(specimen, rig, rms_v, low_hz, high_hz):
-        yield Expected("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
+        yield ExpectedResult("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
         return
     modes: list[tuple[float, tuple[float | None, ...]]] = [
         (hz, (None, None, None)) for hz in specimen.natural_frequencies_hz if low_hz <= hz <= high_hz
@@ -393,16 +393,16 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
             )
             for each in found
         ]
-    clock, lasting = stated.timed(1), float(stated.clock.relative or 0.0)
+    clock, lasting = stated.timing(1), float(stated.clock.relative or 0.0)
     scale = float(np.hypot(stated.scale_sd, lasting))
     calibrations = _missing(stated.response, stated.base, clock)
     for hz, (frequency, damping, peak) in modes:
         at = f"{hz:.0f} Hz"
-        yield Expected(
+        yield ExpectedResult(
             f"resonance at {at}, frequency", time_s, frequency, Cause.NOISE, lasting, _missing(clock)
         )
-        yield Expected(f"resonance at {at}, damping ratio", time_s, damping, Cause.NOISE, 0.0, ())
-        yield Expected(f"transmissibility at {at}", time_s, peak, Cause.NOISE, scale, calibrations)
+        yield ExpectedResult(f"resonance at {at}, damping ratio", time_s, damping, Cause.NOISE, 0.0, ())
+        yield ExpectedResult(f"transmissibility at {at}", time_s, peak, Cause.NOISE, scale, calibrations)
 
 
 def _expected_lines(
@@ -452,7 +452,7 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
     return _HIGHEST_TURN * rms_m > min(specimen.gaps_m)
 
 
-def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
+def _of_sine(measurement: Measurement, rig: Rig, stated: ChannelSd, at_hz: float) -> Iterator[ExpectedResult]:
     """Yield the expected Responses of a sine.
 
     Yield nothing if a tenth of the window is shorter than a period, or the motion cannot be simulated.
@@ -473,19 +473,21 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         shares = noise[0][0] / (omega * size_m) ** 2 + noise[1] / (omega**2 * amplitude_m) ** 2
         by_noise = float(np.sqrt(shares / window_s))
     lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
-    missing = _missing(stated.response, stated.base, stated.timed(1))
+    missing = _missing(stated.response, stated.base, stated.timing(1))
     for name, scatter in ((RESPONSE_I, chance.sd_largest), (RESPONSE_II, chance.sd_second)):
         if chance.has_several_motions:
-            yield Expected(name, window_s, None, Cause.CHANCE, lasting, missing)
+            yield ExpectedResult(name, window_s, None, Cause.CHANCE, lasting, missing)
         elif scatter > STEADY and name == RESPONSE_I:
             # The largest value scatters from window to window; a longer recording does not reduce this.
-            yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
+            yield ExpectedResult(
+                name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing
+            )
         elif scatter > STEADY:
-            yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
+            yield ExpectedResult(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
             # Noise of generator and amplifier moves the masses, and the rig does not state this noise.
             error = None if name == RESPONSE_I else by_noise
-            yield Expected(name, window_s, error, Cause.NOISE, lasting, missing)
+            yield ExpectedResult(name, window_s, error, Cause.NOISE, lasting, missing)
 
 
 @dataclass(frozen=True)
@@ -507,7 +509,7 @@ class TimeShare:
         return f"{self.name}: at most {self.allotted_s:.4g} s of recording ({needed})"
 
 
-def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
+def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
     """Return the campaign with recording times that fill ``available_s``, and the time of each measurement.
 
     A measurement needs the time after which `expected_uncertainty` reaches the targets in `until`. All these
@@ -540,7 +542,7 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
         )
     factor = (available_s - fixed_s) / needed_s
     changed = [
-        each if (need := needs[each.name]) is None else _lasting(each, factor * need)
+        each if (need := needs[each.name]) is None else _with_duration(each, factor * need)
         for each in campaign.measurements
     ]
     shares = tuple(
@@ -553,10 +555,10 @@ def within(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
 def _cost(measurement: Measurement) -> float:
     """Return the ratio of rig time to recorded time; each realisation of noise adds ramps and a wait."""
     has_many = measurement.excitation.stretches > 1
-    return measured_s(measurement) / recorded_s(measurement) if has_many else 1.0
+    return measuring_s(measurement) / recorded_s(measurement) if has_many else 1.0
 
 
-def _lasting(measurement: Measurement, time_s: float) -> Measurement:
+def _with_duration(measurement: Measurement, time_s: float) -> Measurement:
     """Return the measurement with another recording time, in whole realisations."""
     excitation: Excitation = measurement.excitation
     share = time_s / recorded_s(measurement)

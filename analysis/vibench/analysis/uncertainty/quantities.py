@@ -17,7 +17,7 @@ from ..sine.dwell_analysis import BURST, DwellAnalysis
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
-from .budget import Budget, Cause, Contribution, Stated, from_scatter, stated_uncertainties
+from .budget import Budget, Cause, ChannelSd, Contribution, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
@@ -43,7 +43,9 @@ def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tu
     return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance, peak))
 
 
-def _of_resonance(found: Resonance, stated: Stated, chance: float, peak: tuple[str, str]) -> Iterator[Budget]:
+def _of_resonance(
+    found: Resonance, stated: ChannelSd, chance: float, peak: tuple[str, str]
+) -> Iterator[Budget]:
     where = f"{found.frequency_hz:.0f} Hz"
 
     def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
@@ -58,7 +60,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float, peak: tuple[s
         f"resonance at {where}, frequency",
         found.frequency_hz,
         "Hz",
-        (*stated.timed(1), *scatter(found.sd_frequency_hz, found.frequency_hz)),
+        (*stated.timing(1), *scatter(found.sd_frequency_hz, found.frequency_hz)),
     )
     yield Budget(
         f"resonance at {where}, damping ratio",
@@ -73,7 +75,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float, peak: tuple[s
         (
             *stated.response,
             *stated.base,
-            *stated.timed(1),
+            *stated.timing(1),
             *scatter(found.sd_peak_magnitude, found.peak_magnitude),
         ),
     )
@@ -125,13 +127,15 @@ def dwell_budgets(analysis: DwellAnalysis, overlay: DwellOverlay | None) -> tupl
     )
 
 
-def _ratio(stated: Stated) -> tuple[Contribution, ...]:
+def _ratio(stated: ChannelSd) -> tuple[Contribution, ...]:
     """Return the contributions to a displacement ratio, measured as velocity / acceleration * frequency."""
-    return (*stated.response, *stated.base, *stated.timed(1))
+    return (*stated.response, *stated.base, *stated.timing(1))
 
 
-def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str = "") -> Budget:
-    return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), scatter))
+def _amplitude(value_m: float, stated: ChannelSd, scatter: Contribution, where: str = "") -> Budget:
+    return Budget(
+        f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timing(2), scatter)
+    )
 
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:

@@ -100,9 +100,9 @@ class LatestRequest(QObject, Generic[Question, Answer]):
         if self._wanted is None or self._job is not None:
             return
         question, self._wanted = self._wanted, None
-        self._job = self._background.ask(self._function, self._answered, self._failed, question)
+        self._job = self._background.ask(self._function, self._take_answer, self._take_error, question)
 
-    def _answered(self, answer: Answer) -> None:
+    def _take_answer(self, answer: Answer) -> None:
         self._job = None
         if not isValid(self):  # the page of this request was deleted meanwhile
             return
@@ -110,7 +110,7 @@ class LatestRequest(QObject, Generic[Question, Answer]):
             self._on_answer(answer)
         self._ask()
 
-    def _failed(self, error: BaseException) -> None:
+    def _take_error(self, error: BaseException) -> None:
         self._job = None
         if not isValid(self):
             return

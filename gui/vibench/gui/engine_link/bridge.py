@@ -47,7 +47,7 @@ WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
     """Return an empty live view for the run of the recording ``name``."""
-    measurement = measurement_called(campaign, name)
+    measurement = find_measurement(campaign, name)
     band_hz = WHOLE_BAND_HZ if measurement is None else measurement.excitation.band_hz
     channels = [
         LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
@@ -72,7 +72,7 @@ def warm_up() -> None:
     view.portrait()
 
 
-def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
+def find_measurement(campaign: Campaign | None, name: str) -> Measurement | None:
     """Return the measurement of the campaign that records the file ``name``; None if there is none."""
     if campaign is None:
         return None
@@ -249,13 +249,13 @@ class Bridge(QObject):
         """Deliver the engine's replies, then request the next status and samples."""
         if self._line is None:
             return
-        self.beat()
+        self.heartbeat()
         self._line.drain()
         if not self._is_looking and self._line is not None:
             self._is_looking = True
-            self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
+            self._line.ask(Urgency.LOOK, self._look_question(), self._take_snapshot, self._end_look)
 
-    def beat(self) -> None:
+    def heartbeat(self) -> None:
         """Report that the window's thread is alive; a separate process passes the report to the engine."""
         attendant = None if self._line is None else self._line.attendant
         if attendant is not None:
@@ -301,7 +301,7 @@ class Bridge(QObject):
     def stop(self, level: StopLevel, reason: str) -> None:
         """Hold or end the run; the engine receives this request before all waiting requests."""
         if self._line is not None:
-            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._refused)
+            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._report)
 
     @property
     def may_leave(self) -> bool:
@@ -326,19 +326,19 @@ class Bridge(QObject):
         self._orders += 1
         line = self._line
 
-        def over() -> None:
+        def end_order() -> None:
             if self._line is line:  # do not count down commands of an engine that has ended
                 self._orders -= 1
 
-        def answered(answer: Any) -> None:
-            over()
+        def take_answer(answer: Any) -> None:
+            end_order()
             (on_answer or _ignore)(answer)
 
-        def refused(error: AcquisitionError) -> None:
-            over()
-            self._refused(error)
+        def take_refusal(error: AcquisitionError) -> None:
+            end_order()
+            self._report(error)
 
-        line.ask(Urgency.ORDER, question, answered, refused)
+        line.ask(Urgency.ORDER, question, take_answer, take_refusal)
 
     def _look_question(self) -> Callable[[EngineClient], Snapshot]:
         view, run, status = self.view, self._view_run, self.status
@@ -353,7 +353,7 @@ class Bridge(QObject):
 
         return look
 
-    def _looked(self, snapshot: Snapshot) -> None:
+    def _take_snapshot(self, snapshot: Snapshot) -> None:
         before, (self.status, newest_samples) = self.state, snapshot
         if (before, self.state) in _ADVANCES:
             self.advanced.emit()
@@ -378,7 +378,7 @@ class Bridge(QObject):
         if rest.shape[1] == 0:
             self._is_looking = False
         else:
-            self.beat()
+            self.heartbeat()
             in_next_pass(self, lambda: self._take(view, first_sample + size, rest, size))
 
     def _emit_news(self, status: EngineStatus) -> None:
@@ -394,15 +394,15 @@ class Bridge(QObject):
             self.recording_ended.emit(Path(file))
         self._ended = ended
 
-    def _refused(self, error: AcquisitionError) -> None:
+    def _report(self, error: AcquisitionError) -> None:
         if isinstance(error, EngineGone):
             self._drop_engine(error)
         else:
             self.noticed.emit(notice_of(error))
 
-    def _look_refused(self, error: AcquisitionError) -> None:
+    def _end_look(self, error: AcquisitionError) -> None:
         self._is_looking = False
-        self._refused(error)
+        self._report(error)
 
     def _drop_engine(self, error: EngineGone) -> None:
         if self._line is None:
@@ -438,4 +438,4 @@ def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> No
 
 def _adopt(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
     warm_up()
-    return client.open_rig(), client.carried_request(), client.status()
+    return client.open_rig(), client.last_request(), client.status()

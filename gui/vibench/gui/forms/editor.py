@@ -192,11 +192,11 @@ class SuggestionEditor:
         self._box.addItems(examples)
         self._shown = self._box.currentText()
         self._changed = changed
-        self._box.activated.connect(self._tell)
+        self._box.activated.connect(self._note_text)
         line = self._box.lineEdit()
         if line is not None:
             line.setPlaceholderText(_LEFT_OPEN)
-            line.editingFinished.connect(self._tell)
+            line.editingFinished.connect(self._note_text)
         self.widget = self._box
 
     def content(self) -> str:
@@ -208,7 +208,7 @@ class SuggestionEditor:
         self._shown = "" if content is None else str(content)
         self._box.setCurrentText(self._shown)
 
-    def _tell(self, *_: object) -> None:
+    def _note_text(self, *_: object) -> None:
         if self._box.currentText() != self._shown:
             self._shown = self._box.currentText()
             self._changed()

@@ -129,7 +129,7 @@ class ModelForm(QWidget):
 
     def _add(self, name: str, field: FieldInfo) -> None:
         facts = field_facts(self.model, name, field)
-        editor = editor_for(field, facts, lambda *_: self._changed(name))
+        editor = editor_for(field, facts, lambda *_: self._note_edit(name))
         complaint = SentenceLabel(rank="complaint")
         complaint.hide()
         complaint.setAccessibleName(f"Complaint about {facts.label}")
@@ -151,7 +151,7 @@ class ModelForm(QWidget):
             if row.facts.unit in CHOICES and not row.editor.complaint:
                 row.editor.show_content(row.editor.content())
 
-    def _changed(self, name: str) -> None:
+    def _note_edit(self, name: str) -> None:
         row = self._rows.get(name)
         if row is not None:
             inside = row.editor.form.edited if isinstance(row.editor, GroupEditor) else ""

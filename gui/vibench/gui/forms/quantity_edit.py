@@ -44,7 +44,7 @@ def quantity_text(value: float, unit: str) -> str:
         text = shown.text(value, 12)
         if parse_quantity(text, unit, shown.name) == value:
             return text
-        if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
+        if UNITS.chosen_units.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
             # Do not show the SI unit: a number typed over it without a unit would be read in metres.

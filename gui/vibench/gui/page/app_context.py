@@ -183,7 +183,7 @@ class AppContext(QObject):
     def choose_units(self, chosen: Mapping[str, str]) -> None:
         """Change the displayed units and store the choice; ``chosen`` has the displayed unit by SI unit."""
         UNITS.choose(chosen)
-        self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen.values()))
+        self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen_units.values()))
 
     @property
     def patience_s(self) -> float:

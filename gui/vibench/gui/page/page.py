@@ -72,15 +72,15 @@ class DisplayedResult:
 
     widget: QWidget
     inputs: object
-    wanted: object
+    current: object
 
     @property
     def is_current(self) -> bool:
         """Whether the page is consistent: the result is up to date, absent, or marked as outdated."""
-        return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
+        return self.inputs is None or self.inputs == self.current or not self.widget.isEnabled()
 
 
-class Themed(Protocol):
+class ThemedPart(Protocol):
     """A part of a page that draws with the theme's colours."""
 
     def retheme(self, theme: Theme) -> None:
@@ -124,12 +124,12 @@ class Page(QWidget):
         for part in self.findChildren(QWidget):
             # hasattr is faster than isinstance: a page has hundreds of parts, and a check takes 80 µs.
             if hasattr(type(part), "retheme"):
-                cast(Themed, part).retheme(theme)
+                cast(ThemedPart, part).retheme(theme)
 
     def enter(self) -> None:
         """Prepare the page before the window shows it."""
 
-    def left(self) -> None:
+    def leave(self) -> None:
         """Store the user's input; called when another page is shown or the window closes."""
 
 

@@ -23,7 +23,7 @@ class Scale(Enum):
     LINEAR = auto()
     LOGARITHMIC = auto()
 
-    def drawn(self, value: float) -> float:
+    def position(self, value: float) -> float:
         """Return the coordinate at which pyqtgraph draws a value: its decimal logarithm, if logarithmic."""
         return log10(value) if self is Scale.LOGARITHMIC else value
 
@@ -52,7 +52,7 @@ class PlotAxis:
     short: str = ""
 
     @property
-    def shown(self) -> ShownUnit:
+    def display(self) -> ShownUnit:
         """Displayed unit, with the factor from plotted to displayed values."""
         return UNITS.on_axis(self.unit) if self.unit in CHOICES else ShownUnit(self.unit, self.factor)
 
@@ -64,10 +64,10 @@ class PlotAxis:
     @property
     def short_text(self) -> str:
         """Short label with unit, or the unit alone."""
-        return self._with_unit(self.short) if self.short else self.shown.name
+        return self._with_unit(self.short) if self.short else self.display.name
 
     def _with_unit(self, label: str) -> str:
-        unit = self.shown.name
+        unit = self.display.name
         return f"{label} ({unit})" if label and unit else label or unit
 
 
@@ -171,14 +171,14 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
-            factor = self._axis.shown.per_si
+            factor = self._axis.display.per_si
             # Return only ticks with numbers, because each grid line takes time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
             step, values = thin_ticks(step, values, self._most_labels(size, f"{widest}0"))
             return [(step / factor, [value / factor for value in values])]
-        shift = log10(self._axis.shown.per_si)
+        shift = log10(self._axis.display.per_si)
         ticks = logarithmic_ticks(low + shift, high + shift)
         if len(ticks[0][1]) > self._most_labels(size):
             ticks = [thin_ticks(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
@@ -189,9 +189,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         if self._blankness is Blankness.BLANK or (self.logMode and spacing == _MINOR):
             return [""] * len(values)
         if not self.logMode:
-            factor = self._axis.shown.per_si
+            factor = self._axis.display.per_si
             return list(super().tickStrings([v * factor for v in values], scale, spacing * factor))
-        factor = self._axis.shown.per_si
+        factor = self._axis.display.per_si
         return [number_text(10**value * factor) for value in values]
 
     def _most_labels(self, size: float, widest: str = _WIDE) -> int:

@@ -46,21 +46,21 @@ class Markers(QObject):
         if are_shown and self._plots:
             scale = self._plots[0].scales[0]
             low, high = self._plots[0].getViewBox().viewRange()[0]
-            if not all(low <= scale.drawn(value) <= high for value in self._values):
+            if not all(low <= scale.position(value) <= high for value in self._values):
                 self._values = [scale.value_at(low + (high - low) * share) for share in (1 / 3, 2 / 3)]
         self._place()
 
-    def put(self, number: int, value: float) -> None:
+    def move(self, number: int, value: float) -> None:
         """Move one marker to a value in all plots."""
         self._values[number] = value
         self._place()
 
     def _drag(self, number: int, line: pg.InfiniteLine) -> None:
-        self.put(number, self._plots[0].scales[0].value_at(line.value()))
+        self.move(number, self._plots[0].scales[0].value_at(line.value()))
 
     def _place(self) -> None:
         for lines, value in zip(self.lines, self._values, strict=False):
             for plot, line in zip(self._plots, lines, strict=True):
                 line.setVisible(self._are_shown)
-                line.setValue(plot.scales[0].drawn(value))
+                line.setValue(plot.scales[0].position(value))
         self.moved.emit()

@@ -175,7 +175,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._look_for_points()
         return self
 
-    def always_numbered(self) -> "Plot":
+    def keep_numbers(self) -> "Plot":
         """Show numbers on the horizontal axis even if the plot is empty, because a plot above shares it."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
@@ -214,14 +214,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def stripes(self, line_style: LineStyle) -> Stripes:
         """Add vertical stripes for frequency or time ranges."""
-        item = Stripes(self.scales[0].drawn)
+        item = Stripes(self.scales[0].position)
         self.addItem(item, ignoreBounds=True)
         self._line_style(line_style, lambda theme: item.dress(shade_of(line_style, theme)))
         return item
 
     def rules(self, line_style: LineStyle) -> Rules:
         """Add a set of vertical lines without labels."""
-        item = Rules(self.scales[0].drawn)
+        item = Rules(self.scales[0].position)
         self.addItem(item, ignoreBounds=True)
         self._line_style(
             line_style, lambda theme: item.dress(straight_pen(line_style, theme, self.devicePixelRatioF()))
@@ -232,7 +232,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, value: float, label: str = "", label_at: float = 0.92
     ) -> pg.InfiniteLine:
         """Add a vertical line at a value; ``label_at`` is the height of the line's label (0 to 1)."""
-        return self._line(line_style, self.scales[0].drawn(value), 90, label, label_at)
+        return self._line(line_style, self.scales[0].position(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
         """Add a horizontal line; on a logarithmic axis, it is hidden for values of zero or below."""
@@ -365,7 +365,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for item, value in self._levels.items():
             item.setVisible(isfinite(value) and (value > 0 or not is_logarithmic))
             if item.isVisible():
-                item.setValue(self.scales[1].drawn(value))
+                item.setValue(self.scales[1].position(value))
 
     def _line(
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
@@ -392,7 +392,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.named_curves.append((name, item))
         self.addItem(item)
         item.sigPlotChanged.connect(self._look_for_points)
-        item.sigPlotChanged.connect(self.reading.again)
+        item.sigPlotChanged.connect(self.reading.reread)
         self._look_for_points()
 
     @property
@@ -417,7 +417,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Show axis labels and cursor reading in the chosen units, unless the plot is closed."""
         if self.plotItem is not None:
             self._relegend()
-            self.reading.again()
+            self.reading.reread()
 
     def _relegend(self) -> None:
         if self._legend is None:

@@ -88,7 +88,7 @@ def numbers_of(plot: "Plot", separator: str) -> str:
         if item.xData is not None and item.yData is not None:
             called = (name or f"{plot.accessibleName()} {number + 1}").replace(separator, ";")
             rows += [
-                f"{called}{separator}{x * across.shown.per_si:.9g}{separator}{y * up.shown.per_si:.9g}"
+                f"{called}{separator}{x * across.display.per_si:.9g}{separator}{y * up.display.per_si:.9g}"
                 for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
             ]
     return "\n".join(rows) + "\n"

@@ -83,7 +83,7 @@ class Reading:
                 parts.append(f"{20 * log10(up / self._marked[1]):+.2f} dB")
         self._show_text("   ".join(parts))
 
-    def again(self) -> None:
+    def reread(self) -> None:
         """Update the reading after the curves have changed."""
         if self.place is not None:
             self.show_at(self._at)
@@ -127,7 +127,7 @@ class Reading:
             is_drawn = self._marked is not None and (value > 0.0 or scale is Scale.LINEAR)
             line.setVisible(is_drawn)
             if is_drawn:
-                line.setValue(scale.drawn(value))
+                line.setValue(scale.position(value))
 
     def _create_lines(self) -> tuple[pg.InfiniteLine, ...]:
         if not self._lines:
@@ -168,5 +168,5 @@ class Reading:
 
 
 def _value_text(value: float, axis: PlotAxis) -> str:
-    shown = axis.shown
+    shown = axis.display
     return f"{value * shown.per_si:.5g} {shown.name or axis.short}".strip()

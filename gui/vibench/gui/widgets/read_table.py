@@ -24,10 +24,10 @@ def make_readable(table: QTableView, name: str) -> None:
     header = table.horizontalHeader()
     header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    chosen = _offered(table, "Copy", lambda: chosen_text(table))
+    chosen = _copy_action(table, "Copy", lambda: chosen_text(table))
     chosen.setShortcut(QKeySequence.StandardKey.Copy)
     chosen.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
-    _offered(table, "Copy the whole table", lambda: whole_text(table.model()))
+    _copy_action(table, "Copy the whole table", lambda: whole_text(table.model()))
     table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
 
 
@@ -50,7 +50,7 @@ def _lines(cells: Iterable[Cell]) -> str:
     return "\n".join("\t".join(texts) for texts in rows.values())
 
 
-def _offered(table: QTableView, text: str, clipboard_text: Callable[[], str]) -> QAction:
+def _copy_action(table: QTableView, text: str, clipboard_text: Callable[[], str]) -> QAction:
     action = QAction(text, table)
     action.triggered.connect(lambda: QGuiApplication.clipboard().setText(clipboard_text()))
     table.addAction(action)

@@ -94,7 +94,7 @@ class DisplayUnits:
         self._listeners.pop(listener, None)
 
     @property
-    def chosen(self) -> Mapping[str, str]:
+    def chosen_units(self) -> Mapping[str, str]:
         """The chosen units, keyed by their SI unit."""
         return MappingProxyType(self._chosen)
 
@@ -113,12 +113,12 @@ class DisplayUnits:
         """Return the unit of an axis or a column, which does not depend on the value."""
         si = plain_unit(unit)
         name = self._chosen.get(si, si)
-        return _shown(si, "µm" if name == AUTOMATIC else name)
+        return _unit_of(si, "µm" if name == AUTOMATIC else name)
 
     def of(self, unit: str, value: float) -> ShownUnit:
         """Return the unit in which a field displays this value."""
         name = self._chosen.get(unit, AUTOMATIC)
-        return prefixed_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
+        return prefixed_unit(unit, value) if name == AUTOMATIC else _unit_of(unit, name)
 
     def in_field(self, unit: str) -> str:
         """Return the unit in which a number typed without unit into an empty field is read."""
@@ -133,11 +133,11 @@ class DisplayUnits:
         si = _SI_OF[given]
         name = self._chosen[si]
         name = given if name == AUTOMATIC else name
-        factor = _shown(si, name).per_si / _shown(si, given).per_si
+        factor = _unit_of(si, name).per_si / _unit_of(si, given).per_si
         return f"{re.sub(_NUMBER, lambda number: _scale_number(number[0], factor), found[1])} {name}"
 
 
-def _shown(si: str, name: str) -> ShownUnit:
+def _unit_of(si: str, name: str) -> ShownUnit:
     if name == "g":
         return ShownUnit(name, 1.0 / STANDARD_GRAVITY)
     return ShownUnit(name, 10.0 ** -POWERS[name.removesuffix(si)])

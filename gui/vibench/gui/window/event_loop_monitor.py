@@ -70,7 +70,7 @@ class EventLoopMonitor(QObject):
         return len(self._waits)
 
     @property
-    def noted(self) -> tuple[Wait, ...]:
+    def long_waits(self) -> tuple[Wait, ...]:
         """Delays of the event loop above `BOUND_S`, the newest last."""
         return tuple(self._noted)
 

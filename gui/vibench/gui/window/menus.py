@@ -83,9 +83,9 @@ class SettingsDialog(QDialog):
             Preferences(
                 theme=context.theme.name,
                 font_pt=QApplication.font().pointSize(),
-                displacements_in=UNITS.chosen["m"],
-                velocities_in=UNITS.chosen["m/s"],
-                accelerations_in=UNITS.chosen["m/s²"],
+                displacements_in=UNITS.chosen_units["m"],
+                velocities_in=UNITS.chosen_units["m/s"],
+                accelerations_in=UNITS.chosen_units["m/s²"],
                 patience_s=context.patience_s,
                 recordings_folder=str(context.folder),
             )

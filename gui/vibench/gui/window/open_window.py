@@ -58,7 +58,7 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     if starting is not None:
         starting.close()
     QTimer.singleShot(0, window.context.background.prepare)
-    QTimer.singleShot(0, window.look_for_left_campaign)
+    QTimer.singleShot(0, window.adopt_left_campaign)
     QTimer.singleShot(0, Thread(target=load_ahead).start)
     code = app.exec()
     if complaint := stored.complaint:

@@ -147,7 +147,7 @@ def _fill(window: Window) -> None:
     queue.open_file(shipped(CAMPAIGN))
     maps.pick(*MOTION)
     _wait(
-        lambda: maps.displayed_results[1].inputs == maps.displayed_results[1].wanted and not compare.is_busy
+        lambda: maps.displayed_results[1].inputs == maps.displayed_results[1].current and not compare.is_busy
     )
     for path in window.context.folder.glob("sweep*.h5"):
         window.context.recording_requested.emit(path)
@@ -160,7 +160,7 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
     for page in pages:
         window.show_page(page)
         _save(window, folder, page.lower())
-    _themed(window, first)
+    _use_theme(window, first)
 
 
 def _picture_tabs(window: Window, folder: Path) -> None:
@@ -188,7 +188,7 @@ def _picture_spectrogram(window: Window, folder: Path) -> None:
 def _save(window: Window, folder: Path, name: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for theme in THEMES.values():
-        _themed(window, theme)
+        _use_theme(window, theme)
         window.event_loop_monitor.begin()
         _pass_ms(STILL_MS)
         _write(window.grab().toImage(), folder / f"{name}_{theme.name}.png")
@@ -205,7 +205,7 @@ def _write(picture: QImage, path: Path) -> None:
     small.save(str(path), None, _SMALLEST_FILE)
 
 
-def _themed(window: Window, theme: Theme) -> None:
+def _use_theme(window: Window, theme: Theme) -> None:
     if window.context.theme is not theme:
         window.context.choose_theme(theme)
         _wait(lambda: window.is_themed)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.engine import CampaignRequest, left_alone
+from vibench.acquisition.engine import CampaignRequest, unattended_engine
 
 from ..background.background import in_next_pass
 from ..engine_link.bridge import Urgency
@@ -88,7 +88,7 @@ class NavigationBar(QListWidget):
             item.setToolTip(f"{name} page (Ctrl+{number})")
             self.addItem(item)
         self.show_done({})
-        self.currentRowChanged.connect(self._chosen)
+        self.currentRowChanged.connect(self._emit_choice)
 
     @property
     def chosen_name(self) -> str:
@@ -126,7 +126,7 @@ class NavigationBar(QListWidget):
         em = metrics.height()
         self.setFixedWidth(round(metrics.horizontalAdvance(f"8  {longest}  {DONE}") * 1.15) + 2 * em)
 
-    def _chosen(self, row: int) -> None:
+    def _emit_choice(self, row: int) -> None:
         if row >= 0:
             self.chosen.emit(self._names[row])
 
@@ -181,7 +181,7 @@ class Window(QMainWindow):
         page = self.pages.get(name)
         if page is None or page is self._stack.currentWidget():
             return
-        self.page.left()
+        self.page.leave()
         self._stack.setCurrentWidget(page)
         self.navigation.choose(name)
         self.context.settings.keep_text(SettingKey.PAGE, name)
@@ -213,14 +213,14 @@ class Window(QMainWindow):
         self._timer.stop()
         self.event_loop_monitor.stop()
         self.context.bridge.close(how)
-        self.page.left()
+        self.page.leave()
         self.context.settings.keep_state(SettingKey.GEOMETRY, self.saveGeometry())
         self.context.background.close()
         super().closeEvent(event)
 
-    def look_for_left_campaign(self) -> None:
+    def adopt_left_campaign(self) -> None:
         """Take over an engine and its campaign that another window left running, if there is one."""
-        self.context.background.ask(left_alone, self.context.bridge.adopt, self.context.fail)
+        self.context.background.ask(unattended_engine, self.context.bridge.adopt, self.context.fail)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
         """Show a campaign that was taken over, as if it had been armed in this window."""
@@ -328,7 +328,7 @@ class Window(QMainWindow):
     def _theme_next(self) -> None:
         if self._unthemed:
             self._unthemed.pop(0)()
-            self.context.bridge.beat()
+            self.context.bridge.heartbeat()
             in_next_pass(self, self._theme_next)
 
     def showEvent(self, event: QShowEvent) -> None:

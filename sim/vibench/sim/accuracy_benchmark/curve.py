@@ -63,7 +63,7 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     name = "closed form" if is_closed else REFINED
     for found, taken_s in zip(refined, times_s, strict=True):
         if found.error_estimate is not None:
-            two = _two(found)
+            two = _pair(found)
             yield CurvePoint(
                 name, taken_s, found.error_estimate, *two, is_stated=True, is_chosen=found is refined[-1]
             )
@@ -85,15 +85,15 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
 def _methods(scene: Scene) -> Iterator[tuple[str, Callable[[], Answer | None]]]:
     window_s = scene.duration.window_s
     for level in Accuracy:
-        yield f"30 s, {level}", partial(_solved, scene, level, partial(FixedDuration, window_s=window_s))
-        yield f"until settled, {level}", partial(_solved, scene, level, partial(AutomaticDuration, window_s))
-    yield "shooting", partial(_shot, scene)
+        yield f"30 s, {level}", partial(_solve, scene, level, partial(FixedDuration, window_s=window_s))
+        yield f"until settled, {level}", partial(_solve, scene, level, partial(AutomaticDuration, window_s))
+    yield "shooting", partial(_shoot, scene)
     yield "first-order balance", partial(_first_order, scene)
     for tolerance in TOLERANCES:
-        yield f"many-harmonic balance, {tolerance:g}", partial(_balanced, scene, tolerance)
+        yield f"many-harmonic balance, {tolerance:g}", partial(_balance, scene, tolerance)
 
 
-def _solved(
+def _solve(
     scene: Scene, level: Accuracy, duration: Callable[[], FixedDuration | AutomaticDuration]
 ) -> Answer | None:
     variant = Scene(
@@ -103,7 +103,7 @@ def _solved(
     return None if found.error_estimate is None else (_responses(found), found.error_estimate)
 
 
-def _shot(scene: Scene) -> Answer | None:
+def _shoot(scene: Scene) -> Answer | None:
     orbit = periodic_orbit(scene.specimen, scene.drive)
     if orbit.outcome is not ShootingEnd.CONVERGED or not orbit.is_stable:
         return None
@@ -126,7 +126,7 @@ def _first_order(scene: Scene) -> Answer | None:
     return np.array([x, x, p, p]) / drive.amplitude_m, None
 
 
-def _balanced(scene: Scene, tolerance: float) -> Answer | None:
+def _balance(scene: Scene, tolerance: float) -> Answer | None:
     spring, drive = spring_of(scene.specimen), scene.drive
     kept = HarmonicSet.ODD if spring.is_odd else HarmonicSet.ALL
     options = BalanceOptions(kept, tolerance=tolerance)
@@ -142,6 +142,6 @@ def _responses(found: ScenePrediction) -> Floats:
     return np.array(values, dtype=np.float64)
 
 
-def _two(found: ScenePrediction) -> tuple[float, float]:
+def _pair(found: ScenePrediction) -> tuple[float, float]:
     responses = _responses(found)
     return float(responses[0]), float(responses[1])

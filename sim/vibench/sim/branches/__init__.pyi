@@ -2,10 +2,10 @@ from ._branches import (
     UPDATES_TO_HOLD as UPDATES_TO_HOLD,
     BranchOrigin as BranchOrigin,
     FoundBranch as FoundBranch,
-    balanced_branches as balanced_branches,
+    balance_branches as balance_branches,
     growth_time_s as growth_time_s,
     least_growth_time_s as least_growth_time_s,
-    shot_branches as shot_branches,
+    shoot_branches as shoot_branches,
 )
 from ._motion_search import (
     MotionSearch as MotionSearch,

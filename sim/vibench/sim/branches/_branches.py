@@ -143,7 +143,7 @@ SWITCHED = {
 }
 
 
-def shot_branches(
+def shoot_branches(
     specimen: Specimen,
     path: DrivePath,
     low: float,
@@ -289,7 +289,7 @@ def least_growth_time_s(loop_time_s: float) -> float:
 BALANCE_STEPS = ArcSteps(first=0.01, longest=0.03, shortest=1e-7, tolerance=1e-10, most_points=3000)
 
 
-def balanced_branches(
+def balance_branches(
     specimen: Specimen,
     path: DrivePath,
     low: float,
@@ -307,7 +307,7 @@ def balanced_branches(
         every first-order solution is a start (Gong et al. 2025, eq. 5); for other laws, every motion with the
         drive's period from `periodic_motions`.
     path, low, high, steps
-        As for `shot_branches`.
+        As for `shoot_branches`.
     options
         Harmonics from ``fewest`` to ``most``; 1 and 1 give the paper's first-order balance.
     search

@@ -45,7 +45,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
         raise ValueError("Frequencies must be finite and positive, in Hz.")
     across = np.tile(np.eye(2, dtype=np.complex128), (len(omega), 1, 1))
     for cell in unit.cells:
-        across = _across(cell, omega) @ across
+        across = _transfer(cell, omega) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
     # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger root has no cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
@@ -53,14 +53,14 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     return np.asarray(1.0 / larger, dtype=np.complex128)
 
 
-def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
+def _transfer(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
     """Return the transfer matrix of a cell for displacement and force, shape (n, 2, 2)."""
     outer, pushed, _, _ = reduce_to_m0(cell, omega)
     one = np.ones_like(outer)
     return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
 
 
-class SeenFromOutside(NamedTuple):
+class CellResponse(NamedTuple):
     """Response of a cell to harmonic motion of its m0; each field has shape (n,)."""
 
     link: Complex
@@ -73,7 +73,7 @@ class SeenFromOutside(NamedTuple):
     """Ratio z / x: displacement of m2 over that of m0."""
 
 
-def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
+def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> CellResponse:
     """Return the response of a cell without contact to its m0; finite even where m1 resonates alone."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
@@ -85,7 +85,7 @@ def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
     hung = -square * (m2 * held + m1 * inner)
     whole = middle * held + hung
     seen = outer, middle * hung / whole - square * m0, middle * inner / whole, middle * held / whole
-    return SeenFromOutside(*(np.asarray(each, dtype=np.complex128) for each in seen))
+    return CellResponse(*(np.asarray(each, dtype=np.complex128) for each in seen))
 
 
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.drive import Drive, Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.state import Complex, Floats
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from ._chain import Chain
 from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces_between
 
@@ -199,7 +199,7 @@ def integrate_chain(
     max_impact_rate_hz
         Mean impact rate per cell above which the run ends with TOO_MANY_IMPACTS.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
     if chain.size == 1:
         start = None if initial_state is None else start_motion(chain, initial_state)[0]

@@ -18,7 +18,7 @@ from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.state import Floats, Table
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impacts
 from ._tables import chain_tables, longest_window_s
@@ -78,7 +78,7 @@ def chain_lyapunov_exponent(
     seed
         Seed of the initial direction from the first to the second motion.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
     intervals = math.floor(duration_s / interval_s * (1.0 + 1e-9)) if math.isfinite(duration_s) else 0
     if intervals < FEWEST_INTERVALS:
@@ -94,7 +94,7 @@ def chain_lyapunov_exponent(
     )
     most = most_chain_impacts(chain, max_impact_rate_hz, interval_s)
 
-    def advanced(state: Floats, start_s: float) -> tuple[Floats, int, Outcome]:
+    def advance(state: Floats, start_s: float) -> tuple[Floats, int, Outcome]:
         if chain.size == 1:
             alone = integrate_chain(
                 chain,
@@ -117,8 +117,8 @@ def chain_lyapunov_exponent(
     for index in range(intervals if outcome is Outcome.REACHED_END else 0):
         start_s = settle_s + index * interval_s
         before = _size(chain, second - first)
-        first, struck, outcome = advanced(first, start_s)
-        second, _, other = advanced(second, start_s)
+        first, struck, outcome = advance(first, start_s)
+        second, _, other = advance(second, start_s)
         outcome = max(outcome, other)
         if outcome is not Outcome.REACHED_END:
             break

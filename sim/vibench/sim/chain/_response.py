@@ -17,7 +17,7 @@ from ..specimen.outcome import Outcome
 from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, most_chain_impacts, start_motion
 from ._tables import chain_tables, longest_window_s
@@ -82,7 +82,7 @@ def chain_response(
     initial_state
         Initial state of every cell, shape (cells, 6) [m, m/s]; None for rest.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     if chain.size == 1:
         (cell,) = chain.cells
         start = None if initial_state is None else start_motion(chain, initial_state)[0]

@@ -178,7 +178,7 @@ class NativeRun(_Run):
         """
         start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
-    def apart(self, tolerance: float | None = None) -> Self:
+    def copy(self, tolerance: float | None = None) -> Self:
         """Return an independent copy of the run; with another tolerance it has no tangent vectors."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
@@ -262,24 +262,24 @@ class GrowthReadings:
         readings["motions"], readings["room"] = self._motions.ctypes.data, room
 
     @property
-    def made(self) -> int:
+    def completed(self) -> int:
         """Number of time intervals that were completed."""
         return int(self.structure["made"])
 
     @property
     def growth(self) -> Floats:
         """Natural logarithm of the growth of each tangent vector in each interval, shape (n, m)."""
-        return self._growth[: self.made]
+        return self._growth[: self.completed]
 
     @property
     def impacts(self) -> NDArray[np.int64]:
         """Number of impacts in each completed interval, shape (n,)."""
-        return self._impacts[: self.made]
+        return self._impacts[: self.completed]
 
     @property
     def motions(self) -> Floats:
         """x, y, z, vx, vy, vz at the end of each interval, shape (n, 6)."""
-        return self._motions[: self.made]
+        return self._motions[: self.completed]
 
 
 def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:

@@ -21,7 +21,7 @@ from ..specimen.modes import modal_form
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .tangent_run import (
     ALIGNING,
     ALMOST,
@@ -161,11 +161,11 @@ def lyapunov_exponent(
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
 
-    def enough(growth: Floats) -> bool:
+    def is_enough(growth: Floats) -> bool:
         settled = growth[skipped:, 0] / interval.length_s
         return precision is not None and precision.is_reached_by(settled)
 
@@ -178,7 +178,7 @@ def lyapunov_exponent(
         accuracy,
         initial_state,
         max_impact_rate_hz,
-        None if precision is None else enough,
+        None if precision is None else is_enough,
     )
     if run.outcome is not Outcome.REACHED_END:
         return _estimate(drive, accuracy, run, Settling(FinalMotion.THROUGHOUT, 0), _LOST)

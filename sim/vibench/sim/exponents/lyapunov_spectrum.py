@@ -21,7 +21,7 @@ from ..specimen.modes import state_matrix
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Floats
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from .tangent_run import (
     BlockedMean,
@@ -103,7 +103,7 @@ def lyapunov_spectrum(
     The arguments are those of `vibench.sim.lyapunov_exponent`, with ``initial_state`` of shape (6,) [m, m/s].
     The standard errors are valid for blocks longer than the correlation time of the motion.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
     run = run_with_tangent(
@@ -118,7 +118,7 @@ def lyapunov_spectrum(
     )
     length = interval.length_s
     if run.outcome is not Outcome.REACHED_END:
-        parts = _Taken()
+        parts = _RunExponents()
     else:
         parts = _exponents_of_run(specimen, drive, run, skipped)
     since = parts.since
@@ -146,7 +146,7 @@ ONE_BLOCK = np.ones(DIRECTIONS, dtype=np.int64)
 UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
-class _Taken(NamedTuple):
+class _RunExponents(NamedTuple):
     """Lyapunov exponents of a run; the default values describe a run that did not reach its end."""
 
     exponents: Floats = UNKNOWN
@@ -159,13 +159,13 @@ class _Taken(NamedTuple):
     since: int = 0
 
 
-def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:
+def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _RunExponents:
     end = settling(run, state_scales(specimen, drive))
     if end.motion is FinalMotion.QUIET:
         system, _ = state_matrix(specimen)
         decays = np.sort(np.linalg.eigvals(system).real)[::-1]
         verdict = verdict_of(float(decays[0]), 0.0)
-        return _Taken(
+        return _RunExponents(
             decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
         )
     # A motion that settles late leaves little time to average. Use at least the second half of the run.
@@ -175,7 +175,7 @@ def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skip
     order = np.argsort([-each.mean for each in means], kind="stable")
     exponents = np.array([means[k].mean for k in order])
     errors = np.array([means[k].standard_error for k in order])
-    return _Taken(
+    return _RunExponents(
         exponents,
         errors,
         np.array([means[k].blocks for k in order], dtype=np.int64),

@@ -197,8 +197,8 @@ def run_with_tangent(
     readings = GrowthReadings(changes, count, interval.length_s, parts, metric)
     outcome = Outcome.REACHED_END
     stride = count if enough is None else math.ceil(count / CHECKS)
-    while readings.made < count and outcome is Outcome.REACHED_END:
-        outcome = run.read(readings, min(count, readings.made + stride), record)
+    while readings.completed < count and outcome is Outcome.REACHED_END:
+        outcome = run.read(readings, min(count, readings.completed + stride), record)
         if enough is not None and enough(readings.growth):
             break
     return TangentRun(

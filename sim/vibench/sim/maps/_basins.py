@@ -62,7 +62,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
         Index of the motion from each initial state, `MapResults.motion_numbers[:, 0]`, (rows, columns).
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
-    uncertain = {step: _uncertain(numbers, step, steps[-1]) for step in steps}
+    uncertain = {step: _is_uncertain(numbers, step, steps[-1]) for step in steps}
     kept = [
         step
         for step, is_it in uncertain.items()
@@ -81,7 +81,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     return UncertaintyExponent(exponent, exponent - half, exponent + half, tuple(kept), tuple(whole))
 
 
-def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
+def _is_uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.bool_]:
     """Return whether a step of this length along an axis leads to another motion, for all inner cells."""
     inner = numbers[
         edge - step : numbers.shape[0] - edge + step, edge - step : numbers.shape[1] - edge + step

@@ -12,7 +12,7 @@ from ..scene.cost import pilot_cost_s
 from ..scene.prediction import MotionKind, state_of
 from ..scene.refinement import LONGEST_S
 from ..scene.scene import Given, Scene
-from ..scene.solve import InBatches, Question, Solved, settle_scene, solve_scene
+from ..scene.solve import InBatches, Question, SolvedScene, settle_scene, solve_scene
 from ..specimen.outcome import Outcome
 from ..study import (
     NUMBERS,
@@ -26,7 +26,7 @@ from ..study import (
     Solver,
 )
 from ._map import OF_SPECIMEN, START, Map, contact_energy_j, labels_of, section_cells
-from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
+from ._refinement import ComparedCells, RefinementPlan, lattice, plan_refinement
 
 JUMP = 0.1
 """Relative difference of two neighbouring responses above which the points between them are computed."""
@@ -45,7 +45,7 @@ def map_solver(plan: Map) -> Solver:
     """
     if plan.target is not None:
         return solve_scene
-    is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
+    is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varying)
     return (
         InBatches(Question.MOTION) if is_one_specimen and not plan.chain and batches_pay() else settle_scene
     )
@@ -58,7 +58,7 @@ class MapPoints(Points):
 
     def __init__(self, plan: Map) -> None:
         # Refuse such maps here and not in the plan, because files of earlier versions contain them.
-        of_start = [each.field for each in plan.varied if each in START]
+        of_start = [each.field for each in plan.varying if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
                 f"random_starts = {plan.random_starts} was given with a range of {of_start[-1]}, which sets "
@@ -69,30 +69,30 @@ class MapPoints(Points):
         self._kept = {column.name for column in plan.columns}
 
     @property
-    def wanted_first(self) -> NDArray[np.int64]:
+    def first_points(self) -> NDArray[np.int64]:
         """Numbers of the points of the first lattice, for all initial states of each cell."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
 
-    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
         """Return the points to compute next, for all initial states; all points of a non-adaptive map."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
 
-    def unchained(self, number: int) -> Scene:
+    def new_scene(self, number: int) -> Scene:
         """Return the scene of a point that starts from the plan's initial state."""
         return self.plan.scene(self.grid.place(number))
 
-    def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
+    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
         """Return the scene of a point that starts from the final state of the point ``before``."""
         place = self.grid.place(number)
         state = state_of(arrays["final_state"][before].astype(np.float64))
         start = Given(state, self.plan.start_labels[place[-2]])
         return self.plan.scene(place, start, self.plan.phase_after(before, arrays))
 
-    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
         """Return the values to store for the solution of a point."""
         found = solved.prediction
         numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
@@ -128,7 +128,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
     label = np.where(is_whole, labels_of(arrays).reshape(shape), NOTHING)
     size = np.log(np.maximum(np.asarray(arrays["response_i"], dtype=np.float64).reshape(shape)[:, 0], 1e-300))
     is_steady = is_whole[:, 0] & (motion[:, 0] == list(MotionKind).index(MotionKind.PERIODIC))
-    seen = Seen(
+    seen = ComparedCells(
         is_known,
         cell_codes(label),
         np.where(is_steady, size, math.nan),
@@ -245,12 +245,12 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)
-    first, count = points.wanted_first, plan.grid.size
+    first, count = points.first_points, plan.grid.size
     if plan.target is None:
         work_s, first_s = float(points.planned_s.sum()), float(points.planned_s[first].sum())
         longest_s = float(points.times_s(may_repeat=False).sum())
     else:
-        each_s = pilot_cost_s(points.unchained, count)
+        each_s = pilot_cost_s(points.new_scene, count)
         work_s, first_s = count * each_s, len(first) * each_s
         longest_s = count * (LONGEST_S if plan.target.time_s is None else plan.target.time_s)
     return MapEstimate(

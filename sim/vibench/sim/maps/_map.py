@@ -297,7 +297,7 @@ class Map(GridPlan):
     def _varies(self) -> Self:
         if self.target is not None:
             self.require_target_alone("accuracy")
-        names = [each.field for each in self.varied]
+        names = [each.field for each in self.varying]
         if len(names) not in (1, 2):
             have = f"{len(names)} were given: {', '.join(names)}" if names else "none was given"
             raise ValueError(
@@ -306,7 +306,7 @@ class Map(GridPlan):
             )
         if len(set(self.chain)) != len(self.chain):
             raise ValueError(f"chain = {', '.join(self.chain)} has a direction twice; give each once")
-        if self.chain and any(each in START for each in self.varied):
+        if self.chain and any(each in START for each in self.varying):
             raise ValueError(f"chain starts at neighbouring points, but {names[0]} sets the start; omit one")
         if self.coarse is not None and self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse = {self.coarse} is not a power of 2; give 2, 4, 8, 16, 32 or 64")
@@ -318,7 +318,7 @@ class Map(GridPlan):
             raise ValueError(f"{self.grid.size} points were requested; a map has at most {MOST_POINTS}")
         for corner in (0, self.grid.size - 1):
             self.scene(self.grid.place(corner))
-        for quantity in self.varied:
+        for quantity in self.varying:
             self._refuse_unless_felt(quantity)
         return self
 
@@ -339,7 +339,7 @@ class Map(GridPlan):
             )
 
     @property
-    def varied(self) -> tuple[Quantity, ...]:
+    def varying(self) -> tuple[Quantity, ...]:
         """The one or two varying quantities; the first is on the last axis of the results."""
         return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
 
@@ -352,17 +352,17 @@ class Map(GridPlan):
     @property
     def is_basin(self) -> bool:
         """Whether only the initial state varies over the map."""
-        return all(each in START for each in self.varied)
+        return all(each in START for each in self.varying)
 
     @property
     def is_over_drive(self) -> bool:
         """Whether drive frequency and amplitude vary, so that levels of recordings can be overlaid."""
-        return [each.axis for each in self.varied] == ["frequency", "amplitude"]
+        return [each.axis for each in self.varying] == ["frequency", "amplitude"]
 
     @property
     def is_adaptive(self) -> bool:
         """Whether points may be interpolated: two varying quantities, and no point continues another."""
-        may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
+        may_be = self.refinement is Refinement.ADAPTIVE and len(self.varying) == 2 and not self.chain
         return may_be and self.first_step > 1
 
     @property
@@ -370,7 +370,7 @@ class Map(GridPlan):
         """Grid steps between the points that are computed first; 1 if all points are computed."""
         if self.coarse is not None:
             return self.coarse
-        fewest = min(self.range_of(each).points for each in self.varied)
+        fewest = min(self.range_of(each).points for each in self.varying)
         affordable = max(1, (fewest - 1) // FEWEST_STEPS)
         return min(MOST_STEP, 1 << (affordable.bit_length() - 1))
 
@@ -387,7 +387,7 @@ class Map(GridPlan):
         """Axes of the results: second varying quantity (if any), initial states, first varying quantity."""
         first, *second = (
             StudyAxis(each.axis, self.range_of(each).values, each.units, each.long_name)
-            for each in self.varied
+            for each in self.varying
         )
         return (*second, StudyAxis(STARTS, self.start_labels, "", "state from which a point begins"), first)
 
@@ -395,7 +395,7 @@ class Map(GridPlan):
     def columns(self) -> tuple[Column, ...]:
         """Columns that the map stores: errors only with a target, section points only along one quantity."""
         errors = () if self.target is None else tuple(_OF_STUDIES[name] for name in ERRORS)
-        return columns_with((*errors, *(SECTION_COLUMNS if len(self.varied) == 1 else ())))
+        return columns_with((*errors, *(SECTION_COLUMNS if len(self.varying) == 1 else ())))
 
     def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
         """Return the scene at a grid position, from the plan's initial state or the given one.
@@ -413,7 +413,7 @@ class Map(GridPlan):
             (numbers["k0_n_per_m"], numbers["k1_n_per_m"], numbers["k2_n_per_m"]),
             numbers["hertz_stiffness"],
         )
-        observe = (*self.observe, *((Observable.POINCARE,) if len(self.varied) == 1 else ()))
+        observe = (*self.observe, *((Observable.POINCARE,) if len(self.varying) == 1 else ()))
         return Scene(
             specimen,
             drive,
@@ -443,7 +443,7 @@ class Map(GridPlan):
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
         """Return the value of every quantity at a position of the grid."""
         numbers = {each.field: getattr(self, each.field) for each in QUANTITIES}
-        for quantity, index in zip(self.varied, (place[-1], place[0]), strict=False):
+        for quantity, index in zip(self.varying, (place[-1], place[0]), strict=False):
             numbers[quantity.field] = _values(self.range_of(quantity))[index]
         return numbers
 

@@ -21,7 +21,7 @@ AUDITED, AUDITED_SHARE = 400, 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class ComparedCells:
     """Results by which the cells of a map are compared; arrays of shape (rows, columns)."""
 
     is_known: Mask
@@ -64,7 +64,7 @@ class RefinementPlan:
     """Computed cell whose motion each audited cell would have received by filling."""
 
 
-def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
+def plan_refinement(seen: ComparedCells, coarse: int, seed: int) -> RefinementPlan:
     """Return the cells to compute next or, if all are known, the filled-in cells.
 
     Parameters
@@ -109,7 +109,7 @@ def _audit_plan(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> 
 class _Sketch:
     """Cells that are computed or filled in at the lattice levels processed so far."""
 
-    def __init__(self, seen: Seen) -> None:
+    def __init__(self, seen: ComparedCells) -> None:
         self.seen = seen
         self.is_computed = np.zeros_like(seen.is_known)
         self.codes = np.zeros_like(seen.codes)
@@ -211,7 +211,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
     """Return the lattice points around each cell and their bilinear weights, shape (n, 4) each."""
     rows, columns = np.divmod(cells, shape[1])
     (low_row, high_row, up), (low_column, high_column, right) = (
-        _between(place, _lines(length, step)) for place, length in zip((rows, columns), shape, strict=True)
+        _neighbours(place, _lines(length, step)) for place, length in zip((rows, columns), shape, strict=True)
     )
     corners = np.stack(
         [row * shape[1] + column for row in (low_row, high_row) for column in (low_column, high_column)],
@@ -223,7 +223,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
     return corners, weights
 
 
-def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
+def _neighbours(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
     """Return the lattice lines below and above each index, and the index's position between them (0 to 1)."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]

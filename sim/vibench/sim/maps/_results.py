@@ -58,7 +58,7 @@ class Audit:
             return Share(0.0, 0.0, 1.0 if self.filled else 0.0)
         return wilson_share(self.wrong, self.audited)
 
-    def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
+    def corrected_shares(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
         """Return the shares of the motions in a map with ``cells`` cells, corrected for wrong filling.
 
         Where motions are finely mixed, the most common one is filled in too often. The gains and losses found
@@ -114,7 +114,7 @@ class MapResults(GridResults[Map]):
     """Results of a map, over axes in the order of ``plan.axes``."""
 
     @property
-    def computed(self) -> int:
+    def points(self) -> int:
         """Number of computed points of the map."""
         return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
 
@@ -159,7 +159,7 @@ class MapResults(GridResults[Map]):
 
         Shares are those among all known points, corrected by the audit if points are filled in.
         """
-        return self._described(self.motion_numbers.reshape(-1), self.audit)
+        return self._describe_motions(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
         """Return the motions of a cell, the most common first; `place` = indices (second, first quantity)."""
@@ -168,9 +168,9 @@ class MapResults(GridResults[Map]):
         known = cell[self._labels[cell] >= 0]
         numbers = np.full(self.plan.grid.size, UNKNOWN)
         numbers[known] = _by_frequency(_groups(self._labels[known], self._sizes[known]))
-        return self._described(numbers, None)
+        return self._describe_motions(numbers, None)
 
-    def shown(self, name: str, start: int = 0) -> Floats:
+    def map_values(self, name: str, start: int = 0) -> Floats:
         """Return a result over the varying quantities, for one of the initial states; NaN if unknown.
 
         ``name`` is a column, or ``motions`` for the number of motions that a cell's initial states reach.
@@ -201,7 +201,7 @@ class MapResults(GridResults[Map]):
     def _median(self, name: str, points: NDArray[np.int64]) -> float:
         return float(np.nanmedian(self.arrays[name][points].astype(np.float64)))
 
-    def _described(self, numbers: NDArray[np.int64], audit: Audit | None) -> tuple[MapMotion, ...]:
+    def _describe_motions(self, numbers: NDArray[np.int64], audit: Audit | None) -> tuple[MapMotion, ...]:
         total = int(np.count_nonzero(numbers >= 0))
         places = [
             np.flatnonzero(numbers == number) for number in range(int(numbers.max(initial=UNKNOWN)) + 1)
@@ -211,7 +211,7 @@ class MapResults(GridResults[Map]):
         trials = min(total, len(self.plan.start_labels)) if self.plan.random_starts else total
         shares = shares_of([Count(trials * len(place) / total, is_final=True) for place in places])
         if audit is not None:
-            shares = audit.corrected(shares, total // self.plan.grid.shape[-2])
+            shares = audit.corrected_shares(shares, total // self.plan.grid.shape[-2])
         return tuple(
             MapMotion(
                 kind,

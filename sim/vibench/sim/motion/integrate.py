@@ -13,7 +13,7 @@ from ..specimen.drive import Drive, Harmonic, Sampled, Sweep
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats, Table, Vector
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 
 # Drives as cubic polynomials of the base displacement on equal time intervals. SI units.
 #
@@ -143,7 +143,7 @@ def integrate(
     max_impact_rate_hz
         Mean impact rate above which the run ends with TOO_MANY_IMPACTS.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
     check_impact_rate(max_impact_rate_hz)
     end = float(start_time_s + duration_s)
@@ -307,7 +307,7 @@ def follow_samples(
         Samples at which the run begins and ends; by default the whole drive. The spline always uses all
         samples of the drive.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     base = sampled_motion(drive)
     pieces = base.pieces[first:last]
     run = CubicRun(specimen, base.interval, start_motion(initial_state), accuracy.tolerance)

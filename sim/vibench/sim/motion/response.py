@@ -11,7 +11,7 @@ from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
-from ..specimen.stops import chosen, require_positive
+from ..specimen.stops import member, require_positive
 from .integrate import check_impact_rate
 
 
@@ -84,7 +84,7 @@ def steady_response(
     Raises ValueError when the drive amplitude is zero, or the window is longer than the run or shorter than
     one drive period.
     """
-    accuracy = chosen(Accuracy, accuracy)
+    accuracy = member(Accuracy, accuracy)
     periods = whole_periods(drive, duration_s, window_s)
     check_impact_rate(max_impact_rate_hz)
     run = NativeRun(specimen, drive, start_motion(initial_state), accuracy.tolerance)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..specimen.drive import Harmonic
 from ..specimen.state import Complex, Table, Vector, Y, Z
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .branch import Branch, OrbitShape, OrbitSigns
 from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
 from .continuation import ArcSteps
@@ -48,7 +48,7 @@ class BalanceOptions:
     """Largest allowed change of p due to neglected harmonics, relative to the fundamental of p."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
+        object.__setattr__(self, "kept", member(HarmonicSet, self.kept))
         if not (1 <= self.fewest <= self.most and 0.0 < self.tolerance < math.inf):
             raise ValueError(
                 f"From {self.fewest} to {self.most} harmonics at tolerance {self.tolerance} is not allowed: "
@@ -123,7 +123,7 @@ def balance(
     while True:
         harmonics = harmonics_up_to(highest, options.kept)
         problem = BalanceProblem(structure, spring, harmonics)
-        seed = problem.packed(with_harmonics(guess.relative, guess.harmonics, harmonics))
+        seed = problem.pack(with_harmonics(guess.relative, guess.harmonics, harmonics))
         unknowns, is_solved = newton(problem, seed, omega, amplitude_m)
         found = balance_of_solution(problem, unknowns, frequency_hz, amplitude_m, options.tolerance)
         enough = is_solved and found.outcome is BalanceEnd.CONVERGED
@@ -183,11 +183,11 @@ class BalanceFamily:
         """Return drive frequency [Hz] and amplitude [m] at a point of the curve."""
         return self.path.drive(float(point[-1]) * self.scale)
 
-    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Vector) -> tuple[Vector, Table]:
         """Return the residual of the balance, and its derivatives by all unknowns and the parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
-        residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
+        residual, jacobian, by_omega, by_amplitude = self.problem.linearise(point[:-1], omega, amplitude)
         df, da = self.path.slopes(float(point[-1]) * self.scale)
         along = (2.0 * math.pi * df * by_omega + da * by_amplitude) * self.scale
         return residual, np.column_stack([jacobian, along])
@@ -206,7 +206,7 @@ class BalanceFamily:
             left_out=found.left_out,
         )
 
-    def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
+    def refine(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
         """Return the family with twice the harmonics, the new ones zero; None if that exceeds the limit."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
@@ -215,12 +215,12 @@ class BalanceFamily:
         harmonics = harmonics_up_to(more, self.options.kept)
         problem = BalanceProblem(self.problem.structure, self.problem.spring, harmonics)
         finer = BalanceFamily(problem, self.path, self.scale, self.options)
-        return finer, self._carried(point, problem), self._carried(tangent, problem)
+        return finer, self._convert_point(point, problem), self._convert_point(tangent, problem)
 
-    def _carried(self, point: Vector, problem: BalanceProblem) -> Vector:
+    def _convert_point(self, point: Vector, problem: BalanceProblem) -> Vector:
         phasors = self.problem.phasors(point[:-1])
         padded = with_harmonics(phasors, self.problem.harmonics, problem.harmonics)
-        return np.append(problem.packed(padded), point[-1])
+        return np.append(problem.pack(padded), point[-1])
 
 
 def orbit_signs(
@@ -257,7 +257,7 @@ def balance_branch_within(
     value = parameter_value(path, Harmonic(start.frequency_hz, start.amplitude_m))
     scale = range_scale(low, high, value)
     problem = BalanceProblem(structure, spring, start.harmonics)
-    point = np.append(problem.packed(start.relative), value / scale)
+    point = np.append(problem.pack(start.relative), value / scale)
     family = BalanceFamily(problem, path, scale, options)
     return follow_both_ways(family, point, (low / scale, high / scale), steps)
 

@@ -50,11 +50,11 @@ class FrequencyPath:
         """Return frequency [Hz] and amplitude [m] for a frequency on the path."""
         if len(self.amplitudes_m) == 1:
             return value, self.amplitudes_m[0]
-        return value, float(self._curve(self._inside(value)))
+        return value, float(self._curve(self._clip(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
         """Return the derivatives of frequency (1) and amplitude [m/Hz] by the frequency."""
-        if len(self.amplitudes_m) == 1 or self._inside(value) != value:
+        if len(self.amplitudes_m) == 1 or self._clip(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
 
@@ -62,7 +62,7 @@ class FrequencyPath:
     def _curve(self) -> PchipInterpolator:
         return PchipInterpolator(self.frequencies_hz, self.amplitudes_m)
 
-    def _inside(self, value: float) -> float:
+    def _clip(self, value: float) -> float:
         return min(max(value, self.frequencies_hz[0]), self.frequencies_hz[-1])
 
 
@@ -127,7 +127,7 @@ class Family(Curve, Protocol):
         """Return the results (responses, stability) of the motion at a point of the curve."""
         ...
 
-    def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
+    def refine(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
         """Return the family at a higher resolution, with a point and a tangent converted to it.
 
         None if the family already has the highest resolution.
@@ -169,12 +169,12 @@ def follow(
     steps
         Step lengths and tolerances.
     """
-    followed = _Followed(family, steps)
+    followed = _FollowedBranch(family, steps)
     while True:
         end, last = followed.go_on(start, toward, bounds)
         if end is not None:
             return followed.branch(end)
-        refined = followed.family.refined(last.point, last.tangent)
+        refined = followed.family.refine(last.point, last.tangent)
         if refined is None:
             return followed.end_where_stuck()
         finer, guess, normal = refined
@@ -215,7 +215,7 @@ def _join_branches(back: Branch, onward: Branch) -> Branch:
 
 
 @dataclass
-class _Followed:
+class _FollowedBranch:
     """Points and events of a branch while it is followed."""
 
     family: Family
@@ -246,10 +246,7 @@ class _Followed:
             if here.is_fold:
                 self._add_event(BifurcationKind.FOLD, report)
                 continue
-            if (
-                report.left_out > family.tolerance
-                and family.refined(before.point, before.tangent) is not None
-            ):
+            if report.left_out > family.tolerance and family.refine(before.point, before.tangent) is not None:
                 return None, before
             if here.end is ArcEnd.TOO_MANY_POINTS:
                 return here.end, here

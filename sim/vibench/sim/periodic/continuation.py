@@ -21,7 +21,7 @@ from ..specimen.state import Table, Vector
 class Curve(Protocol):
     """Equations r(u, lambda) = 0 whose solutions form the curve."""
 
-    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Vector) -> tuple[Vector, Table]:
         """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at a point (u, lambda), shape (n + 1,).
 
         Return NaN or infinite values where the equations cannot be evaluated.
@@ -105,7 +105,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
     """
     point = guess.copy()
     for iteration in range(1, NEWTON_ITERATIONS + 1):
-        residual, jacobian = curve.linearised(point)
+        residual, jacobian = curve.linearise(point)
         if not bool(np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
             return point, 0
         if float(np.max(np.abs(residual))) < tolerance:
@@ -121,7 +121,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
 
 def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
     """Return the unit tangent at a point, in the direction of ``along``, shape (n + 1,)."""
-    _, jacobian = curve.linearised(point)
+    _, jacobian = curve.linearise(point)
     system = np.vstack([jacobian, along])
     aim = np.zeros(len(point))
     aim[-1] = 1.0
@@ -168,7 +168,7 @@ def trace(
             # No smooth curve exists between two kinks this close together, so end here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
-            ahead = None if is_stuck else _leap(curve, here, steps)
+            ahead = None if is_stuck else _leap_kink(curve, here, steps)
             if ahead is None:
                 yield replace(here, end=ArcEnd.STEP_TOO_SHORT)
                 return
@@ -183,7 +183,7 @@ def trace(
         if fold is not None and bounds[0] <= fold.point[-1] <= bounds[1]:
             yield fold
         if not inside:
-            yield _at_bound(curve, here if fold is None else fold, ahead, bounds, steps)
+            yield _point_at_bound(curve, here if fold is None else fold, ahead, bounds, steps)
             return
         if _passes(curve, first, here, ahead, steps):
             arc = here.arc + float(np.linalg.norm(first.point - here.point))
@@ -228,7 +228,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
 
 
-def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
+def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
     """Return a point beyond a kink, where a contact begins and the branch may turn back; None if not found.
 
     At a kink the parameter may reverse while the unknowns continue. Steps of growing length are tried along
@@ -313,7 +313,7 @@ def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance
     return None
 
 
-def _at_bound(
+def _point_at_bound(
     curve: Curve, before: ArcPoint, after: ArcPoint, bounds: tuple[float, float], steps: ArcSteps
 ) -> ArcPoint:
     """Return the point of the curve at the parameter bound that the step has passed."""

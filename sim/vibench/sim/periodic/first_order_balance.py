@@ -147,7 +147,7 @@ def first_order_states(
     slopes = [_slope_sign(size, coefficients, exponents) for size in sizes]
     states = []
     for size, slope in zip(sizes, slopes, strict=True):
-        describing = _describing(float(size), spring)
+        describing = _describe_force(float(size), spring)
         relative = alone / (1.0 + compliance * describing)
         states.append(
             FirstOrderState(
@@ -159,7 +159,7 @@ def first_order_states(
     return states
 
 
-def _describing(size: float, spring: PowerSpring) -> float:
+def _describe_force(size: float, spring: PowerSpring) -> float:
     """Return the describing function N = F_1 / P at abs(P) = size * length [N/m]; inf on overflow."""
     with np.errstate(over="ignore"):
         return float(

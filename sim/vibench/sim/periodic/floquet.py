@@ -66,7 +66,7 @@ def transition(
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
     result = np.eye(2 * structure.size)
     for start, stop in pairwise(edges):
-        result = departures.over(start, stop) @ result
+        result = departures.transition(start, stop) @ result
     return np.asarray(result)
 
 
@@ -92,7 +92,7 @@ class _Departures:
         own = float(np.max(np.abs(np.linalg.eigvals(self._system))))
         self._fastest = own + math.sqrt(stiffest * float(-structure.direction @ push))
 
-    def over(self, start: float, stop: float) -> Floats:
+    def transition(self, start: float, stop: float) -> Floats:
         """Return the transition matrix of small perturbations between two drive phases [rad]."""
         length = (stop - start) / (2.0 * math.pi * self._motion.frequency_hz)
         stiffness, _ = self._slopes(np.array([0.5 * (start + stop)]))

@@ -73,7 +73,7 @@ def structure_of(specimen: Specimen) -> LinearStructure:
     )
 
 
-class Condensed(NamedTuple):
+class CondensedStructure(NamedTuple):
     """Structure condensed to p at m harmonics of one frequency; "slope" fields are derivatives by omega."""
 
     compliance: Complex
@@ -88,7 +88,7 @@ class Condensed(NamedTuple):
     """Displacements without the spring over U, Z_1^-1 (e_k + i w e_c), shape (n,)."""
 
 
-def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> Condensed:
+def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> CondensedStructure:
     """Return the structure condensed to p, at the given harmonics of ``omega``.
 
     Parameters
@@ -112,7 +112,7 @@ def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> 
     entry = structure.entry_stiffness + 1j * omega * structure.entry_damping
     carried: Complex = np.linalg.solve(first, entry).astype(np.complex128)
     moved = np.linalg.solve(first, 1j * structure.entry_damping - first_slope @ carried)
-    return Condensed(
+    return CondensedStructure(
         compliance=reach[:, :, 0] @ structure.direction,
         compliance_slope=-np.sum(reach[:, :, 0] * bent, axis=1),
         linear=complex(structure.direction @ carried),
@@ -264,7 +264,7 @@ class BalanceProblem:
         """Number of real unknowns of the balance equations."""
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
-    def packed(self, phasors: Complex) -> Vector:
+    def pack(self, phasors: Complex) -> Vector:
         """Return the unknowns for the phasors P_k [m], shape (size,)."""
         return _real(phasors, self.harmonics) / self.spring.length
 
@@ -276,7 +276,7 @@ class BalanceProblem:
         imaginary[2 * count - self.size :] = scaled[count:]
         return scaled[:count] + 1j * imaginary
 
-    def linearised(
+    def linearise(
         self, unknowns: Vector, omega: float, amplitude_m: float
     ) -> tuple[Vector, Table, Vector, Vector]:
         """Return the residual, its Jacobian, and its derivatives by omega and by the drive amplitude.
@@ -301,7 +301,7 @@ class BalanceProblem:
         by_amplitude = _real(-seen.linear * drive, self.harmonics) / scale
         return _real(residual, self.harmonics) / scale, jacobian, by_omega, by_amplitude
 
-    def _jacobian(self, seen: Condensed, spring: ForceHarmonics) -> Table:
+    def _jacobian(self, seen: CondensedStructure, spring: ForceHarmonics) -> Table:
         count = len(self.harmonics)
         direct = np.eye(count) + seen.compliance[:, None] * spring.holomorphic
         mirrored = seen.compliance[:, None] * spring.conjugate
@@ -366,7 +366,7 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
 def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
     """Solve the balance by Newton's iteration with step halving; return the unknowns, and if it converged."""
     unknowns = start.copy()
-    residual, jacobian, _, _ = problem.linearised(unknowns, omega, amplitude_m)
+    residual, jacobian, _, _ = problem.linearise(unknowns, omega, amplitude_m)
     error = size_of(residual)
     for _ in range(NEWTON_ITERATIONS):
         if error < ROUNDING * max(1.0, size_of(unknowns)):
@@ -377,7 +377,7 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
             return unknowns, False
         for halving in range(MOST_HALVINGS):
             trial = unknowns - 0.5**halving * step
-            trial_residual, trial_jacobian, _, _ = problem.linearised(trial, omega, amplitude_m)
+            trial_residual, trial_jacobian, _, _ = problem.linearise(trial, omega, amplitude_m)
             trial_error = size_of(trial_residual)
             if trial_error < error:
                 break

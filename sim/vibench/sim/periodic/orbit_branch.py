@@ -9,7 +9,7 @@ import numpy as np
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import state_scales
 from ..specimen.state import Table, Vector
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
     RANGE_LENGTH,
@@ -54,7 +54,7 @@ class ExactFamily:
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
         return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
 
-    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002
+    def refine(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002
         """Return None, because shooting has no finer resolution."""
         return None
 
@@ -75,7 +75,7 @@ class OrbitFamily(ExactFamily):
         """Return the state at time zero of the drive, for a point of the curve."""
         return point[:-1] * self.scales
 
-    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Vector) -> tuple[Vector, Table]:
         """Return the closure error after a period, and its derivatives by state and parameter."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
@@ -120,7 +120,7 @@ def periodic_branch(
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
     """
-    parameter = chosen(Parameter, parameter)
+    parameter = member(Parameter, parameter)
     drive = orbit.drive
     is_frequency = parameter is Parameter.FREQUENCY
     path = FrequencyPath((drive.amplitude_m,)) if is_frequency else AmplitudePath(drive.frequency_hz)

@@ -17,7 +17,7 @@ from ..specimen.drive import Harmonic
 from ..specimen.modes import base_transmissibility
 from ..specimen.specimen import Specimen
 from ..specimen.state import Table, Vector
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .branch import Branch, OrbitShape
 from .branch_following import AmplitudePath, DrivePath, OrbitReport, follow
 from .continuation import ArcSteps, correct
@@ -65,7 +65,7 @@ class PhaseResonanceFamily(ExactFamily):
         frequency_hz = self.reference.frequency_hz * math.exp(FREQUENCY_SHARE * float(point[6]))
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
-    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Vector) -> tuple[Vector, Table]:
         """Return closure error and phase error, shape (7,), and their derivatives by all unknowns, (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
@@ -75,12 +75,12 @@ class PhaseResonanceFamily(ExactFamily):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         by_frequency = FREQUENCY_SHARE * ratio * self.mapping.frequency_slope(state, drive)
         by_level = math.log(10.0) / LENGTH_PER_DECADE * ratio * self.mapping.amplitude_slope(state, drive)
-        off, slopes = self._off(point), np.empty(8)
+        off, slopes = self._error(point), np.empty(8)
         for k, nudge in enumerate(DIFFERENCE * np.eye(8)):
-            slopes[k] = (self._off(point + nudge) - self._off(point - nudge)) / (2.0 * DIFFERENCE)
+            slopes[k] = (self._error(point + nudge) - self._error(point - nudge)) / (2.0 * DIFFERENCE)
         return np.append(gone, off), np.vstack([np.column_stack([by_state, by_frequency, by_level]), slopes])
 
-    def _off(self, point: Vector) -> float:
+    def _error(self, point: Vector) -> float:
         """Return the sine of the phase error of m0 relative to the base."""
         run = self.mapping.orbit(point[:6] * self.scales, self.drive_at(point), SAMPLES)
         count = self.mapping.periods * SAMPLES
@@ -124,7 +124,7 @@ def phase_resonance_branch(
     steps
         Step lengths along the branch; 0.5 is a quarter of a decade of level, or 5 % of frequency.
     """
-    (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
+    (low_m, high_m), of = levels_m, member(PhaseReference, of)
     if not any(specimen.dampings):
         raise ValueError(
             "A specimen without damping has no phase resonance: at a resonance its motion without contacts "

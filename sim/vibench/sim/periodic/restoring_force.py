@@ -103,24 +103,24 @@ class GapSpring:
 
     def force(self, p: Floats, rate: Floats) -> Floats:
         """Return the force F, shape of ``p`` [N]."""
-        side, depth = self._pressed(p)
+        side, depth = self._penetration(p)
         return side * self._push(depth) * (1.0 + self.loss * side * rate)
 
     def stiffness(self, p: Floats, rate: Floats) -> Floats:
         """Return the stiffness dF/dp, shape of ``p`` [N/m]."""
-        side, depth = self._pressed(p)
+        side, depth = self._penetration(p)
         slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0) + self.beside
         return np.where(depth > 0.0, slope * (1.0 + self.loss * side * rate), 0.0)
 
     def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the force is linear in the rate
         """Return the damping dF/d(dp/dt), shape of ``p`` [N s/m]."""
-        _, depth = self._pressed(p)
+        _, depth = self._penetration(p)
         return self.loss * self._push(depth)
 
     def _push(self, depth: Floats) -> Floats:
         return self.stiffness_coefficient * depth**self.exponent + self.beside * depth
 
-    def _pressed(self, p: Floats) -> tuple[Floats, Floats]:
+    def _penetration(self, p: Floats) -> tuple[Floats, Floats]:
         depth = np.where(p > 0.0, p - self.upper, -p - self.lower)
         return np.sign(p), np.maximum(depth, 0.0)
 

@@ -24,7 +24,7 @@ from ..specimen.power_law import PowerLaw
 from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
 from .harmonic_balance import phasors_of, size_of
@@ -212,7 +212,7 @@ def periodic_orbit(
         raise ValueError(
             f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."
         )
-    mapping = PeriodMap(specimen, chosen(OrbitShape, shape), periods)
+    mapping = PeriodMap(specimen, member(OrbitShape, shape), periods)
     settling = SETTLING_PERIODS / drive.frequency_hz
     first = integrate(specimen, drive, settling).final_state if start is None else start_motion(start)
     scales = state_scales(specimen, drive)

@@ -23,7 +23,7 @@ import numpy as np
 from ..engine.library import physics_digest
 from ..operating_system.this import replace_file, state_folder, state_place
 from .plan import ScenePlan, plan_scene
-from .refinement import LONGEST_S, refined
+from .refinement import LONGEST_S, refine_to_end
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
@@ -67,7 +67,7 @@ MOST_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedTime:
     """Expected computing time with its uncertainty."""
 
     time_s: float
@@ -99,23 +99,23 @@ class CostLedger:
         self._lately = deque[float](maxlen=MEMORY)
         """Logarithmic deviations of the latest runs of any kind, to detect that the machine became slower."""
 
-    def expected(self, kind: str, planned_s: float) -> Expected:
+    def expected_time(self, kind: str, planned_s: float) -> ExpectedTime:
         """Return the expected time of a run; a new kind uses the statistics of a more general kind."""
         with self._lock:
-            known, drift = self._known(kind), self._drift
+            known, drift = self._statistics(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
             # Variance of the next run about the estimated mean: scatter of runs plus uncertainty of the mean.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
-        return Expected(planned_s * math.exp(known.mean + drift), factor, known.runs)
+        return ExpectedTime(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
         """Record the computing time of a run [s], without the loading of modules."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
-            known = self._known(kind)
+            known = self._statistics(kind)
             if known.runs >= FEWEST:
                 self._lately.append(known.off(taken_s / planned_s))
             for name in _names(kind):
@@ -124,7 +124,7 @@ class CostLedger:
         if time.monotonic() - self._saved_s > SAVED_EVERY_S:
             self.save()
 
-    def _known(self, kind: str) -> _Kind:
+    def _statistics(self, kind: str) -> _Kind:
         """Return the statistics of a kind of run or, with too few runs, of the next more general kind."""
         enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
         return next((each for each in enough if each.runs >= FEWEST), _Kind())
@@ -218,8 +218,8 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
     """
     plan = plan_scene(scene)
     planned_s = plan.planned_s if may_repeat else plan.longest_planned_s
-    own = cost_ledger().expected(_kind(plan, solver), planned_s)
-    return own.time_s if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s).time_s
+    own = cost_ledger().expected_time(_kind(plan, solver), planned_s)
+    return own.time_s if own.runs >= FEWEST else cost_ledger().expected_time(plan.kind, planned_s).time_s
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
@@ -245,7 +245,7 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
     assert scene.target is not None
     limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
     tried_s, began_s = min(most_s, limit_s), time.monotonic()
-    report = refined(replace(scene, target=replace(scene.target, time_s=tried_s))).target
+    report = refine_to_end(replace(scene, target=replace(scene.target, time_s=tried_s))).target
     assert report is not None
     taken_s = time.monotonic() - began_s
     if taken_s < tried_s or (report.is_met and scene.target.error is not None):

@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
 Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
-`watch` classifies it and returns it if it must be integrated further. `seen` observes the end. Between these
-steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
+`watch` classifies it and returns it if it must be integrated further. `observe` observes the end. Between
+these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
 """
 
 import math
@@ -29,7 +29,7 @@ from .followed_run import (
     window_of,
 )
 from .prediction import MotionKind
-from .repetition import EXACTLY, Pace, Repetition, growth_of, kind_of, wandered_until
+from .repetition import EXACTLY, Pace, Repetition, first_repetition, growth_of, kind_of
 from .scene import FixedDuration
 from .states_alone import StatesAlone
 
@@ -80,7 +80,7 @@ class FixedCourse:
     def watch(self) -> None:
         """Return None: with a fixed duration the motion is not integrated further."""
 
-    def seen(self) -> SceneRun:
+    def observe(self) -> SceneRun:
         """Observe the motion in the window at its end and classify it."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
@@ -94,7 +94,7 @@ class FixedCourse:
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
             # The period became known only in the window: observe it again over whole periods (no leakage).
-            begins = window.begins.apart()
+            begins = window.begins.copy()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
             leaked = np.abs(window.responses_m / whole.responses_m - 1.0)
@@ -270,7 +270,7 @@ class SettlingCourse:
                 break
             if not late:
                 run.follow_tangent()
-            starts.append(run.apart())
+            starts.append(run.copy())
             late.append(follow_with_section(run, end_s, Watch.PEAKS_AND_LINES))
         ended = f"it has not settled within {self._longest_s:g} s"
         seen = _observe_last(run, late or early, starts, in_window, pace, ended)
@@ -285,21 +285,21 @@ class SettlingCourse:
         self._on = StatesAlone(run, self._pace, states_of(path)).aim(until_s, run.cost_s + alone_s)
         return self._on
 
-    def seen(self) -> SceneRun:
+    def observe(self) -> SceneRun:
         """Return window and kind of the motion; if it was integrated further, observe a new window."""
         if self._on is not None:
-            return self._after(self._on)
+            return self._observe_end(self._on)
         assert self._seen is not None
         return self._seen
 
-    def _after(self, states: StatesAlone) -> SceneRun:
+    def _observe_end(self, states: StatesAlone) -> SceneRun:
         run, pace, path, watched = self._run, self._pace, self._path, self._watched
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
         # Chaos may have become quasi-periodic, which does not repeat either, but whose growth is zero.
         run.follow_tangent()
-        begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
+        begins, made = run.copy(), round(run.time_s * pace.frequency_hz)
         last = [
             follow_with_section(
                 run, (made + number * self._slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES
@@ -328,9 +328,9 @@ def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
 
 def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretch], pace: Pace) -> SceneRun:
     """Observe one period of a repeating motion, and find the time at which the motion settled."""
-    settled_s, begins = run.time_s, run.apart()
+    settled_s, begins = run.time_s, run.copy()
     section = states_of(path)
-    since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
+    since = first_repetition(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
     end_s = settled_s + repeats.period / pace.frequency_hz
     one = follow_with_section(run, end_s, Watch.PEAKS_AND_LINES)
     window = window_of(begins, [one])

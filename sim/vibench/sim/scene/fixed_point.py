@@ -36,7 +36,7 @@ def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
 
 
 def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
-    run, gone = near.apart(TOLERANCE), np.inf
+    run, gone = near.copy(TOLERANCE), np.inf
     scales = np.repeat([1.0, 2.0 * np.pi * run.drive.frequency_hz], 3)
     start = run.state / scales
     size = float(np.abs(start).max(initial=1e-300))
@@ -52,5 +52,5 @@ def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
             distance = float(np.abs(run.state / scales - start).max()) / size
             is_stable = np.abs(np.linalg.eigvals(scaled)).max() < 1.0
             return FixedPoint(run, away, distance) if is_stable else None
-        run = run.pushed(away @ off * scales)
+        run = run.with_push(away @ off * scales)
     return None

@@ -98,7 +98,7 @@ class Stretch:
         """Length of the stretch [s]."""
         return self.end_s - self.start_s
 
-    def thinned(self, every: int) -> "Stretch":
+    def every_nth(self, every: int) -> "Stretch":
         """Return the stretch with only every ``every``-th stored state."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
@@ -140,10 +140,10 @@ class FollowedRun:
         """Current x, y, z, vx, vy, vz, shape (6,)."""
         return self._run.motion
 
-    def apart(self, tolerance: float | None = None) -> Self:
+    def copy(self, tolerance: float | None = None) -> Self:
         """Return an independent copy, optionally with another tolerance."""
         twin = copy(self)
-        twin.__dict__.update(_run=self._run.apart(tolerance))
+        twin.__dict__.update(_run=self._run.copy(tolerance))
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
@@ -161,7 +161,7 @@ class FollowedRun:
         """Whether m1 touches no stop at present."""
         return self._run.is_in_flight
 
-    def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
+    def _batch_stretch(self, start_s: float, motion: BatchedMotion) -> Stretch:
         """Return the stretch, from ``start_s`` until now, that was integrated in a batch."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
@@ -176,9 +176,9 @@ class FollowedRun:
         """Propagate no tangent vector from now on."""
         self._run.carry(np.empty((0, DIRECTIONS)))
 
-    def pushed(self, push: Floats) -> Self:
+    def with_push(self, push: Floats) -> Self:
         """Return a copy of the motion whose current state is changed by ``push``, shape (6,)."""
-        twin, run = self.apart(), self._run.apart()
+        twin, run = self.copy(), self._run.copy()
         run.place(start_motion(self.state + push))
         twin.__dict__.update(_run=run)
         return twin
@@ -231,7 +231,7 @@ class FollowedRun:
 
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
         """Return the state `drive_periods` later and its Jacobian, (6,) and (6, 6); NaN if the run fails."""
-        run, frequency_hz = self._run.apart(), self.drive.frequency_hz
+        run, frequency_hz = self._run.copy(), self.drive.frequency_hz
         made = self.time_s * frequency_hz if self.periods is None else self.periods
         until_s = (made + drive_periods) / frequency_hz
         run.carry(np.eye(DIRECTIONS))
@@ -265,7 +265,7 @@ def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list
     starts_s = [run.time_s for run in runs]
     found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
     return [
-        None if motion is None else run._batched(start_s, motion)  # noqa: SLF001
+        None if motion is None else run._batch_stretch(start_s, motion)  # noqa: SLF001
         for run, start_s, motion in zip(runs, starts_s, found, strict=True)
     ]
 
@@ -361,7 +361,7 @@ def observe_window(
     window is long enough; this avoids leakage. If ``is_chaos`` returns True for the first parts, the tangent
     vector is propagated only at both ends of the window.
     """
-    begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
+    begins, start_s, frequency = run.copy(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
     periods = whole_periods(window_s, frequency)
     periods = cycle * (periods // cycle) or periods
@@ -435,7 +435,7 @@ def spectrum_of(window: ObservedWindow) -> LineSpectrum:
 
     Sampling does not change the motion: both runs agree to the last digit, even in chaos.
     """
-    run, periods = window.begins.apart(), window.line_periods
+    run, periods = window.begins.copy(), window.line_periods
     frequency = run.drive.frequency_hz
     per_period = math.ceil(LEAST_RATE_HZ / frequency)
     rate, count = per_period * frequency, per_period * periods

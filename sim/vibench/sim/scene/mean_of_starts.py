@@ -88,7 +88,7 @@ def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tupl
     windows = windows_of(starts)
     if len(starts) < FEWEST_STARTS:
         return FEWEST_STARTS, windows
-    more = 2.0 if error is None else min(2.0, more_needed(starts, error))
+    more = 2.0 if error is None else min(2.0, time_factor(starts, error))
     if windows_help(starts, lead):
         return len(starts), max(windows + 1, math.ceil(windows * more))
     return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
@@ -111,7 +111,7 @@ def windows_help(starts: Sequence[Start], lead: float) -> bool:
     return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
 
 
-def more_needed(starts: Sequence[Start], error: float) -> float:
+def time_factor(starts: Sequence[Start], error: float) -> float:
     """Return the factor by which the simulated time must grow to reach the requested error."""
     power = 2.0 if others_of(starts) is None else 1.0
     return 1.05 * math.pow(float(error_of(starts).max()) / error, power)

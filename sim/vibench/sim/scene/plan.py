@@ -20,7 +20,7 @@ from .repetition import MOST_STATES
 from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
 
 if TYPE_CHECKING:
-    from .cost import Expected
+    from .cost import ExpectedTime
 
 # Without contact a displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0. Its
 # magnitude is at most abs(S) + sum abs(m_j). If this bound on abs(p) is below the gap, no stop is touched.
@@ -66,14 +66,14 @@ class LinearMotion:
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
-    def share_left(self, time_s: float) -> float:
+    def transient_share(self, time_s: float) -> float:
         """Return the remaining transient at a time over the steady motion; the larger of x and p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
         )
 
-    def died_away_s(self, share: float) -> float:
+    def decay_time_s(self, share: float) -> float:
         """Return the time at which the transient falls below ``share`` of the steady motion [s], or inf."""
         latest = 0.0
         for part, whole in self._parts:
@@ -165,16 +165,16 @@ class ScenePlan:
     """Upper bound on abs(p) without contact [m]."""
 
     @property
-    def alike(self) -> tuple[str, ...]:
+    def batch_key(self) -> tuple[str, ...]:
         """Key of the solution method; scenes that are solved in the same way have equal keys."""
         return (self.method.value, *self.sentences[1:])
 
     @property
-    def cost(self) -> "Expected":
+    def cost(self) -> "ExpectedTime":
         """Expected computing time on one core of this machine, from previous runs."""
         from .cost import cost_ledger  # noqa: PLC0415 - reads a file, and few plans need it
 
-        return cost_ledger().expected(self.kind, self.planned_s)
+        return cost_ledger().expected_time(self.kind, self.planned_s)
 
     @property
     def cost_s(self) -> float:
@@ -210,10 +210,10 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     sentences = (
         _reason_to_integrate(scene.specimen, motion, method),
         *(
-            _refined(scene.duration)
+            _refinement_texts(scene.duration)
             if scene.target is not None
             else (
-                *_carried_quantities(scene.observe),
+                *_observable_texts(scene.observe),
                 _length(scene.duration),
                 *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
             )
@@ -240,7 +240,7 @@ def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | 
             by_s = duration.duration_s - duration.window_s
         case _, AutomaticDuration():
             by_s = duration.longest_s - 1.0 / motion.drive.frequency_hz
-    is_proved = never_touches(specimen, motion) and motion.died_away_s(DECAYED_SHARE) <= by_s
+    is_proved = never_touches(specimen, motion) and motion.decay_time_s(DECAYED_SHARE) <= by_s
     return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
 
 
@@ -270,7 +270,7 @@ def _reason_to_integrate(specimen: Specimen, motion: LinearMotion, method: Metho
     )
 
 
-def _carried_quantities(observe: tuple[Observable, ...]) -> list[str]:
+def _observable_texts(observe: tuple[Observable, ...]) -> list[str]:
     sentences = [
         "A tangent vector is computed for the exponent."
         if Observable.LYAPUNOV in observe
@@ -287,7 +287,7 @@ def _carried_quantities(observe: tuple[Observable, ...]) -> list[str]:
     return sentences
 
 
-def _refined(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
+def _refinement_texts(duration: FixedDuration | AutomaticDuration) -> tuple[str, ...]:
     return (
         "A second run, whose start differs by a millionth of the gap, has a smaller tolerance.",
         "If the motion approaches a stable periodic motion, Newton's iteration finds that motion exactly.",

@@ -31,9 +31,9 @@ from .mean_of_starts import (
     ALIKE,
     Start,
     error_of,
-    more_needed,
     next_size,
     others_of,
+    time_factor,
     windows_help,
     windows_of,
 )
@@ -44,7 +44,7 @@ from .scatter import COVERED
 from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
 from .shares import student_quantile
-from .solve import Question, in_closed_form
+from .solve import Question, solve_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S = 60.0
@@ -84,12 +84,12 @@ class _Clock:
         self.limit_s = LONGEST_S if target.time_s is None else target.time_s
 
     @property
-    def taken_s(self) -> float:
+    def time_s(self) -> float:
         return time.monotonic() - self._began_s
 
     @property
     def is_over(self) -> bool:
-        return self.taken_s > self.limit_s
+        return self.time_s > self.limit_s
 
     def report(
         self,
@@ -101,7 +101,7 @@ class _Clock:
         """Return the prediction, with its requested and reached error and time."""
         error, target = found.error_estimate, self._target
         is_met = error is not None and (target.error is None or error <= target.error)
-        taken_s = self.taken_s
+        taken_s = self.time_s
         report = TargetReport(target.error, target.time_s, error, taken_s, starts, windows, is_met, needed)
         return replace(found, target=report)
 
@@ -149,13 +149,13 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     clock = _Clock(scene.target)
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     if plan_of(scene, motion).method is Method.CLOSED_FORM:
-        found = in_closed_form(scene, motion, Question.ANSWER)
+        found = solve_closed_form(scene, motion, Question.ANSWER)
         yield clock.report(found)
         return
     yield from _Refinement(scene, motion, clock).answers()
 
 
-def refined(scene: Scene) -> ScenePrediction:
+def refine_to_end(scene: Scene) -> ScenePrediction:
     """Return the last result of `refine_scene`."""
     *_, last = refine_scene(scene)
     return last
@@ -176,12 +176,12 @@ class _Refinement:
         fastest = float(np.abs(modal_form(scene.specimen).rates).max(initial=0.0))
         self._part_s = min(1.0 / frequency_hz, FIRST_CYCLES / max(fastest, frequency_hz))
         self._begin = FollowedRun(scene.specimen, scene.drive, LOOSE, scene.start.state)
-        self._pushes = self._drawn(1)
-        self._main, self._twin = self._begin.apart(), self._begin.apart(TIGHT).pushed(self._pushes[0])
+        self._pushes = self._random_changes(1)
+        self._main, self._twin = self._begin.copy(), self._begin.copy(TIGHT).with_push(self._pushes[0])
         self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
-        self._pair = self._main.apart(), self._twin.apart()
+        self._pair = self._main.copy(), self._twin.copy()
         """Copies of the run and of the stricter run beside it, made at the last check of both."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
@@ -212,21 +212,21 @@ class _Refinement:
         settle_s = self._settle_s
         while self._main.time_s < settle_s:
             look_s = self._next_look_s(self._main)
-            ours, other = self._followed(self._main, look_s), self._followed(self._twin, look_s)
+            ours, other = self._follow_parts(self._main, look_s), self._follow_parts(self._twin, look_s)
             if self._is_lost:
-                yield self._lost()
+                yield self._lost_result()
                 return
             if ours is None or other is None:
                 yield from self._interim()
                 return
-            self._pair = self._main.apart(), self._twin.apart()
+            self._pair = self._main.copy(), self._twin.copy()
             if self._have_parted(ours, other):
                 yield from self._many_starts()
                 return
             if self._approaches(self._path, ours):
                 yield self._on_orbit()
                 return
-            if self._clock.taken_s > self._due_s and not self._has_answered:
+            if self._clock.time_s > self._due_s and not self._has_answered:
                 yield from self._interim()
         yield from self._one_start()
 
@@ -235,7 +235,7 @@ class _Refinement:
         look = max(LOOK_PERIODS, LOOK_SHARE * made, min(LOOK_S * self._frequency_hz, made))
         return (made + math.ceil(look)) / self._frequency_hz
 
-    def _drawn(self, count: int) -> Floats:
+    def _random_changes(self, count: int) -> Floats:
         """Return random changes of the initial state, shape (count, 6), far smaller than the motion."""
         drawn = pushes(self._scene.specimen, self._scene.drive, count, SEED)
         gap_m, most_m = min(self._scene.specimen.gaps_m), MOST_PUSH * self._scene.drive.amplitude_m
@@ -254,7 +254,7 @@ class _Refinement:
     def _is_lost(self) -> bool:
         return self._main.outcome is not Outcome.REACHED_END
 
-    def _followed(
+    def _follow_parts(
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
         """Integrate a motion in short parts; return the parts, or None after the time limit or a failure."""
@@ -272,11 +272,11 @@ class _Refinement:
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
-    def _observed(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
+    def _observe_next(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
         """Return the next ``periods`` drive periods as a window; None after the time limit or a failure."""
-        begins = run.apart()
+        begins = run.copy()
         made = round(run.time_s * self._frequency_hz)
-        parts = self._followed(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
+        parts = self._follow_parts(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
         return None if parts is None else window_of(begins, parts)
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
@@ -329,15 +329,15 @@ class _Refinement:
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
         """Return a stable periodic motion near a run, with this period (in drive periods) or a divisor."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
-        if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.taken_s, GRACE_S):
+        if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.time_s, GRACE_S):
             return None
         found = stable_motion(near, period)
         if found is None:
             return None
-        run, away, strict = found.run, found.away, found.run.apart(TIGHTEST)
+        run, away, strict = found.run, found.away, found.run.copy(TIGHTEST)
         off = (strict.image(period)[0] - strict.state) / self._scales
-        strict = strict.pushed(away @ off * self._scales)
-        windows = [self._observed(each.apart(), period) for each in (run, strict)]
+        strict = strict.with_push(away @ off * self._scales)
+        windows = [self._observe_next(each.copy(), period) for each in (run, strict)]
         if windows[0] is None or windows[1] is None:
             return None
         states = states_of(windows[1].stretches) / self._scales
@@ -380,16 +380,16 @@ class _Refinement:
     def _interim(self) -> Iterator[ScenePrediction]:
         """Yield an early result, for a window that begins at the last check of both runs."""
         self._spent_s = 0.0
-        run, twin = (each.apart() for each in self._pair)
+        run, twin = (each.copy() for each in self._pair)
         periods = min(self._window_periods, max(1, round(run.time_s * self._frequency_hz) // 8))
-        windows = [self._observed(each, periods) for each in (run, twin)]
+        windows = [self._observe_next(each, periods) for each in (run, twin)]
         if windows[0] is None or windows[1] is None:
             return
-        found = self._in_window(windows[0], windows[1], run, self._unsettled)
+        found = self._in_window(windows[0], windows[1], run, self._remaining_change)
         yield replace(found, memory=StartMemory.UNKNOWN)
 
     @property
-    def _unsettled(self) -> float:
+    def _remaining_change(self) -> float:
         """Estimate the relative distance of a run from its final motion, by the change in one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
@@ -425,12 +425,12 @@ class _Refinement:
         for tolerance in (None, TIGHTEST):
             if tolerance is not None:
                 until_s = main.time_s - periods / self._frequency_hz
-                main = self._begin.apart(TIGHT)
+                main = self._begin.copy(TIGHT)
                 rounded = ROUNDED * self._scene.drive.amplitude_m * SIDES * self._scales
-                twin = self._begin.apart(TIGHTEST).pushed(rounded)
-                if self._followed(main, until_s) is None or self._followed(twin, until_s) is None:
+                twin = self._begin.copy(TIGHTEST).with_push(rounded)
+                if self._follow_parts(main, until_s) is None or self._follow_parts(twin, until_s) is None:
                     return
-            windows = [self._observed(each, periods) for each in (main, twin)]
+            windows = [self._observe_next(each, periods) for each in (main, twin)]
             if windows[0] is None or windows[1] is None:
                 if not self._has_answered:
                     yield from self._interim()
@@ -449,13 +449,13 @@ class _Refinement:
         lead_s = max(min(self._pace.attractor_s, PAPER_DURATION_S), 1.5 * self._main.time_s)
         begins_s = math.ceil(lead_s * self._frequency_hz) / self._frequency_hz
         each_s = begins_s + self._window_periods / self._frequency_hz
-        if self._clock.taken_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
+        if self._clock.time_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
             yield from self._interim()
         starts: list[Start] = []
         wanted, windows = FIRST_STARTS, 1
         while len(starts) < MOST_STARTS:
             is_over = not self._observe_more(starts, wanted, windows, begins_s) or self._clock.is_over
-            is_due = not self._has_answered and self._clock.taken_s > self._due_s
+            is_due = not self._has_answered and self._clock.time_s > self._due_s
             is_complete = len(starts) == wanted and windows_of(starts) == windows
             if len(starts) > 1 and (is_complete or is_due or is_over):
                 found = self._mean(starts, begins_s)
@@ -466,7 +466,7 @@ class _Refinement:
                     return
             if is_over:
                 if self._is_lost and not self._has_answered:
-                    yield self._lost()
+                    yield self._lost_result()
                 return
             if is_complete:
                 lead = begins_s * self._frequency_hz / self._window_periods
@@ -476,7 +476,7 @@ class _Refinement:
         """Observe one more window, or one more start; return False after the time limit or a failure."""
         for each in starts:
             if each.repeats is None and len(each.windows) < windows:
-                window = self._observed(each.run, self._window_periods)
+                window = self._observe_next(each.run, self._window_periods)
                 if window is not None:
                     each.windows.append(window.responses_m)
                 return window is not None
@@ -484,12 +484,12 @@ class _Refinement:
             return True
         number = len(starts)
         if number > len(self._pushes):
-            self._pushes = self._drawn(2 * number)
-        run = self._main if number == 0 else self._begin.pushed(self._pushes[number - 1])
+            self._pushes = self._random_changes(2 * number)
+        run = self._main if number == 0 else self._begin.with_push(self._pushes[number - 1])
         path = self._path if number == 0 else _Path(run, np.empty((0, 6)))
         while run.time_s < begins_s:
             look_s = math.ceil((run.time_s + begins_s / LOOKS) * self._frequency_hz) / self._frequency_hz
-            seen = self._followed(run, min(begins_s, look_s))
+            seen = self._follow_parts(run, min(begins_s, look_s))
             if seen is None:
                 return False
             if self._approaches(path, seen):
@@ -499,7 +499,7 @@ class _Refinement:
                 impacts = orbit.impacts * self._window_periods // orbit.period
                 starts.append(Start(run, [orbit.responses_m], settled, impacts, orbit.section))
                 return True
-        window = self._observed(run, self._window_periods)
+        window = self._observe_next(run, self._window_periods)
         if window is not None:
             repeats = self._nearly.repeats(window.stretches)
             section = states_of(window.stretches)
@@ -536,24 +536,24 @@ class _Refinement:
         )
         needed = None
         if self._target.error is not None:
-            per_s = self._clock.taken_s / sum(each.run.time_s for each in starts)
-            more = more_needed(starts, self._target.error) - 1.0
+            per_s = self._clock.time_s / sum(each.run.time_s for each in starts)
+            more = time_factor(starts, self._target.error) - 1.0
             part_s = len(starts) * windows * window_s
             if not windows_help(starts, begins_s / window_s):
                 part_s = sum(each.run.time_s for each in starts)
             # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n).
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
-            about_s = max(0.0, self._clock.taken_s + more * per_s * part_s)
+            about_s = max(0.0, self._clock.time_s + more * per_s * part_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         return self._clock.report(found, len(starts), needed, windows)
 
     def _kind_of_others(self, begin: FollowedRun) -> MotionKind:
         """Return the kind of a motion that does not repeat, from the growth of perturbations in a window."""
-        run, seen = begin.apart(), list[Stretch]()
+        run, seen = begin.copy(), list[Stretch]()
         run.follow_tangent()
         until_s = run.time_s + self._window_periods / self._frequency_hz
         while run.time_s < until_s:
-            part = self._followed(run, min(until_s, self._next_look_s(run)))
+            part = self._follow_parts(run, min(until_s, self._next_look_s(run)))
             if part is None:
                 return MotionKind.UNDECIDED
             seen += part
@@ -563,7 +563,7 @@ class _Refinement:
         is_torus = found is MotionKind.QUASI_PERIODIC and not self._pace.drifts(seen)
         return found if is_torus else MotionKind.UNDECIDED
 
-    def _lost(self) -> ScenePrediction:
+    def _lost_result(self) -> ScenePrediction:
         """Return the result for a motion whose integration failed."""
         run = self._main
         found = self._prediction(np.full(4, math.nan), np.full(4, math.nan), run.time_s, 0.0, 0)

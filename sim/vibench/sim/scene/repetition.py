@@ -130,7 +130,7 @@ def _returns_nowhere(points: Floats, tolerance: float) -> bool:
     return bool(np.all(changes >= tolerance))
 
 
-def wandered_until(section: Floats, omega: float, period: int) -> int:
+def first_repetition(section: Floats, omega: float, period: int) -> int:
     """Return the index of the first state after which a motion nearly repeats with this period."""
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)

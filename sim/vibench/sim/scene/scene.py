@@ -8,7 +8,7 @@ from typing import Literal
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.specimen import Specimen
-from ..specimen.stops import Strict, chosen, require_positive
+from ..specimen.stops import Strict, member, require_positive
 from .prediction import State
 
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
@@ -150,8 +150,8 @@ class Scene(Strict):
         if not 0.0 <= self.budget_s < math.inf:
             msg = f"Budget {self.budget_s} s is not allowed: it must be zero or positive, and finite."
             raise ValueError(msg)
-        object.__setattr__(self, "accuracy", chosen(Accuracy, self.accuracy))
-        object.__setattr__(self, "observe", tuple(chosen(Observable, each) for each in self.observe))
+        object.__setattr__(self, "accuracy", member(Accuracy, self.accuracy))
+        object.__setattr__(self, "observe", tuple(member(Observable, each) for each in self.observe))
         if self.target is not None:
             self._follow_target()
         if not self.observe:

@@ -84,17 +84,17 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
     size_m = max(float(farthest_m), LEAST_SIZE * gap_m)
-    twin = begin.pushed(pushes(begin.specimen, begin.drive, 1, SEED)[0])
+    twin = begin.with_push(pushes(begin.specimen, begin.drive, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
-        pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
+        pressed = _touches(begin.specimen, beside.states) & _touches(begin.specimen, stretch.states)
         apart_m = np.abs(beside.states[~pressed, :3] - stretch.states[~pressed, :3]).max(initial=0.0)
         if not apart_m < PARTED * size_m:
             return True
     return False
 
 
-def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
+def _touches(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
     """Return for each state, shape (n, 6), whether m1 may touch a stop; batches extrapolate those states."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
@@ -145,19 +145,19 @@ class SeveralStarts:
         # Simulated time at the end of the first round; the time doubles with each round.
         self._first_s = min(first_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
-        self._waiting = [begin.pushed(change) for change in changes]
+        self._waiting = [begin.with_push(change) for change in changes]
         self._under_way: list[StatesAlone] = []
         self._reached = [requested]
 
     @property
-    def reached(self) -> tuple[ReachedMotion, ...]:
+    def motions(self) -> tuple[ReachedMotion, ...]:
         """Motions reached from the starts; that of the requested start comes first."""
         return tuple(self._reached)
 
     @property
     def followed_s(self) -> float:
         """Sum of the simulated times of the runs from all starts [s]."""
-        return sum(each.run.time_s for each in self.reached)
+        return sum(each.run.time_s for each in self.motions)
 
     @property
     def escape(self) -> EscapeRate | None:
@@ -192,9 +192,9 @@ class SeveralStarts:
         if not self._is_clear:
             more = self._draw.fewest - self._draw.clear
             spent_s += self._follow_some(more, budget_s - spent_s, each_s)
-        if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
+        if any(each.period is not None for each in self.motions) and len(motions_among(self.motions)) > 1:
             # The cost per start so far determines how many more starts the budget allows.
-            each_s = spent_s / (len(self.reached) - 1)
+            each_s = spent_s / (len(self.motions) - 1)
             more = self._draw.most - self._draw.fewest
             self._follow_some(more, budget_s - spent_s, each_s)
 
@@ -210,7 +210,7 @@ class SeveralStarts:
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
         self._follow_rounds(budget_s)
-        found = [self._observed(each) for each in self._under_way]
+        found = [self._observe(each) for each in self._under_way]
         self._under_way = []
         self._reached += [each for each in found if each.run.outcome is Outcome.REACHED_END]
         return sum(each.run.cost_s for each in found)
@@ -255,11 +255,11 @@ class SeveralStarts:
             return math.inf
         return max(0.0, escape.chaotic_s * (LASTING_S / escape.lifetime_above_s - 1.0)) + MORE_S
 
-    def _observed(self, other: StatesAlone) -> ReachedMotion:
+    def _observe(self, other: StatesAlone) -> ReachedMotion:
         run = other.run
         if other.repeats is not None:
             period, kind = other.repeats.period, MotionKind.PERIODIC
-            begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
+            begins, end_s = run.copy(), run.time_s + other.repeats.period / self._pace.frequency_hz
             one = follow_with_section(run, end_s, Watch.PEAKS_AND_LINES)
             window = window_of(begins, [one])
             until_s = other.wandered_until_s
@@ -361,7 +361,7 @@ def ensemble_of(
     error_of
         Function for the relative error of the responses of one start.
     """
-    reached, escape = several.reached, several.escape
+    reached, escape = several.motions, several.escape
     groups = motions_among(reached)
     requested = next(group for group in groups if any(each is reached[0] for each in group))
     groups = sorted(groups, key=len, reverse=True)

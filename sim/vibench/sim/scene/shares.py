@@ -14,7 +14,7 @@ def student_quantile(freedom: int, probability: float) -> float:
     Source: Abramowitz and Stegun, Handbook of Mathematical Functions (1964), eqs. 26.7.3 and 26.7.4.
     """
 
-    def outside(angle: float) -> float:
+    def tail_share(angle: float) -> float:
         total, power = 0.0, math.cos(angle) ** (freedom % 2)
         for k in range(2 + freedom % 2, freedom + 1, 2):
             total += power
@@ -22,7 +22,7 @@ def student_quantile(freedom: int, probability: float) -> float:
         inside = math.sin(angle) * total
         return 1.0 - (2.0 / math.pi * (angle + inside) if freedom % 2 else inside)
 
-    angle = _root(outside, 2.0 * (1.0 - probability), 0.5 * math.pi)
+    angle = _root(tail_share, 2.0 * (1.0 - probability), 0.5 * math.pi)
     return math.sqrt(freedom) * math.tan(angle)
 
 
@@ -34,11 +34,11 @@ def normal_quantile(tail: float) -> float:
 def poisson_mean(fewer_than: int, probability: float) -> float:
     """Return the mean of a Poisson distribution whose count is below ``fewer_than`` with ``probability``."""
 
-    def below(mean: float) -> float:
+    def cumulative(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
         return math.fsum(map(math.exp, terms))
 
-    return _root(below, probability, 2.0 * fewer_than + 40.0)
+    return _root(cumulative, probability, 2.0 * fewer_than + 40.0)
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:

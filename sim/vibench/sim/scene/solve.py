@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..specimen.outcome import Outcome
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .plan import DECAYED_SHARE, LinearMotion, linear_motion, plan_of
@@ -35,8 +35,8 @@ from .stated_error import (
     SAFETY,
     UNKNOWN_ERRORS,
     StatedErrors,
-    error_of_settled,
     finite_or_none,
+    settled_errors,
     stated_errors,
     with_errors,
 )
@@ -85,15 +85,15 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """
-    question = chosen(Question, question)
+    question = member(Question, question)
     if scene.target is not None:
-        from .refinement import refined  # noqa: PLC0415 - most scenes have no target
+        from .refinement import refine_to_end  # noqa: PLC0415 - most scenes have no target
 
-        return refined(scene)
+        return refine_to_end(scene)
     method, motion = _plan(scene)
     if method is Method.CLOSED_FORM:
-        return in_closed_form(scene, motion, question)
-    begun = _Begun(scene, method, motion, question)
+        return solve_closed_form(scene, motion, question)
+    begun = _StartedScene(scene, method, motion, question)
     if begun.course.way is not None:
         begun.course.way.follow()
     chaos = begun.course.watch()
@@ -118,7 +118,7 @@ MOST_HELD = 2e7
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedScene:
     """Result of one of several scenes that were solved together."""
 
     prediction: ScenePrediction
@@ -127,13 +127,13 @@ class Solved:
     loaded in this time."""
 
 
-def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
+def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
     """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
     The result of a scene does not depend on the other scenes. In chaos it is another random sample than that
     of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
     """
-    found: list[Solved] = []
+    found: list[SolvedScene] = []
     together: list[Scene] = []
     held = 0.0
     for scene in scenes:
@@ -146,17 +146,17 @@ def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) 
     return found + _solve_together(together, question)
 
 
-def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]:
+def _solve_together(scenes: Sequence[Scene], question: Question) -> list[SolvedScene]:
     answers: dict[int, ScenePrediction] = {}
-    begun: dict[int, _Begun] = {}
+    begun: dict[int, _StartedScene] = {}
     taken_s = [0.0] * len(scenes)
     for place, scene in enumerate(scenes):
         with _count_time(taken_s, [place]):
             method, motion = _plan(scene)
             if method is Method.CLOSED_FORM:
-                answers[place] = in_closed_form(scene, motion, question)
+                answers[place] = solve_closed_form(scene, motion, question)
             else:
-                begun[place] = _Begun(scene, method, motion, question)
+                begun[place] = _StartedScene(scene, method, motion, question)
     ways = {place: each.course.way for place, each in begun.items() if each.course.way is not None}
     with _count_time(taken_s, ways):
         in_batches([*ways.values()])
@@ -171,7 +171,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[Solved]
     for place, each in begun.items():
         with _count_time(taken_s, [place]):
             answers[place] = each.answer(in_batches)
-    return [Solved(answers[place], taken_s[place]) for place in range(len(scenes))]
+    return [SolvedScene(answers[place], taken_s[place]) for place in range(len(scenes))]
 
 
 @contextmanager
@@ -214,11 +214,11 @@ def solve_ensemble(
     method, motion = _plan(scene)
     if method is Method.CLOSED_FORM:
         return None
-    begun = _Begun(scene, method, motion, Question.ANSWER)
+    begun = _StartedScene(scene, method, motion, Question.ANSWER)
     one_by_one([begun.course.way] if begun.course.way is not None else [])
     chaos = begun.course.watch()
     one_by_one([chaos] if chaos is not None else [])
-    seen = begun.course.seen()
+    seen = begun.course.observe()
     if begun.run.outcome is not Outcome.REACHED_END:
         return None
     errors = begun.errors(seen, one_by_one)
@@ -231,7 +231,7 @@ def _plan(scene: Scene) -> tuple[Method, LinearMotion]:
     return plan_of(scene, motion).method, motion
 
 
-def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
+def solve_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
     """Return the prediction for a scene without contact, from the exact linear solution."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
@@ -239,7 +239,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             ended = f"the {duration_s:g} s requested have passed"
         case AutomaticDuration():
-            settled_s, window_s = motion.died_away_s(DECAYED_SHARE), period_s
+            settled_s, window_s = motion.decay_time_s(DECAYED_SHARE), period_s
             duration_s = settled_s + period_s
             ended = "it repeats after 1 drive period(s)"
     x, p = abs(motion.steady_x) / amplitude, abs(motion.steady_p) / amplitude
@@ -270,7 +270,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
         accuracy=scene.accuracy.value,
         memory=StartMemory.KEPT,
     )
-    found = with_errors(found, np.full(4, motion.share_left(duration_s - window_s) + ROUNDING))
+    found = with_errors(found, np.full(4, motion.transient_share(duration_s - window_s) + ROUNDING))
     if Observable.POINCARE in scene.observe:
         periods = whole_periods(duration_s, scene.drive.frequency_hz)
         count = whole_periods(window_s, scene.drive.frequency_hz)
@@ -284,7 +284,7 @@ def in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> Sc
     return found
 
 
-class _Begun:
+class _StartedScene:
     """Scene whose motion is integrated in time, and the evaluation of this motion.
 
     Parameters
@@ -298,7 +298,7 @@ class _Begun:
     def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:
         self._scene, self._method, self._motion, self._question = scene, method, motion, question
         self._begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
-        self.run = self._begin.apart()
+        self.run = self._begin.copy()
         self._pace = pace = pace_of(
             scene.specimen,
             scene.drive.frequency_hz,
@@ -324,16 +324,16 @@ class _Begun:
 
     def answer(self, follow: Follow) -> ScenePrediction:
         """Return the prediction for the scene; ``follow`` integrates other starts."""
-        scene, seen = self._scene, self.course.seen()
+        scene, seen = self._scene, self.course.observe()
         if self._question is Question.MOTION:
-            return self._found(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
+            return self._prediction(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
         is_whole = self.run.outcome is Outcome.REACHED_END
         errors = self.errors(seen, follow) if is_whole else UNKNOWN_ERRORS
         memory = memory_of(scene, self._begin, seen, self._motion)
         ensemble: Ensemble | None = None
         if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
             ensemble = self.ensemble(seen, errors, follow)
-        return self._found(seen, errors, memory, ensemble)
+        return self._prediction(seen, errors, memory, ensemble)
 
     def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
         """Return the errors of the scene's responses; the run must have reached its end."""
@@ -367,14 +367,14 @@ class _Begun:
             if reached.period is None:
                 return None if reached.scatter is None else reached.scatter.between_runs
             answer, period = reached.responses_m, reached.period
-            off = error_of_settled(reached.run, answer, scene.accuracy, period, pace.forgetting_s)
+            off = settled_errors(reached.run, answer, scene.accuracy, period, pace.forgetting_s)
             return finite_or_none(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
 
-        if len(several.reached) == 1:
+        if len(several.motions) == 1:
             return None
         return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
 
-    def _found(
+    def _prediction(
         self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
     ) -> ScenePrediction:
         """Return the prediction from the motion observed in the window."""
@@ -394,7 +394,7 @@ class _Begun:
             relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
             impacts=window.impacts,
             impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
-            motion=_lasting(scene, seen, ensemble),
+            motion=_final_kind(scene, seen, ensemble),
             period=None if seen.repeats is None else seen.repeats.period,
             duration_s=run.time_s,
             window_s=window.length_s,
@@ -414,7 +414,7 @@ class _Begun:
             memory=memory,
             ensemble=ensemble if memory is StartMemory.LOST else None,
         )
-        found = with_errors(found if exponent is None else _supported(found, exponent), errors.stated)
+        found = with_errors(found if exponent is None else _confirm_chaos(found, exponent), errors.stated)
         if is_whole and Observable.POINCARE in scene.observe:
             found = replace(found, section=states_of(window.stretches))
         if is_whole and Observable.SPECTRUM in scene.observe:
@@ -430,7 +430,7 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
 
 
-def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
+def _final_kind(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
     """Return the kind of the motion; with an automatic duration, only proved lasting chaos is "chaotic"."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
@@ -440,7 +440,7 @@ def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionK
             return lasting(seen.motion, escape)
 
 
-def _supported(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
+def _confirm_chaos(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
     """Return the prediction; a motion found to be chaotic is corrected if its exponent is not positive."""
     from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
 

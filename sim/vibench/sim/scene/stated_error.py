@@ -99,7 +99,7 @@ def stated_errors(
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
     if seen.repeats is not None and seen.was_settled:
-        off = error_of_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
+        off = settled_errors(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
     strict = _strict_run(scene, begin, seen, run)
     if strict.responses_m is not None and strict.is_together:
@@ -157,10 +157,10 @@ def _more_starts(
     The stricter run is one of these, because all other runs share the step errors until they separate.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
-    runs = [begin.pushed(push) for push in pushed[1:]]
+    runs = [begin.with_push(push) for push in pushed[1:]]
     found = [strict.responses_m] if strict.responses_m is not None else []
     if not found:
-        runs.append(strict.run.apart(begin.tolerance))
+        runs.append(strict.run.copy(begin.tolerance))
     window = seen.window
     until_s = max(window.begins.time_s - pace.section_s, *(run.time_s for run in runs))
     leads = [Lead(run, until_s, pace) for run in runs]
@@ -172,7 +172,7 @@ def _more_starts(
     return found
 
 
-def error_of_settled(
+def settled_errors(
     run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
 ) -> Floats:
     """Return the relative errors of the responses of a repeating motion; NaN if a run fails.
@@ -182,12 +182,12 @@ def error_of_settled(
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
-    strict = run.apart(STRICTER[accuracy])
+    strict = run.copy(STRICTER[accuracy])
     looks = []
     for _ in range(2):
         strict.follow(strict.time_s + wait_s)
         looks.append(_responses(strict, LOOKS * cycle_s))
-    on = run.apart(accuracy.tolerance)
+    on = run.copy(accuracy.tolerance)
     seen = [answer, *(_responses(on, cycle_s) for _ in range(LOOKS))]
     off = np.max(np.abs(np.array(seen) - looks[1]), axis=0)
     moved = np.abs(looks[1] - looks[0])
@@ -200,10 +200,10 @@ def error_of_settled(
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
     """Return the largest relative error of the responses that one drive period adds; NaN if a run fails."""
     cycle_s = 1.0 / run.drive.frequency_hz
-    on = run.apart(accuracy.tolerance)
+    on = run.copy(accuracy.tolerance)
     seen, missed = [], []
     for _ in range(LOOKS):
-        twin = on.apart(STRICTER[accuracy])
+        twin = on.copy(STRICTER[accuracy])
         seen.append(_responses(on, cycle_s))
         missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
     return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
@@ -215,8 +215,8 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
     The start is offset by a rounding error. Otherwise exact motion between contacts would be compared with
     itself, and a motion that amplifies rounding errors would appear exact.
     """
-    loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
-    strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
+    loose, strict = begin.copy(scene.accuracy.tolerance), begin.copy(STRICTER[scene.accuracy])
+    strict = strict.with_push(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
     begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
     while strict.time_s < begin_s:
         until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))

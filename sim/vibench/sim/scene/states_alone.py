@@ -23,7 +23,7 @@ from .followed_run import (
     samples_between,
     whole_periods,
 )
-from .repetition import Growth, Pace, Repetition, growth_of, longest_section, wandered_until
+from .repetition import Growth, Pace, Repetition, first_repetition, growth_of, longest_section
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
@@ -105,7 +105,7 @@ class StatesAlone:
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self.note(stretch)
             if self.repeats is not None:
-                since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
+                since = first_repetition(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
                 self._settled_s = run.time_s - (len(self.recent) - since) / frequency_hz
 
     @property
@@ -129,7 +129,7 @@ class StatesAlone:
     def note(self, stretch: Stretch) -> Repetition | None:
         """Store the states of a stretch; return the repetition of the motion, or None."""
         if self._every is not None:
-            self.path.append(stretch.thinned(self._every))
+            self.path.append(stretch.every_nth(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
         return self._pace.repeats_in(self.recent)
 

@@ -35,11 +35,11 @@ class LinearMotion:
         return self.per_newton / self.per_newton[:, [_P]]
 
     @property
-    def stuck(self) -> ComplexArray:
+    def stuck_motion(self) -> ComplexArray:
         """Motion per volt while m1 sticks to m2, shape (n, 5)."""
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
-    def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
+    def response(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
         """Return the motion under sine voltages of given amplitudes, shape (n, 5).
 
         Parameters

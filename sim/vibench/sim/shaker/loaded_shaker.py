@@ -136,7 +136,7 @@ class ShakenMotion:
     """Absolute velocity of m0 [m/s]."""
     ends: FloatArray
     """States at the ends of the first ``rows`` steps, columns MOTION_COLUMNS, shape (rows, 9)."""
-    begun: FloatArray
+    contacts: FloatArray
     """Number of contacts up to the end of each block of steps, shape (blocks,); may be empty."""
 
     @classmethod
@@ -278,7 +278,7 @@ class LoadedShaker:
             base_acceleration=motion.base_acceleration,
             m0_velocity=motion.m0_velocity,
             ends=motion.ends,
-            begun=motion.begun,
+            begun=motion.contacts,
         )
 
     def account(self, good: int, count: int) -> None:

@@ -104,7 +104,7 @@ def follow_voltage(
     resampling = _Resampling(sample_rate_hz, ratio, table.shaker)
     for stop, fine in resampling.stretches(volts):
         motion = shaken.move(fine, block=block)
-        impacts.append(motion.begun)
+        impacts.append(motion.contacts)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
         # The last samples can be filtered only with the motion after them, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
@@ -168,13 +168,13 @@ class _Resampling:
             edge = ((frequency_hz / self._sample_rate_hz) - _PASS_PART) / (0.5 - _PASS_PART)
             band = np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
             if gain is None:
-                known = band * mean_of_step / self._held(frequency_hz)
+                known = band * mean_of_step / self._hold_gain(frequency_hz)
             else:
                 known = band * gain(frequency_hz) / mean_of_step
             self._weights[size, gain] = known
         return known
 
-    def _held(self, frequency_hz: FloatArray) -> ComplexArray:
+    def _hold_gain(self, frequency_hz: FloatArray) -> ComplexArray:
         """Return the coil current under a stepped over that under a continuous voltage: 1 - (w h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s

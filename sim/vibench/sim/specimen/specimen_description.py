@@ -66,11 +66,11 @@ class SpecimenWarning(UserWarning):
     """Warning: a replaced value also changed stiffnesses or dampings, which are computed from it."""
 
 
-class _Described(FrozenModel):
+class _DescribedModel(FrozenModel):
     model_config = ConfigDict(ser_json_inf_nan="strings")
 
 
-class Material(_Described):
+class Material(_DescribedModel):
     """Elastic constants of a body."""
 
     youngs_modulus_pa: PositiveFloat
@@ -84,7 +84,7 @@ class Material(_Described):
         return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
 
 
-class SphereOnPlane(_Described):
+class SphereOnPlane(_DescribedModel):
     """Sphere on a plane: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
 
     radius_m: PositiveFloat
@@ -98,12 +98,12 @@ class SphereOnPlane(_Described):
         return hertz_stiffness(self.sphere.elasticity, self.plane.elasticity, self.radius_m)
 
 
-def _known_law(word: str) -> str:
+def _require_law(word: str) -> str:
     law_by_name(word, 1.0, _ANY_GAP_M)
     return word
 
 
-ContactWord = Annotated[str, AfterValidator(_known_law)]
+ContactWord = Annotated[str, AfterValidator(_require_law)]
 """Name of a contact law from `CONTACT_LAWS` with its numbers: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
 
 
@@ -118,7 +118,7 @@ DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
 larger values, runs take minutes or overflow."""
 
 
-class SpecimenDescription(_Described):
+class SpecimenDescription(_DescribedModel):
     """Three masses in a chain, base - m0 - m2 - m1, with stops for m1 on m2 (Gong et al. 2025, eq. 1).
 
     Other numbers of masses, stops between other masses, hardening springs, friction and several pairs of

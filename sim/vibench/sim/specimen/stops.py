@@ -99,7 +99,7 @@ def require_positive(name: str, value: float, unit: str) -> None:
 Choice = TypeVar("Choice", bound=StrEnum)
 
 
-def chosen(kind: type[Choice], word: str) -> Choice:
+def member(kind: type[Choice], word: str) -> Choice:
     """Return the enum member whose value is ``word``; a member is returned unchanged.
 
     Raises ValueError when the enum has no such word.

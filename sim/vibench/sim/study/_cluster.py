@@ -14,7 +14,7 @@ from distributed import CancelledError, Client, Future
 from distributed.comm import get_address_host_port
 
 from ..scene.scene import Scene
-from ..scene.solve import Solved, solve_scene
+from ..scene.solve import SolvedScene, solve_scene
 from ._errors import ClusterLost
 from ._executor import Bundle, Reply, Solver, empty_queue, solve_timed
 from ._software import software
@@ -26,7 +26,7 @@ LOOK_AGAIN_S = 1.0
 RUNNING, CONNECTING = "running", "connecting"
 FINISHED, ERROR = "finished", "error"
 
-Answer = tuple[str, tuple[Solved, ...]]
+Answer = tuple[str, tuple[SolvedScene, ...]]
 """Results of a worker, with the versions of its software."""
 
 
@@ -89,7 +89,7 @@ class ClusterExecutor:
         arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()
-        answers = self._fetched([future for _, future in arrived if future.status == FINISHED])
+        answers = self._fetch([future for _, future in arrived if future.status == FINISHED])
         return [self._reply(bundle, future, answers) for bundle, future in arrived]
 
     def cancel(self) -> Sequence[Reply]:
@@ -108,7 +108,7 @@ class ClusterExecutor:
         """Put a finished bundle into the queue; the Dask client calls this function in one of its threads."""
         self._arrived.put((bundle, future))
 
-    def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
+    def _fetch(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
         """Return the results of all finished futures, fetched together; nothing for lost results."""
         if not futures:
             return {}

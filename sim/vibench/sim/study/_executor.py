@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias, TypeVar
 from ..scene.cost import learn_cost
 from ..scene.prediction import Method, ScenePrediction
 from ..scene.scene import Scene
-from ..scene.solve import InBatches, Solved, Solver as SceneSolver, solve_scene, solve_scenes
+from ..scene.solve import InBatches, SolvedScene, Solver as SceneSolver, solve_scene, solve_scenes
 from ._errors import InvalidStudy
 
 
@@ -35,7 +35,7 @@ class Reply:
     """Results of a bundle, as a worker returns them."""
 
     bundle: Bundle
-    solved: tuple[Solved, ...]
+    solved: tuple[SolvedScene, ...]
     """Results in the order of the scenes; fewer than scenes after a cancellation or an error."""
     error: BaseException | None = None
     """Error that prevented the missing results; None if there was no error."""
@@ -74,7 +74,7 @@ _solved_before: set[Kind] = set()
 """Kinds of scenes that this process has solved."""
 
 
-def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
+def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[SolvedScene]:
     """Solve scenes, in batches or one by one; yield each result with its processor time.
 
     Times are recorded for later estimates, except for the first scene of each kind, which may load modules.
@@ -93,13 +93,13 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
             # Closed forms are not recorded: planning them takes about as long as evaluating them.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
-            yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)
+            yield SolvedScene(each.prediction, each.taken_s if is_prepared else math.nan)
 
 
-def _solve_and_time(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> Solved:
+def _solve_and_time(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> SolvedScene:
     start_s = time.thread_time()
     prediction = solver(scene)
-    return Solved(prediction, time.thread_time() - start_s)
+    return SolvedScene(prediction, time.thread_time() - start_s)
 
 
 Item = TypeVar("Item")
@@ -132,7 +132,7 @@ class ThreadExecutor:
 
     def submit(self, bundle: Bundle) -> None:
         """Add a bundle to the queue for the next free thread."""
-        solved: list[Solved] = []
+        solved: list[SolvedScene] = []
         future = self._pool.submit(self._solve_into, solved, bundle.scenes)
         future.add_done_callback(partial(self._note, bundle, solved))
 
@@ -150,7 +150,7 @@ class ThreadExecutor:
         """End the threads of the executor."""
         self.cancel()
 
-    def _solve_into(self, solved: list[Solved], scenes: Sequence[Scene]) -> None:
+    def _solve_into(self, solved: list[SolvedScene], scenes: Sequence[Scene]) -> None:
         if self._is_cancelled.is_set():
             return
         for each in solve_timed(scenes, self._solver):
@@ -158,7 +158,7 @@ class ThreadExecutor:
             if self._is_cancelled.is_set():
                 return
 
-    def _note(self, bundle: Bundle, solved: list[Solved], future: Future[None]) -> None:
+    def _note(self, bundle: Bundle, solved: list[SolvedScene], future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()
         self._arrived.put(Reply(bundle, tuple(solved), error))
 

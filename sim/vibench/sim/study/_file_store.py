@@ -24,7 +24,7 @@ from . import _grid as layout
 from ._errors import StudyError
 from ._results import places_of, read_arrays, read_plan
 from ._software import software
-from ._store import Arrays, PointAnswer, put
+from ._store import Arrays, PointAnswer, write_cells
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 """Longest wait for a reader to close the file, and time between attempts to lock the file [s]."""
@@ -214,7 +214,7 @@ class FileStore:
         self._session = 0
 
     @classmethod
-    def created(cls, path: Path, plan: layout.GridPlan) -> Self:
+    def create(cls, path: Path, plan: layout.GridPlan) -> Self:
         """Create the file and return its store; raise StudyError if the file exists."""
         make_file(path, plan)
         return cls(path, plan)
@@ -239,7 +239,7 @@ class FileStore:
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
-            for column, raw in put(self.arrays, self._columns, kept):
+            for column, raw in write_cells(self.arrays, self._columns, kept):
                 self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
@@ -271,15 +271,15 @@ class FileStore:
         try:
             self._disk.write(offset, raw)
         except OSError as error:
-            raise self._refused(error) from error
+            raise self._write_error(error) from error
 
     def _sync(self) -> None:
         try:
             self._disk.sync()
         except OSError as error:
-            raise self._refused(error) from error
+            raise self._write_error(error) from error
 
-    def _refused(self, error: OSError) -> StudyError:
+    def _write_error(self, error: OSError) -> StudyError:
         return StudyError(
             f"{self._path} could not be written: {error.strerror}. Earlier results are safe;"
             " free disk space or repair the disk, and resume."

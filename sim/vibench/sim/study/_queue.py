@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..background import Cancelled, Observer, Progress
 from ..scene.cost import expected_cost_s
 from ..scene.scene import Scene
-from ..scene.solve import Solved, Solver
+from ..scene.solve import SolvedScene, Solver
 from ..specimen.state import Floats
 from ._executor import Bundle, Executor, Reply
 from ._grid import FINAL_STATE, MESSAGE, TAKEN, Grid, PointState
@@ -57,7 +57,7 @@ class Costs:
                 self._is_informed[each] = True
                 yield each
 
-    def left_s(self, is_missing: NDArray[np.bool_]) -> float:
+    def remaining_s(self, is_missing: NDArray[np.bool_]) -> float:
         """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
 
         For points without a finished neighbour it is the planned time, times actual over planned time so far.
@@ -105,7 +105,7 @@ class PointScheduler:
                 self._push(int(number))
 
     @property
-    def released(self) -> int:
+    def released_points(self) -> int:
         """Number of released points, also of those with a result."""
         return int(np.count_nonzero(self._is_released))
 
@@ -247,7 +247,7 @@ class Points(ABC):
 
         def time_s(number: int) -> float:
             try:
-                return expected_cost_s(self.unchained(number), self._solver, may_repeat=may_repeat)
+                return expected_cost_s(self.new_scene(number), self._solver, may_repeat=may_repeat)
             except ValueError:
                 return 0.0
 
@@ -269,7 +269,7 @@ class Points(ABC):
         when a scene with these values is not allowed.
         """
         before = self.predecessor(number, arrays)
-        return self.unchained(number) if before == NOBODY else self.continued(number, before, arrays)
+        return self.new_scene(number) if before == NOBODY else self.next_scene(number, before, arrays)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
         """Return the result to store for a scene that raised an error."""
@@ -277,19 +277,19 @@ class Points(ABC):
         return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
 
     @abstractmethod
-    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
         """Return the points to compute next, given the results so far; called when all others are done."""
 
     @abstractmethod
-    def unchained(self, number: int) -> Scene:
+    def new_scene(self, number: int) -> Scene:
         """Return the scene of a point that continues no other point."""
 
     @abstractmethod
-    def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
+    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
         """Return the scene of a point that continues the point ``before``."""
 
     @abstractmethod
-    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
         """Return the result to store for the solution of a point."""
 
 
@@ -329,7 +329,7 @@ class _Session:
             for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
                 pass
         self._scheduler = PointScheduler(points.after, is_done, self._costs)
-        self._scheduler.release(points.wanted(store.arrays))
+        self._scheduler.release(points.next_points(store.arrays))
         self._failed = int(np.count_nonzero(is_failed(states(store.arrays))))
         self._out = 0
         self._looked_s = -math.inf
@@ -369,18 +369,18 @@ class _Session:
             self._scheduler.learn(number, taken_s)
             self._taken_s += taken_s
         if answers and not self.is_unfinished:
-            self._scheduler.release(self._points.wanted(self._store.arrays))
+            self._scheduler.release(self._points.next_points(self._store.arrays))
         if answers and math.isnan(self._first_s):
             # Measure the workers' speed from the first results on, because workers need time to start.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:
         """Return the number of done points and of all points, the remaining time, and the failures."""
-        released = self._scheduler.released
+        released = self._scheduler.released_points
         note = f"{self._failed} failed" if self._failed else ""
-        return Progress(released - self._scheduler.left, released, self._left_s(), note)
+        return Progress(released - self._scheduler.left, released, self._remaining_s(), note)
 
-    def _left_s(self) -> float | None:
+    def _remaining_s(self) -> float | None:
         """Return the remaining time of the session [s], from the workers' speed so far; None if unknown."""
         if not self.is_unfinished:
             return 0.0
@@ -393,7 +393,7 @@ class _Session:
         now_s = time.monotonic()
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s
-            self._work_left_s = self._costs.left_s(self._scheduler.is_missing)
+            self._work_left_s = self._costs.remaining_s(self._scheduler.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
         """Yield the results in a reply; put points without a result back into the queue."""

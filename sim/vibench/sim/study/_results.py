@@ -16,7 +16,7 @@ from . import _grid as layout
 from ._errors import InvalidStudy, StudyError
 from ._grid import CONTINUES, ENDED, MESSAGE, GridPlan, PointState, StudyAxis
 from ._store import Arrays, prediction_at, states
-from ._study import GivenStart, Start, Study, continued_from
+from ._study import GivenStart, Start, Study, start_name
 
 if TYPE_CHECKING:
     import h5py
@@ -181,7 +181,7 @@ class GridResults(Generic[Plan]):
         return bool(np.all(states(self.arrays) != PointState.MISSING))
 
     @property
-    def kept(self) -> int:
+    def done(self) -> int:
         """Number of points with a result or an error."""
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
 
@@ -255,7 +255,7 @@ class StudyResults(GridResults[Study]):
             case GivenStart():
                 name = start.label
             case _ if before >= 0:
-                name = continued_from(frequencies_hz[self.study.grid.place(before)[-1]])
+                name = start_name(frequencies_hz[self.study.grid.place(before)[-1]])
             case _:
                 name = Start.REST.value
         return prediction_at(

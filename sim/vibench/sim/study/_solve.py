@@ -16,9 +16,9 @@ from ..background import Cancelled, Observer
 from ..scene.cost import pilot_cost_s
 from ..scene.prediction import state_of
 from ..scene.scene import Given, Rest, Scene
-from ..scene.solve import Solved, solve_scene
+from ..scene.solve import SolvedScene, solve_scene
 from ..specimen.outcome import Outcome
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from ._errors import ClusterLost
 from ._executor import Executor, Solver, ThreadExecutor
 from ._grid import (
@@ -35,7 +35,7 @@ from ._grid import (
 from ._queue import NOBODY, Points, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
-from ._study import GivenStart, Study, continued_from, study_solver
+from ._study import GivenStart, Study, start_name, study_solver
 
 # Points of a study: their scenes, and what is stored.
 #
@@ -82,11 +82,11 @@ class Expansion(Points):
         self._study = study
         self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
 
-    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
         """Return the numbers of all points of the study."""
         return np.arange(len(arrays[FINAL_STATE]))
 
-    def unchained(self, number: int) -> Scene:
+    def new_scene(self, number: int) -> Scene:
         """Return the scene of a point that continues no other point."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
@@ -96,13 +96,13 @@ class Expansion(Points):
             case _:
                 return self._study.scene(place, Rest())
 
-    def continued(self, number: int, before: int, arrays: Arrays) -> Scene:
+    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
         """Return the scene of a point that continues the point ``before``."""
-        name = continued_from(self._study.frequency_at(self.grid.place(before)))
+        name = start_name(self._study.frequency_at(self.grid.place(before)))
         start = Given(state_of(arrays[FINAL_STATE][before].astype(np.float64)), name)
         return self._study.scene(self.grid.place(number), start, self._study.phase_after(before, arrays))
 
-    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
         """Return the result to store for a solved point, with the start and the digest of its scene."""
         before = self.predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
@@ -130,7 +130,7 @@ def planned_work_s(study: Study) -> float:
     """
     points = Expansion(study)
     if study.target is not None:
-        return points.grid.size * pilot_cost_s(points.unchained, points.grid.size)
+        return points.grid.size * pilot_cost_s(points.new_scene, points.grid.size)
     return float(points.planned_s.sum())
 
 
@@ -188,14 +188,14 @@ def solve_study(
 @contextmanager
 def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | ExistingWord) -> Iterator[Store]:
     """Open the store of a plan: a new file, a file to be resumed, or memory."""
-    existing = chosen(ExistingStudy, existing)
+    existing = member(ExistingStudy, existing)
     if out is None:
         yield MemoryStore(plan)
         return
     from ._file_store import FileStore  # noqa: PLC0415 - h5py takes longer than a short answer
 
     is_there = existing is ExistingStudy.RESUME and out.exists()
-    with FileStore(out, plan) if is_there else FileStore.created(out, plan) as store:
+    with FileStore(out, plan) if is_there else FileStore.create(out, plan) as store:
         yield store
 
 

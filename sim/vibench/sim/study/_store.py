@@ -12,7 +12,7 @@ from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, SceneP
 from ..scene.shares import EscapeRate, Share
 from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.outcome import Outcome
-from ..specimen.stops import chosen
+from ..specimen.stops import member
 from . import _grid as layout
 
 Arrays = dict[str, NDArray[np.generic]]
@@ -38,7 +38,7 @@ def empty_arrays(plan: layout.GridPlan) -> Arrays:
     }
 
 
-def put(
+def write_cells(
     arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
 ) -> Iterator[tuple[layout.Column, bytes]]:
     """Write a result into the arrays; yield each changed column with its bytes for the file.
@@ -96,7 +96,7 @@ class MemoryStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Store the results of points in memory."""
         for answer in answers:
-            for _ in put(self.arrays, self._columns, answer):
+            for _ in write_cells(self.arrays, self._columns, answer):
                 pass
             self.arrays[layout.STATE][answer.number] = answer.state
 
@@ -203,7 +203,7 @@ def prediction_at(
         start=start,
         memory=list(StartMemory)[int(arrays[layout.MEMORY][number])],
         ensemble=_ensemble_at(arrays, number),
-        accuracy=chosen(Accuracy, accuracy).value,
+        accuracy=member(Accuracy, accuracy).value,
     )
 
 

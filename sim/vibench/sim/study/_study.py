@@ -294,7 +294,7 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
     )
 
 
-def continued_from(frequency_hz: float) -> str:
+def start_name(frequency_hz: float) -> str:
     """Return the name of an initial state that is the final state at this frequency [Hz]."""
     return f"end at {frequency_hz:g} Hz"
 

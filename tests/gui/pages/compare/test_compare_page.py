@@ -97,8 +97,8 @@ def test_unticked_curves_are_neither_drawn_nor_listed(overlaid):
 
 def test_markers_read_the_value_of_every_curve(overlaid):
     overlaid._markers.setChecked(True)
-    overlaid.plots.markers.put(0, 150.0)
-    overlaid.plots.markers.put(1, 300.0)
+    overlaid.plots.markers.move(0, 150.0)
+    overlaid.plots.markers.move(1, 300.0)
     assert overlaid.plots.markers.values == (150.0, 300.0)
     first, second = texts(overlaid.readings)
     assert float(first[1]) == pytest.approx(2 * float(second[1]), rel=1e-3)
@@ -164,7 +164,7 @@ def test_a_copy_under_another_name_is_shown_once(page, record_noise, tmp_path):
     copy = shutil.copy(path, tmp_path / "copy.h5")
     page._recordings = {path: None, copy: None}
     for each in (path, copy, copy):
-        page._compared(compare_recording(each, FrequencyResponseRequest(), Simulation.LEFT_OUT))
+        page._add_recording(compare_recording(each, FrequencyResponseRequest(), Simulation.LEFT_OUT))
     assert [each.what for each in notices] == 2 * [f"{copy} has the same samples as {path}."]
     assert {each.source for each in page.curves.curves} == {"noise"}
     assert set(page._recordings) == {path}

@@ -13,7 +13,7 @@ from vibench.gui.widgets.theme import DARK
 
 @pytest.fixture(scope="module")
 def shaken_recording(tmp_path_factory):
-    return shaken_world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
+    return shaken_world.shake(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
 
 
 @pytest.mark.thorough

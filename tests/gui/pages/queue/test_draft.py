@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml, shipped
 from vibench.acquisition.plan import Measurement, Range, SweepAxis
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages.queue.draft import move_up, with_measurement, with_sweep, without
+from vibench.gui.pages.queue.draft import move_up, remove_entry, with_measurement, with_sweep
 
 DWELL = Measurement.model_validate(
     {
@@ -41,8 +41,8 @@ def test_entries_can_be_moved_and_removed():
     other = DWELL.model_copy(update={"name": "other"})
     campaign = with_measurement(with_measurement(None, DWELL), other)
     assert names(move_up(campaign, 1)) == ("other", "dwell")
-    assert names(without(campaign, 0)) == ("other",)
-    assert without(without(campaign, 0), 0) is None
+    assert names(remove_entry(campaign, 0)) == ("other",)
+    assert remove_entry(remove_entry(campaign, 0), 0) is None
 
 
 def test_a_saved_campaign_loads_unchanged(tmp_path):

@@ -194,7 +194,7 @@ def test_curves_that_differ_from_the_form_are_greyed_out(page):
     page.form.show_value(SimulationRequest(**{**LINEAR, "amplitude_m": 9e-6}))
     assert not page.plots.isEnabled()
     assert all(each.is_current for each in page.displayed_results)
-    page.left()
+    page.leave()
     again = SimulatePage(page.context)
     assert again.form.value.amplitude_m == 9e-6
     again.form.form.show_content({"model": "continuous n=5"})

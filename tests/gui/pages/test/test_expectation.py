@@ -20,17 +20,17 @@ def page(context):
 
 def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
-    page._predicted(preview.predict_test(preview.TestPreview(Measurement(name="weak", excitation=plan), RIG)))
+    page._on_result(preview.predict_test(preview.TestPreview(Measurement(name="weak", excitation=plan), RIG)))
     assert page.expectation.text().startswith("Expected uncertainty: Response II: ± ")
     assert "Response I: not known beforehand" in page.expectation.toolTip()
-    page._prediction_failed(ValueError("no"))
+    page._on_failure(ValueError("no"))
     assert page.expectation.text() == ""
 
 
 def test_a_test_with_until_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
-    page._predicted(preview.predict_test(preview.TestPreview(test, RIG)))
+    page._on_result(preview.predict_test(preview.TestPreview(test, RIG)))
     assert page.expectation.text().startswith("Records until the results are known, about 2 s. Expected")
 
 
@@ -45,9 +45,9 @@ def test_a_branch_beyond_the_fast_loop_is_refused_with_the_reason(page):
     asked = preview.TestPreview(
         Measurement(name="branch", excitation=plan), rig.model_copy(update={"specimen": RIG.specimen})
     )
-    page._looked(preview.preview_test(asked))
+    page._show_preview(preview.preview_test(asked))
     assert page.is_done
-    page._predicted(preview.predict_test(asked))
+    page._on_result(preview.predict_test(asked))
     assert page.summary.text().startswith("✖ it is not known whether the fast loop holds the branch")
     assert not page.is_done
 
@@ -79,7 +79,7 @@ def test_renaming_a_test_does_not_repeat_the_prediction(page, qtbot):
     page.form.show_value(Measurement(name="after", excitation=plan))
     assert asked == []
     assert page.context.selection.measurement.name == "after"
-    page._looked(preview.preview_test(preview.TestPreview(page._inputs[0], RIG)))
+    page._show_preview(preview.preview_test(preview.TestPreview(page._inputs[0], RIG)))
     assert all(each.is_current for each in page.displayed_results)
     assert page.is_done
     page.form.show_value(Measurement(name="after", excitation=plan.model_copy(update={"duration_s": 7.0})))

@@ -174,7 +174,7 @@ class Acquisition(Stream):
     def look_for_overloads(self) -> None:
         """Latch the inputs that have clipped since the last call."""
         if self._is_open:
-            self.overloaded = np.asarray(self._sampler.overloaded(), dtype=np.bool_)
+            self.overloaded = np.asarray(self._sampler.overload_flags(), dtype=np.bool_)
 
     def close(self) -> None:
         """Stop the conversion; stored samples can still be read."""

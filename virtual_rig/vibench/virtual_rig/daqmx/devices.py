@@ -251,9 +251,9 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
             "nothing was started, choose another name"
         )
 
-    def renamed(text: str) -> str:
+    def rename(text: str) -> str:
         return name if text == old.name else text
 
     return Catalogue(
-        tuple(replace(each, name=renamed(each.name), chassis=renamed(each.chassis)) for each in devices)
+        tuple(replace(each, name=rename(each.name), chassis=rename(each.chassis)) for each in devices)
     )

@@ -31,7 +31,7 @@ class OutputBuffer:
         return int(self._ring.shape[1])
 
     @property
-    def filled(self) -> int:
+    def buffered(self) -> int:
         """Number of samples in the buffer, which a regeneration repeats."""
         return min(self.written, self.size)
 
@@ -47,7 +47,7 @@ class OutputBuffer:
 
     def cyclic(self, first: int, count: int) -> NDArray[np.float64]:
         """Return ``count`` samples from number ``first`` on; the filled part repeats endlessly."""
-        return self._ring[:, (first + np.arange(count)) % self.filled]
+        return self._ring[:, (first + np.arange(count)) % self.buffered]
 
 
 class Generation(Stream):
@@ -115,7 +115,7 @@ class Generation(Stream):
 
     @property
     def _end(self) -> float:
-        return math.inf if self.repeats and self.buffer.filled else self.buffer.written
+        return math.inf if self.repeats and self.buffer.buffered else self.buffer.written
 
     def advance_to(self, now_s: float) -> None:
         """Update the number of played samples at rig time ``now_s``, and detect an underflow."""

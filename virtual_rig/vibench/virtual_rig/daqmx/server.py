@@ -32,7 +32,7 @@ def token_for(address: str) -> str | None:
     return None if host in LOOPBACK_HOSTS else secrets.token_urlsafe(24)
 
 
-class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
+class TokenCheck(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
     """Interceptor that rejects calls without the server's token."""
 
     def __init__(self, token: str) -> None:
@@ -109,7 +109,7 @@ class DaqServer:
         self._rig = Rig(world, self._pace, catalogue or Catalogue())
         self._system = DaqmxSystem(self._rig)
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
-        guards = () if token is None else (TokenRequired(token),)
+        guards = () if token is None else (TokenCheck(token),)
         self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
         listening = {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
         self._server.add_generic_rpc_handlers((_Service(self._unary_calls(), listening), *handlers))
@@ -254,9 +254,9 @@ class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
         def serialise(answer: Fields) -> bytes:
             return bytes(response(**answer).SerializeToString())
 
-        handler = self._unary.get(name) or partial(_not_simulated, name)
+        handler = self._unary.get(name) or partial(_refuse_call, name)
         return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
 
 
-def _not_simulated(name: str, request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - not read
+def _refuse_call(name: str, request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - not read
     context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")

@@ -267,7 +267,7 @@ class Task:
         """Start the run, or wait for the start trigger."""
         self.require_stopped()
         self._verify()
-        if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.filled:
+        if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.buffered:
             raise self.refusal(DAQmxErrors.OUTPUT_BUFFER_EMPTY)
         self._reserve()
         self.state = TaskState.RUNNING

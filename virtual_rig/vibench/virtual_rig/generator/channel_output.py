@@ -194,7 +194,7 @@ class ChannelOutput(Timeline):
         at_s, own_s = self.effective(now_s)
         latest = self.latest
         if settings.mode is RunMode.SWEEP:
-            course = self._swept(settings, latest.course.phase(own_s), own_s, own_s)
+            course = self._sweep(settings, latest.course.phase(own_s), own_s, own_s)
             self.change(replace(latest, course=course), at_s)
             return
         is_waiting = latest.burst is not None and not latest.burst.begin_s <= own_s < latest.burst.end_s
@@ -223,10 +223,10 @@ class ChannelOutput(Timeline):
     def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
         """Return the mode's phase over time; it equals ``phase`` [cycles] at the time ``own_s``."""
         if settings.mode is RunMode.SWEEP:
-            return self._swept(settings, phase, own_s, math.inf)
-        return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
+            return self._sweep(settings, phase, own_s, math.inf)
+        return SteadyPhase.with_phase(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
 
-    def _swept(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
+    def _sweep(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
         return SweptPhase(
             settings.sweep_start_hz, settings.sweep_stop_hz, settings.sweep_s, settings.sweep_hold_s,
             settings.sweep_spacing, begin_s, own_s, phase,

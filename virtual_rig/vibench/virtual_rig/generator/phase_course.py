@@ -31,7 +31,7 @@ class SteadyPhase:
     """Phase at time zero [cycles, 0 <= offset < 1]."""
 
     @classmethod
-    def through(cls, frequency_uhz: int, phase: float, time_s: float) -> "SteadyPhase":
+    def with_phase(cls, frequency_uhz: int, phase: float, time_s: float) -> "SteadyPhase":
         """Return the course with a given phase at a given time."""
         since_zero = cls(frequency_uhz, 0.0).phase(time_s)
         return cls(frequency_uhz, (phase - since_zero) % 1.0)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from nidaqmx.error_codes import DAQmxErrors
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, create_model
 
-from vibench.acquisition import load_toml, named
+from vibench.acquisition import file_path, load_toml
 from vibench.acquisition.recording import DiskTrouble
 from vibench.sim import FrozenModel
 
@@ -203,7 +203,7 @@ class ScriptedFault(FrozenModel):
         return heal
 
 
-def _scripted(fault: Callable[..., Heal]) -> type[ScriptedFault]:
+def _script_model(fault: Callable[..., Heal]) -> type[ScriptedFault]:
     """Return the model of a fault in a script; the parameters of the fault's method are its keys."""
     keys = {
         name: (each.annotation, ... if each.default is each.empty else each.default)
@@ -242,7 +242,7 @@ _SCRIPTED = (
 if TYPE_CHECKING:
     FaultKind = ScriptedFault
 else:
-    FaultKind = Annotated[reduce(or_, map(_scripted, _SCRIPTED)), Field(discriminator="fault")]
+    FaultKind = Annotated[reduce(or_, map(_script_model, _SCRIPTED)), Field(discriminator="fault")]
 
 
 class FaultScript(FrozenModel):
@@ -256,4 +256,4 @@ def load_fault_script(path: Path | str) -> FaultScript:
 
     Raises ConfigurationError with file, key, what was given and what is allowed.
     """
-    return load_toml(named(path, "hardware_configs/faults"), FaultScript)
+    return load_toml(file_path(path, "hardware_configs/faults"), FaultScript)

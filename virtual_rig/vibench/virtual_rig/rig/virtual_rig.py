@@ -9,7 +9,7 @@ from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.instruments import PlugInKind, plug_in as load_plug_in
-from vibench.acquisition.recording import DiskTrouble, troubled_disks
+from vibench.acquisition.recording import DiskTrouble, trouble_disks
 from vibench.acquisition.rig import Rig, Role, VirtualConfig
 
 from ..daqmx.devices import catalogue_with
@@ -159,7 +159,7 @@ class VirtualRig:
                 None if self.controller is None else starting.enter_context(ScpiSocket(self.controller))
             )
             disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
-            starting.enter_context(troubled_disks(disk))
+            starting.enter_context(trouble_disks(disk))
             faults = RigFaults(self.world, self.generator, self._usb, daq, disk)
             faults.play(self._script)
             self._running = _Running(daq, socket, controller, faults, starting.pop_all())

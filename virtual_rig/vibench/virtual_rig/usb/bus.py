@@ -29,7 +29,7 @@ import usb.core
 import usb.util
 
 from vibench.acquisition import ConfigurationError, InstrumentLost
-from vibench.acquisition.rig import TOKEN_KEY, given_token
+from vibench.acquisition.rig import TOKEN_KEY, token_from_env
 
 from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbTmcInstrument
 
@@ -93,7 +93,7 @@ class RemoteUsbDevice:
 
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
-        self._metadata = ((TOKEN_KEY, given_token()),)
+        self._metadata = ((TOKEN_KEY, token_from_env()),)
         try:
             answer = self._method("Identify")(b"", timeout=CONNECT_TIMEOUT_S, metadata=self._metadata)
         except grpc.RpcError as error:

@@ -313,7 +313,7 @@ class Conversion:
         self._advance(self._start_step + steps)
         return self._waiting.take(count)
 
-    def overloaded(self) -> NDArray[np.bool_]:
+    def overload_flags(self) -> NDArray[np.bool_]:
         """Return which inputs have clipped since the last call, shape (inputs,)."""
         clipped = np.array([channel.has_clipped for channel in self._inputs], dtype=np.bool_)
         for channel in self._inputs:

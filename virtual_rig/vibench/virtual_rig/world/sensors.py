@@ -86,10 +86,10 @@ class RandomDropouts:
             return []
         # No drop-out is longer than a page, so only the previous page can reach into the first.
         pages = range(max(first // PAGE - 1, 0), stop // PAGE + 1)
-        found = [dropout for page in pages for dropout in self._of(page)]
+        found = [dropout for page in pages for dropout in self._page_dropouts(page)]
         return [dropout for dropout in found if dropout.stop_step > first and dropout.first_step < stop]
 
-    def _of(self, page: int) -> list[Disturbance]:
+    def _page_dropouts(self, page: int) -> list[Disturbance]:
         random = self._stream.generator(page)
         count = int(random.poisson(self._per_page))
         begins = page * PAGE + random.integers(0, PAGE, count)

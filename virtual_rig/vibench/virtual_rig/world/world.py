@@ -56,7 +56,7 @@ class AnalogueOutput:
 
         If the rate differs, samples that are left to play also change to the new rate.
         """
-        left = self.unplayed(now_step)
+        left = self.queued_samples(now_step)
         if left == 0:
             self._queue = np.empty(0)
             self._begin_step = max(float(now_step), self._begin_step)
@@ -66,7 +66,7 @@ class AnalogueOutput:
         self._steps_per_sample = steps_per_sample
         self._queue = np.concatenate([self._queue, np.asarray(volts, dtype=np.float64)])
 
-    def unplayed(self, now_step: int) -> int:
+    def queued_samples(self, now_step: int) -> int:
         """Return the number of samples in the queue whose end has not been played."""
         ended = int(max(now_step - self._begin_step, 0.0) / self._steps_per_sample + _ROUNDING)
         return max(len(self._queue) - ended, 0)

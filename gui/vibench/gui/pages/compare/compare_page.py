@@ -110,7 +110,7 @@ class ComparePage(Page):
     @property
     def is_done(self) -> bool:
         """Whether at least two curves are overlaid."""
-        return len(self.curves.ticked()) > 1
+        return len(self.curves.ticked_curves()) > 1
 
     @property
     def is_busy(self) -> bool:
@@ -133,8 +133,8 @@ class ComparePage(Page):
             self._jobs.append(
                 self.context.background.ask(
                     compare_recording,
-                    self._compared,
-                    self._failed,
+                    self._add_recording,
+                    self._show_error,
                     path,
                     options.request,
                     options.simulation,
@@ -162,14 +162,14 @@ class ComparePage(Page):
 
     def export_to(self, path: Path) -> None:
         """Write the comparison in the background, in the format of the path's suffix."""
-        shown = tuple(each for each, _ in self.curves.ticked())
+        shown = tuple(each for each, _ in self.curves.ticked_curves())
         recordings = tuple(each for each in self._recordings.values() if each is not None)
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
         marked = self.plots.markers.values
         ask = self.context.background.ask
-        ask(export_comparison, self._exported, self.context.fail, path, shown, recordings, pair, marked)
+        ask(export_comparison, self._say_done, self.context.fail, path, shown, recordings, pair, marked)
 
-    def _compared(self, found: ComparedRecording) -> None:
+    def _add_recording(self, found: ComparedRecording) -> None:
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
             self._recordings.pop(found.path, None)  # absent if its path was requested twice
@@ -183,7 +183,7 @@ class ComparePage(Page):
             self.context.warn(sentence, "Only the measured curves are shown.")
         self._end_job()
 
-    def _failed(self, error: BaseException) -> None:
+    def _show_error(self, error: BaseException) -> None:
         self._recordings = {path: each for path, each in self._recordings.items() if each is not None}
         self.context.fail(error)
         self._end_job()
@@ -197,11 +197,11 @@ class ComparePage(Page):
             self._total = 0
         self.panel.show_progress(self._total - len(self._jobs), self._total)
 
-    def _exported(self, path: Path) -> None:
+    def _say_done(self, path: Path) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {path}"))
 
     def _draw(self) -> None:
-        shown = self.curves.ticked()
+        shown = self.curves.ticked_curves()
         self.pair_box.offer(self.curves.curves, tuple(each for each, _ in shown))
         self.plots.show_curves(shown, self.pair_box.difference())
         self.peaks.show_numbers(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
@@ -211,7 +211,7 @@ class ComparePage(Page):
 
     def _read(self) -> None:
         markers_hz = self.plots.markers.values
-        curves = tuple(each for each, _ in self.curves.ticked()) if markers_hz else ()
+        curves = tuple(each for each, _ in self.curves.ticked_curves()) if markers_hz else ()
         self.readings.show_numbers(marker_headings(markers_hz), marker_rows(curves, markers_hz))
 
     def _choose_recordings(self) -> None:

@@ -58,7 +58,7 @@ class CurvePlots(QWidget):
         self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
             "Select a curve and its reference on the left."
         )
-        self.differences.always_numbered().setXLink(self.magnitudes)
+        self.differences.keep_numbers().setXLink(self.magnitudes)
         # The lower plot labels the frequency axis for both plots.
         self.magnitudes.across.show_nothing()
         parts = splitter("Curves and their difference", self.magnitudes, self.differences, (500, 170))
@@ -196,7 +196,7 @@ class CurveList(QListWidget):
         """All curves of the list, ticked or not."""
         return tuple(self._curves)
 
-    def ticked(self) -> tuple[tuple[Curve, LineStyle], ...]:
+    def ticked_curves(self) -> tuple[tuple[Curve, LineStyle], ...]:
         """Return the ticked curves with their line styles."""
         return tuple(
             (each, self.line_style(each))
@@ -219,7 +219,7 @@ class CurveList(QListWidget):
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Replace the curves of one recording or prediction by new curves."""
-        ticked = {each.name for each, _ in self.ticked()}
+        ticked = {each.name for each, _ in self.ticked_curves()}
         known = {each.name for each in self._curves}
         others = [each for each in self._curves if not _is_of(each, source)]
         place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
@@ -232,7 +232,7 @@ class CurveList(QListWidget):
     def remove_chosen(self) -> tuple[str, ...]:
         """Remove the selected curves; return the sources that have no curve left."""
         before = {each.source for each in self._curves}
-        ticked = {each.name for each, _ in self.ticked()}
+        ticked = {each.name for each, _ in self.ticked_curves()}
         rows = {index.row() for index in self.selectedIndexes()}
         self._curves = [each for row, each in enumerate(self._curves) if row not in rows]
         self._list(lambda each: each.name in ticked)
@@ -252,7 +252,7 @@ class CurveList(QListWidget):
                 self.item(row).setIcon(_swatch(self.line_style(each), theme))
 
     def _show_units(self) -> None:
-        ticked = {each.name for each, _ in self.ticked()}
+        ticked = {each.name for each, _ in self.ticked_curves()}
         self._list(lambda each: each.name in ticked)
 
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:

@@ -111,7 +111,7 @@ class FilesPage(Page):
         if self._listing is not None:
             self._listing.drop()
         self.table.is_listing = True
-        self._listing = self.context.background.ask(read_listing, self._listed, self.context.fail, folder)
+        self._listing = self.context.background.ask(read_listing, self._refill, self.context.fail, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording from any folder."""
@@ -129,7 +129,7 @@ class FilesPage(Page):
         if self._opened is before:
             self._open(path)
 
-    def _listed(self, found: Listing) -> None:
+    def _refill(self, found: Listing) -> None:
         entries, shown = found.recordings, self.table.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
@@ -259,9 +259,9 @@ class FilesPage(Page):
     def _choose_export(self) -> None:
         path = self.table.chosen_paths()[0]
         if (target := new_path(self, "Export", path.with_suffix(".uff"), EXPORTS)) is not None:
-            self.context.background.ask(export_recording, self._exported, self.context.fail, path, target)
+            self.context.background.ask(export_recording, self._say_done, self.context.fail, path, target)
 
-    def _exported(self, files: tuple[Path, ...]) -> None:
+    def _say_done(self, files: tuple[Path, ...]) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
 
     def _write_note(self) -> None:

@@ -337,7 +337,7 @@ class _Image:
 
     def show_picture(self, found: DensityPicture) -> None:
         """Draw a spectrogram; its colours cover a fixed level range below the strongest spectral line."""
-        bottom, top = map(self._plot.scales[1].drawn, found.frequency_hz)
+        bottom, top = map(self._plot.scales[1].position, found.frequency_hz)
         left, right = found.time_s
         self.item.setImage(found.decibel, autoLevels=False)
         self.item.setRect(QRectF(left, bottom, right - left, top - bottom))

@@ -78,7 +78,7 @@ class RecordingTimeHistories(PlotStack):
         self._mark_overloads(overview)
         self.markers.draw_in(self.plots)
         for number, share in enumerate((1 / 3, 2 / 3)):
-            self.markers.put(number, share * overview.recording.duration_s)
+            self.markers.move(number, share * overview.recording.duration_s)
         self._label_last()
         self.show_all()
         self._draw()
@@ -151,7 +151,7 @@ class RecordingTimeHistories(PlotStack):
             title.setBackgroundRole(QPalette.ColorRole.Base)
             title.setAutoFillBackground(True)
             title.move(round((plot.up_em + 1) * self.fontMetrics().height()), 2)
-            plot.getViewBox().sigXRangeChanged.connect(self._ranged)
+            plot.getViewBox().sigXRangeChanged.connect(self._on_range)
             self._kept[kind] = _TimeHistory(channel.role, plot, plot.curve(curve_style(0)))
         return self._kept[kind]
 
@@ -199,7 +199,7 @@ class RecordingTimeHistories(PlotStack):
                 if each.channel == history.role
             )
 
-    def _ranged(self, view: pg.ViewBox, _range: object) -> None:
+    def _on_range(self, view: pg.ViewBox, _range: object) -> None:
         if not self._histories or view is not self._histories[0].plot.getViewBox():
             return
         self._later.start()

@@ -228,11 +228,11 @@ class MapsPage(Page):
         """The map and the motion, each with its request as input."""
         return (
             DisplayedResult(self.map, self._request, self.form.value),
-            DisplayedResult(self.motion, self._motion_of, self._motion_wanted),
+            DisplayedResult(self.motion, self._motion_of, self._motion_request),
         )
 
     @property
-    def _motion_wanted(self) -> MotionRequest | None:
+    def _motion_request(self) -> MotionRequest | None:
         request = self.form.value
         if request is None or self._point is None:
             return None
@@ -276,7 +276,7 @@ class MapsPage(Page):
         if self.form.value is None or frequency_hz <= 0.0:
             return
         self._point = (frequency_hz, amplitude_m)
-        request = self._motion_wanted
+        request = self._motion_request
         assert request is not None
         self.map.mark(frequency_hz, amplitude_m)
         self.motion.caption.setText("Following the motion…")
@@ -325,7 +325,7 @@ class MapsPage(Page):
         if wanted is not None and self.picture is None:
             self.map.show_range((wanted.start_hz, wanted.stop_hz), (wanted.lowest_m, wanted.highest_m))
         self.map.setEnabled(self._request in (None, wanted))
-        self.motion.setEnabled(self._motion_of in (None, self._motion_wanted))
+        self.motion.setEnabled(self._motion_of in (None, self._motion_request))
 
     def _recolour(self, *_: object) -> None:
         self._is_stale = True

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from vibench.acquisition import AcquisitionError, ConfigurationError, validated
+from vibench.acquisition import AcquisitionError, ConfigurationError, validate
 from vibench.acquisition.campaign import ExistingRecordings, planned_recordings
 from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
 from vibench.acquisition.plan import (
@@ -31,7 +31,7 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
     named = measurement.model_copy(update={"name": _free(measurement.name, taken)})
-    return _changed(campaign, measurements=[*_dump_all(campaign.measurements), _dump(named)])
+    return _update(campaign, measurements=[*_dump_all(campaign.measurements), _dump(named)])
 
 
 def with_sweep(
@@ -50,15 +50,15 @@ def with_sweep(
         "measurement": template,
         axis.value: values.model_dump(mode="json", exclude_none=True),
     }
-    alone = validated({"name": USUAL_NAME, "sweeps": [sweep]}, Campaign, "the sweep")
+    alone = validate({"name": USUAL_NAME, "sweeps": [sweep]}, Campaign, "the sweep")
     if rig is not None:
         _require_playable(alone, rig)
     if campaign is None:
         return alone
-    return _changed(campaign, sweeps=[*_dump_all(campaign.sweeps), sweep])
+    return _update(campaign, sweeps=[*_dump_all(campaign.sweeps), sweep])
 
 
-def without(campaign: Campaign, number: int) -> Campaign | None:
+def remove_entry(campaign: Campaign, number: int) -> Campaign | None:
     """Return the campaign without one test or sweep; None if none is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
@@ -66,7 +66,7 @@ def without(campaign: Campaign, number: int) -> Campaign | None:
     if not entries:
         return None
     first_sweep = len(measurements) - (number < len(measurements))
-    return _changed(campaign, measurements=entries[:first_sweep], sweeps=entries[first_sweep:])
+    return _update(campaign, measurements=entries[:first_sweep], sweeps=entries[first_sweep:])
 
 
 def move_up(campaign: Campaign, number: int) -> Campaign:
@@ -78,7 +78,7 @@ def move_up(campaign: Campaign, number: int) -> Campaign:
     if place == 0:
         return campaign
     kind[place - 1], kind[place] = kind[place], kind[place - 1]
-    return _changed(campaign, measurements=measurements, sweeps=sweeps)
+    return _update(campaign, measurements=measurements, sweeps=sweeps)
 
 
 def _require_playable(campaign: Campaign, rig: Rig) -> None:
@@ -91,8 +91,8 @@ def _require_playable(campaign: Campaign, rig: Rig) -> None:
         )
 
 
-def _changed(campaign: Campaign, **parts: object) -> Campaign:
-    return validated({**_dump(campaign), **parts}, Campaign, campaign.name)
+def _update(campaign: Campaign, **parts: object) -> Campaign:
+    return validate({**_dump(campaign), **parts}, Campaign, campaign.name)
 
 
 def _dump_all(models: Sequence[BaseModel]) -> list[dict[str, object]]:

@@ -22,7 +22,7 @@ from vibench.acquisition import (
     load_campaign,
     save_toml,
     toml_text,
-    validated,
+    validate,
 )
 from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState, EngineStatus, Supervision
@@ -45,9 +45,9 @@ from .draft import (
     move_up,
     point_rows,
     preview_campaign,
+    remove_entry,
     with_measurement,
     with_sweep,
-    without,
 )
 
 _AXES = {
@@ -167,7 +167,7 @@ class QueuePage(Page):
             "Hold (drive on)", "Hold the run; the drive stays on", self._actions.hold_or_resume
         )
         self._looking = LatestRequest(
-            context.looks, preview_campaign, self._looked, context.fail, LOOK_MS, self
+            context.looks, preview_campaign, self._show_preview, context.fail, LOOK_MS, self
         )
         self._lay_out()
         self._connect()
@@ -205,7 +205,7 @@ class QueuePage(Page):
         wanted = (self.context.selection.campaign, self.context.selection.rig)
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 
-    def left(self) -> None:
+    def leave(self) -> None:
         """Store the edited campaign in the settings."""
         campaign = self.context.selection.campaign
         self.context.settings.keep_text(SettingKey.CAMPAIGN, "" if campaign is None else toml_text(campaign))
@@ -244,7 +244,7 @@ class QueuePage(Page):
         self.entries.setEnabled(False)
         self._looking.ask((campaign, rig, self.context.folder / campaign.name))
 
-    def _looked(self, preview: CampaignPreview) -> None:
+    def _show_preview(self, preview: CampaignPreview) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
             return
@@ -290,7 +290,7 @@ class QueuePage(Page):
     def _remove(self) -> None:
         campaign, number = self.context.selection.campaign, self._chosen_entry
         if campaign is not None and number >= 0:
-            self.context.selection.choose_campaign(without(campaign, number))
+            self.context.selection.choose_campaign(remove_entry(campaign, number))
 
     def _move_up(self) -> None:
         campaign, number = self.context.selection.campaign, self._chosen_entry
@@ -336,7 +336,7 @@ class QueuePage(Page):
         kept = self.context.settings.text(SettingKey.CAMPAIGN)
         if kept:
             try:
-                campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
+                campaign = validate(tomllib.loads(kept), Campaign, "the last campaign")
             except (ConfigurationError, tomllib.TOMLDecodeError) as error:
                 self.context.say(notice_of(error, "It was ignored; open or create another campaign."))
             else:

@@ -311,7 +311,7 @@ class RigPage(Page):
                 ]
             )
 
-    def _chosen(self) -> None:
+    def _show_choice(self) -> None:
         rig = self.choice.rig
         self.knobs.show_rig(rig)
         if rig is None:
@@ -332,16 +332,16 @@ class RigPage(Page):
             return
         self.find_button.setEnabled(False)
         self.instruments.show_rows([("looking", "opening takes seconds; a simulated rig is started first")])
-        self.context.background.ask(list_rig_instruments, self._found, self._not_found, rig)
+        self.context.background.ask(list_rig_instruments, self._list_found, self._fail_search, rig)
 
-    def _found(self, found: InstrumentList) -> None:
+    def _list_found(self, found: InstrumentList) -> None:
         self.find_button.setEnabled(True)
         rows = [("VISA", resource) for resource in found.visa_resources]
         rows += [("DAQ", f"{each.name}: {each.product}, serial {each.serial}") for each in found.daq_devices]
         rows += [("remark", remark) for remark in found.remarks]
         self.instruments.show_rows(rows or [("none", "no instrument answers: check cables and power")])
 
-    def _not_found(self, error: BaseException) -> None:
+    def _fail_search(self, error: BaseException) -> None:
         self.find_button.setEnabled(True)
         self.instruments.show_rows([])
         self.context.fail(error)
@@ -351,7 +351,7 @@ class RigPage(Page):
         self.instruments.show_rows([])
 
     def _connect(self) -> None:
-        self.choice.chosen.connect(self._chosen)
+        self.choice.chosen.connect(self._show_choice)
         self.choice.refused.connect(self.context.fail)
 
     def _lay_out(self) -> None:

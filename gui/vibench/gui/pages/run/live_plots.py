@@ -337,7 +337,7 @@ _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."
 
 
-def _faded(number: int, theme: Theme) -> Colour:
+def _fade(number: int, theme: Theme) -> Colour:
     opacity = round(255 * (1.0 - number / _SHADES))
     return f"{theme.traces[1]}{opacity:02x}"
 
@@ -353,7 +353,7 @@ class HiddenMotionPlot(QWidget):
         self.plot = Plot(self.title, _FROM_NEWEST, _BETWEEN_STOPS, theme).with_hint(_HINT)
         self.tracked = self.plot.curve(curve_style(0))
         self.forecast = [
-            self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
+            self.plot.curve(LineStyle(partial(_fade, number), Dash.SOLID)) for number in range(_SHADES)
         ]
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.caption = SentenceLabel(rank="second", name="Report of the live twin")

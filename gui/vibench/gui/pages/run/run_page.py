@@ -25,7 +25,7 @@ from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
-from ...engine_link.bridge import measurement_called
+from ...engine_link.bridge import find_measurement
 from ...forms.editor import Choice
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
@@ -401,7 +401,7 @@ class RunPage(Page):
             # The button with the focus was just hidden. Otherwise Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
-        played = self._played
+        played = self._measurement
         self.watch_card.show_status(status, 0 if played is None else played.excitation.stretches)
         if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
             self.hidden_motion.show_status(status)
@@ -463,7 +463,7 @@ class RunPage(Page):
     def _begin(self, view: LiveView) -> None:
         """Clear the plots, show the run's prediction, and select the plots for its excitation."""
         self._view = view
-        measurement = self._played
+        measurement = self._measurement
         prediction = self.context.selection.prediction
         if prediction is not None and (
             measurement is None or prediction.measurement.excitation != measurement.excitation
@@ -482,7 +482,7 @@ class RunPage(Page):
         self.left_tabs.setCurrentWidget(pictures[shown.left])
         self.right_tabs.setCurrentWidget(pictures[shown.right])
 
-    def _recorded(self, path: Path) -> None:
+    def _show_end(self, path: Path) -> None:
         self._ended = path
         status = self.context.bridge.status
         rows = () if status is None else status.rows
@@ -508,13 +508,13 @@ class RunPage(Page):
             self.context.bridge.order(EngineClient.mark, text)
 
     @property
-    def _played(self) -> Measurement | None:
+    def _measurement(self) -> Measurement | None:
         status = self.context.bridge.status
         run = None if status is None else status.run
-        return None if run is None else measurement_called(self.context.bridge.campaign, run.name)
+        return None if run is None else find_measurement(self.context.bridge.campaign, run.name)
 
     def _reject(self) -> None:
-        played, view = self._played, self.context.bridge.view
+        played, view = self._measurement, self.context.bridge.view
         if played is not None and view is not None:
             view.leave_out(played.excitation.playing_s / played.excitation.stretches)
             self._mark(REJECTED)
@@ -543,7 +543,7 @@ class RunPage(Page):
         # Redraw at once: until the next tick, plots of a finished run would look like those of this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
-        self.context.recording_made.connect(self._recorded)
+        self.context.recording_made.connect(self._show_end)
         self.context.selection.rig_changed.connect(self._show_channels)
 
     def _lay_out(self) -> None:

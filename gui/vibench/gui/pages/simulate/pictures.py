@@ -54,7 +54,7 @@ class _PairPicture:
         """Return the pair of plots over a parameter."""
         return self._pairs[along]
 
-    def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
+    def clear(self, along: Parameter) -> tuple[Plot, Plot]:
         """Clear and show the pair of plots over a parameter; return the pair."""
         self.widget.setCurrentIndex(list(ACROSS).index(along))
         pair = self.plots(along)
@@ -75,7 +75,7 @@ class BranchPicture(_PairPicture):
     def show_answer(self, answer: BranchDiagram) -> None:
         """Draw every branch."""
         along = answer.request.along
-        pair = self.cleared(along)
+        pair = self.clear(along)
         named: set[str] = set()
         for line in answer.lines:
             for is_stable, piece in line.pieces():
@@ -84,7 +84,7 @@ class BranchPicture(_PairPicture):
                 name = f"{'stable' if is_stable else 'unstable'}{period}"
                 for plot, (what, _) in zip(pair, RESPONSES, strict=True):
                     curve = plot.curve(style, "" if name in named else name)
-                    curve.setData(line.along(along)[piece], getattr(line, what)[piece, 0])
+                    curve.setData(line.axis_values(along)[piece], getattr(line, what)[piece, 0])
                 named.add(name)
         is_frequency = answer.request.along is Parameter.FREQUENCY
         for number, kind in enumerate(_SPECIAL, start=_FIRST_SPECIAL_COLOUR):
@@ -106,7 +106,7 @@ class SpectrumPicture(_PairPicture):
     def show_answer(self, answer: ExponentSpectrum) -> None:
         """Draw the exponents and dimensions found so far."""
         along = answer.request.along
-        upper, lower = self.cleared(along)
+        upper, lower = self.clear(along)
         if not answer.points:
             return
         place = answer.column("frequency_hz" if along is Parameter.FREQUENCY else "amplitude_m")

@@ -77,7 +77,7 @@ class SimulatePage(Page):
         for view in self._views:
             view.refresh()
 
-    def left(self) -> None:
+    def leave(self) -> None:
         """Store the scene of the form in the settings."""
         self.context.settings.keep_text(SettingKey.SCENES, json.dumps(self.form.form.content()))
 
@@ -128,8 +128,8 @@ class SimulatePage(Page):
         self._is_stale = True
         troubles = () if self.progress is None else self.progress.troubles
         text = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
-        if self.progress is not None and self.progress.forgotten:
-            text += f" At {self.progress.forgotten} points the motion depends sensitively on the start."
+        if self.progress is not None and self.progress.sensitive:
+            text += f" At {self.progress.sensitive} points the motion depends sensitively on the start."
         self._say_progress(text)
         if troubles:
             self.context.warn(troubles[0], details="\n".join(troubles[1:]))

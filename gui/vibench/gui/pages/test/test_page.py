@@ -28,7 +28,7 @@ from vibench.acquisition import (
     printable,
     save_toml,
     toml_text,
-    validated,
+    validate,
 )
 from vibench.acquisition.plan import (
     EXCITATION_KINDS,
@@ -351,10 +351,10 @@ class TestPage(Page):
             "first",
         )
         self._looking = LatestRequest(
-            context.looks, preview_test, self._looked, self._look_failed, LOOK_MS, self
+            context.looks, preview_test, self._show_preview, self._show_look_error, LOOK_MS, self
         )
         self._predicting = LatestRequest(
-            context.background, predict_test, self._predicted, self._prediction_failed, PREDICT_MS, self
+            context.background, predict_test, self._on_result, self._on_failure, PREDICT_MS, self
         )
         self._lay_out()
         self._connect()
@@ -393,13 +393,13 @@ class TestPage(Page):
         nameless = None if value is None else value.model_copy(update=NAMELESS)
         return nameless, self.context.selection.rig
 
-    def left(self) -> None:
+    def leave(self) -> None:
         """Store the edited test in the settings."""
         measurement = self.form.value
         if measurement is not None:
             self.context.settings.keep_text(SettingKey.TEST, toml_text(measurement))
 
-    def _changed(self) -> None:
+    def _on_change(self) -> None:
         measurement, inputs = self.form.value, self._inputs
         seen = self.context.selection.prediction
         self.context.selection.choose_measurement(measurement)
@@ -426,7 +426,7 @@ class TestPage(Page):
         self.prediction_note.setText("◌ simulating")
         self._predicting.ask(TestPreview(measurement, rig))
 
-    def _looked(self, seen: MeasurementPreview) -> None:
+    def _show_preview(self, seen: MeasurementPreview) -> None:
         self._preview = seen
         self._of = self._summary_of = self._requested_inputs
         self.summary.setText(summary_text(seen, self._refusal))
@@ -435,10 +435,10 @@ class TestPage(Page):
         self.plots.show_preview(seen)
         self.limits.show_checks(seen.checks)
 
-    def _look_failed(self, error: BaseException) -> None:
+    def _show_look_error(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
 
-    def _predicted(self, prediction: TestPrediction) -> None:
+    def _on_result(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
         self.context.selection.prediction = seen
         self._predicted_of = self._requested_inputs
@@ -462,7 +462,7 @@ class TestPage(Page):
         self.expectation.setText(text)
         self.expectation.setToolTip("\n".join(sentences))
 
-    def _prediction_failed(self, error: BaseException) -> None:
+    def _on_failure(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
         self.prediction_note.setEnabled(True)
         self._predicted_of = self._requested_inputs
@@ -521,8 +521,8 @@ class TestPage(Page):
 
     def _connect(self) -> None:
         self.choice.activated.connect(self._take)
-        self.form.changed.connect(self._changed)
-        self.context.selection.rig_changed.connect(self._changed)
+        self.form.changed.connect(self._on_change)
+        self.context.selection.rig_changed.connect(self._on_change)
 
     def _lay_out(self) -> None:
         self.choice.setAccessibleName("Known tests")
@@ -559,6 +559,6 @@ class TestPage(Page):
 def _stored_test(text: str) -> Measurement | None:
     """Return the test from the settings' text; None if this version does not allow it."""
     try:
-        return validated(tomllib.loads(text), Measurement, "the last test")
+        return validate(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):
         return None

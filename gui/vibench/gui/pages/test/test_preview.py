@@ -9,7 +9,7 @@ from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_me
 from vibench.acquisition.rig import Rig
 
 if TYPE_CHECKING:
-    from vibench.analysis import Expected, MeasurementPrediction
+    from vibench.analysis import ExpectedResult, MeasurementPrediction
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class TestPrediction:
     """Predicted response to a test, with the expected uncertainty of its results."""
 
     motion: "MeasurementPrediction"
-    expected: tuple["Expected", ...]
+    expected: tuple["ExpectedResult", ...]
     recorded_s: float | None
     """Predicted recording time of a test with `until` [s]; None if unknown, or without `until`."""
     refusal: str
