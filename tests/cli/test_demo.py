@@ -62,7 +62,7 @@ def test_weak_noise_shows_the_three_linear_resonances_within_1_percent(results):
     assert resonances_hz(results["noise_weak"]) == pytest.approx(LINEAR_HZ, rel=0.01)
 
 
-def test_strong_noise_shows_only_two_terminal_resonances_within_2_percent(results):
+def test_strong_noise_shows_exactly_the_two_terminal_resonances(results):
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
 
 

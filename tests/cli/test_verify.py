@@ -154,7 +154,7 @@ def test_a_crate_marks_damaged_recordings(vibench_here, folder):
 
 
 @pytest.mark.thorough
-def test_a_crate_names_missing_recordings_of_its_campaign(vibench_here, folder):
+def test_an_ro_crate_states_which_recordings_of_its_campaign_are_missing(vibench_here, folder):
     campaign = folder / "tiny.toml"
     campaign.write_text(TINY)
     made = vibench_here("measure", "tiny.toml", "--out", ".", "--check", "waived", cwd=folder)

@@ -213,7 +213,7 @@ ONE_SIDED = 'model = "gong2025"\ngap_m = [30e-6, inf]'
 
 
 @pytest.mark.parametrize("kind", [SpecimenDescription, SpecimenTable])
-def test_a_specimen_that_is_written_names_its_schema_and_passes_it(kind, tmp_path):
+def test_a_saved_specimen_names_its_schema_and_satisfies_it(kind, tmp_path):
     (tmp_path / "one_sided.toml").write_text(ONE_SIDED, encoding="utf-8")
     assert schema_errors("specimen", ONE_SIDED) == []
     for name in (*shipped_specimens(), str(tmp_path / "one_sided.toml")):

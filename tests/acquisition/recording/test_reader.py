@@ -41,7 +41,7 @@ def test_missing_converter_step_and_sensitivity_are_read_as_missing(tmp_path, ma
         assert recording.channels == (bare,)
 
 
-def test_a_plan_longer_than_an_attribute_is_stored(tmp_path, make_header):
+def test_a_plan_too_long_for_an_hdf5_attribute_is_stored(tmp_path, make_header):
     long_plan = '{"steps": [' + ",".join(["0.125"] * 50_000) + "]}"
     with create_recording(tmp_path / "b.h5", make_header(plan_json=long_plan)):
         pass

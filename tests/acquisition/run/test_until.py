@@ -49,7 +49,7 @@ def seconds(recording, label):
 
 
 @pytest.mark.thorough
-def test_a_dwell_ends_when_its_response_meets_the_bound(rig, tmp_path):
+def test_a_dwell_ends_when_the_error_of_its_response_is_small_enough(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=120)
     outcome, recording, seen = record(rig, tmp_path, dwell, Until(response_ii=0.01))
     with recording:

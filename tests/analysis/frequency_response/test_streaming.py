@@ -62,7 +62,7 @@ def test_a_four_times_longer_record_needs_no_more_memory():
     assert channels.longest_read < channels.samples / 5
 
 
-def test_analysis_progress_reports_every_stage_and_position(streamed_file):
+def test_analysis_progress_reports_every_stage_and_its_completed_share(streamed_file):
     heard = []
     with open_recording(streamed_file()) as recording:
         analyse(recording, observer=heard.append)

@@ -195,7 +195,7 @@ class TestEffects:
             kept.reopen()
             kept.bench.generator.set_amplitude(0.1)
 
-    def test_a_clock_jump_shifts_the_phase_by_its_time(self, scripted):
+    def test_a_clock_jump_of_a_quarter_period_shifts_the_phase_by_90_degrees(self, scripted):
         with open_bench(scripted(fault("jump_clock", 1.0, by_s=0.0025))) as bench:
             bench.generator.load_sine(100.0, 1.0)
             bench.generator.start()
