@@ -75,7 +75,7 @@ class Case(FigureOptions):
         try:
             super().specimen(self.sum_model)
         except ValueError as error:
-            raise InvalidRequest(f"the sum cannot be {self.sum_model}: {error}") from error
+            raise InvalidRequest(f"the model n = 3+5+7 cannot be {self.sum_model}: {error}") from error
 
     def model_name(self, model: str) -> str:
         """Return a model's name, with the indentation of the fit if this case changes it."""

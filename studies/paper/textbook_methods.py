@@ -195,9 +195,9 @@ def march(
     drives: Sequence[Harmonic],
     method: TextbookMethod,
 ) -> tuple[Reals, Reals]:
-    """Integrate states, and optional neighbours, to a time; return the states and divergence rates [1/s].
+    """Integrate motions to a time, optionally with neighbours; return states and divergence rates [1/s].
 
-    ``states`` has shape (6, 1 or 2, motions); the second entry is the neighbour.
+    ``states`` has shape (6, 1 or 2, motions); the second entry is a neighbouring state of the first.
     """
     tableau, law, scales = method.tableau, law_of(specimen), _scales(drives)
     numbers = np.array([numbers_of(specimen, drive) for drive in drives]).reshape(-1, 12).T

@@ -52,7 +52,7 @@ def map_motions(
         str | None, option(f"Quantity drawn with the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
     ] = None,
     branches: Annotated[
-        Path | None, option("Overlay branches on a map along one parameter.", "BRANCHES.h5")
+        Path | None, option("Overlay computed branches on a one-parameter map.", "BRANCHES.h5")
     ] = None,
     like: Annotated[
         list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")

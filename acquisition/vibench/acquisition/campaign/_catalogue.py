@@ -370,7 +370,7 @@ def _verify(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> Ve
     sentence = found.sentence
     bad = [name for name, each in results.items() if each in BAD]
     if bad:
-        sentence += f"; changed since they were saved: results {', '.join(bad)}"
+        sentence += f"; results changed since they were saved: {', '.join(bad)}"
     return VerifiedRecording(where, found.state.value, sentence, found.seal, results)
 
 

@@ -1,4 +1,4 @@
-"""Equalised noise at the base: the measured gain of every spectral line corrects the next drive."""
+"""Equalised noise at the base: the gain from drive to base at every line determines the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt

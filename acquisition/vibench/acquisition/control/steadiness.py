@@ -315,7 +315,7 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # The means of the three thirds also differ by chance; ``allowed`` includes the noise.
+    # Noise also shifts the means of the window's thirds, so ``remaining`` is compared with ``allowed``.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 

@@ -376,7 +376,7 @@ class DaqmxDigitizer:
         return self._task
 
     def _next_samples(self, samples: int) -> tuple[Samples, Counts | None]:
-        """Return the next volts; also their counts, if the converter scales linearly."""
+        """Return the next samples [V], and their counts if the converter scales linearly."""
         shape = len(self._channels), samples
         if isinstance(self._reader, AnalogUnscaledReader):
             counts = np.empty(shape, np.int32)

@@ -71,7 +71,7 @@ def _manager(visa_library: str) -> pyvisa.ResourceManager:
         return pyvisa.ResourceManager(visa_library)
     except (OSError, ValueError) as error:
         raise InstrumentError(
-            f"the VISA library {visa_library or 'of the system'!r} cannot be loaded ({error}); "
+            f"the VISA library {visa_library or 'of the system'} cannot be loaded ({error}); "
             'install it, or set generator.visa_library = "@py"'
         ) from error
 

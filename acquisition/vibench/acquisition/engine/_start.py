@@ -204,7 +204,7 @@ def stop_engine(
 
 
 def _runs(engine: Program) -> bool:
-    """Whether the process runs now; asked repeatedly, because the answer changes during a stop."""
+    """Whether the process runs at the time of the call; it may end during a stop."""
     return engine.is_alive
 
 

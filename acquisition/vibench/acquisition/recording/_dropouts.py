@@ -293,7 +293,7 @@ class BridgedChannel:
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
-        # Include neighbouring drop-outs, whose samples must not be used for the prediction.
+        # Include neighbouring drop-outs: the interpolation must not use their samples.
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)

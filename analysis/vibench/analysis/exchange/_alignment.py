@@ -264,7 +264,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=rate if rate is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # Times that start at zero count from the stated start of the channel.
+            # If the times begin at zero, they are relative to the stated start of the channel.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second,

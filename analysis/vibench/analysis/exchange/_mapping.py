@@ -42,7 +42,7 @@ def unit_in_name(name: str) -> str:
         unit = unit.replace("_", "/") if sign == "_" else unit
         is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
-        # DIN 461 writes "a / Gal". A word of more than four letters may belong to the name of the channel.
+        # DIN 461 writes "a / Gal". More than four letters after " / " may belong to the name of the channel.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
         if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit

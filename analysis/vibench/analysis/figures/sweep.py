@@ -91,7 +91,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None
         axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     if overlay is not None:
         sines = overlay.prediction
-        draw_sines(axes, sines.frequency_hz, sines, what, "steady sines of the measured A0")
+        draw_sines(axes, sines.frequency_hz, sines, what, "predicted steady sines at measured A0")
     response = getattr(measured, attribute)
     axes.plot(measured.frequency_hz, response, color=style.MEASURED, label="measured response")
     if overlay is not None:

@@ -260,7 +260,7 @@ def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ..
 def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
-    # Round to the second digit of the half width, so that the printed bounds differ.
+    # Round to the second digit of the half width, so that the printed lower and upper bounds differ.
     places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)

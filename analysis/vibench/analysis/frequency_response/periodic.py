@@ -508,7 +508,7 @@ class PeriodicSums:
     def frequency_response(
         self, *, delay_s: float = 0.0, orders: Integers | None = None
     ) -> PeriodicFrequencyResponse:
-        """Return the transmission of the realisations added so far, at the driven lines.
+        """Return the frequency response at the driven lines, from the realisations added so far.
 
         Bounds follow Student's t with 2 (realisations - 1) degrees of freedom, valid from two realisations.
 

@@ -165,7 +165,7 @@ class SweepHistory:
 
 
 class SweepTrace:
-    """Growing list of sweep points, in memory that is allocated once."""
+    """Sweep points in the order of time, in an array that is allocated once and keeps the newest."""
 
     def __init__(self, most: int = MOST_POINTS) -> None:
         self._most = most

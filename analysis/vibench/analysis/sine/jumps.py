@@ -164,7 +164,7 @@ def _likely(logarithm: Reals) -> tuple[int, int, int]:
 def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, logarithm: Reals) -> Jump:
     best = places[1]
     between = [0.5 * float(frequency_hz[each - 1] + frequency_hz[each]) for each in places]
-    # The jump lies within the interval before or after its boundary.
+    # The jump lies within half an interval before or after the boundary between two intervals.
     half = 0.5 * abs(float(frequency_hz[best] - frequency_hz[best - 1]))
     size, error = _steps(logarithm[max(0, best - 2 * _SIDE) : best + 2 * _SIDE])
     at = best - max(0, best - 2 * _SIDE)

@@ -369,7 +369,7 @@ class SweepSums:
         residual = impacts = linear_ii = np.full(upper.size, np.nan)
         steady_over_swept = np.nan
         if linear is not None:
-            # Drive the linear specimen by order 1 only: accelerometer noise would make it ring too.
+            # Excite the linear specimen by order 1 only: accelerometer noise would also excite its modes.
             middles = (np.arange(upper.size) + 0.5) * self._interval
             place = np.arange(data.shape[1])
             at_middles = base.order(1.0)

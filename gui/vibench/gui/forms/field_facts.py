@@ -63,7 +63,7 @@ class FieldFacts:
 
     @property
     def label_with_unit(self) -> str:
-        """Label with unit, as it stands at the beginning of a complaint about the field."""
+        """Label with unit; error messages about the field begin with it."""
         return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property

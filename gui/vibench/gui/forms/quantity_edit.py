@@ -40,7 +40,7 @@ def quantity_text(value: float, unit: str) -> str:
     """Return an SI value as text in the unit of a field, in full precision."""
     shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
     if shown.per_si != 1.0:
-        # Twelve digits hide that 4.5e-05 / 1e-06 is not exactly 45; but reading the text must give the value.
+        # Twelve digits hide that 4.5e-05 / 1e-06 is not exactly 45. The text must read back as the value.
         text = shown.text(value, 12)
         if parse_quantity(text, unit, shown.name) == value:
             return text

@@ -242,7 +242,7 @@ OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("M", "mark an event in the recording (Run page)"),
     ("A, L", "in a plot: show everything, logarithmic axis"),
     ("G, D", "in a plot: read values; mark a point to read differences"),
-    ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
+    ("Ctrl+C", "copy a plot as a picture, or the selected cells of a table"),
     ("Menu key", "context menu of the focused plot or table"),
     ("F4, Alt+Down", "open the list of a combo box"),
 )

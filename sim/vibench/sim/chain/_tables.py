@@ -202,7 +202,7 @@ BaseDrive = Sampled | LinearSweep | LogarithmicSweep
 
 
 class Pieces(NamedTuple):
-    """Force of the base on the first m0 as consecutive polynomials."""
+    """Force of the base on the first m0, as a piecewise polynomial of time."""
 
     terms: Table
     """Coefficients of the force, in powers of the time since the start of each piece, shape (pieces,

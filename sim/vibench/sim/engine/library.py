@@ -40,7 +40,7 @@ def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
         whole = _STRUCTURE.fullmatch(text)
         if whole is None:
             raise ValueError(
-                f"{text!r} is not a structure of the native engine: its form is 'Name {{ double field; }}'."
+                f"{text!r} is not a structure of the native engine: write 'Name {{ double field; }}'."
             )
         name, fields = whole.groups()
         declared = [each.strip().removeprefix("const ") for each in fields.split(";") if each.strip()]
@@ -56,9 +56,7 @@ def _fields(
     for name in names.split(","):
         found = _NAME.fullmatch(name.strip())
         if found is None:
-            raise ValueError(
-                f"{name!r} is not a field of a structure: its form is 'name', 'name[6]' or '*name'."
-            )
+            raise ValueError(f"{name!r} is not a field of a structure: write 'name', 'name[6]' or '*name'.")
         pointer, word, sizes = found.groups()
         shape = tuple(int(size) for size in re.findall(r"\d+", sizes))
         yield word, np.uintp if pointer else _NUMBERS.get(kind) or known[kind], shape
@@ -70,7 +68,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Build script; exists in a checkout, but not in an installed wheel."""
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
-"""File ending of this operating system's libraries; a checkout may contain those of other systems."""
+"""File name extension of compiled libraries on this operating system."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),

@@ -179,7 +179,7 @@ class NativeRun(_Run):
         start_at(self.engine, self._tables, self.specimen, self._state, motion, self.tolerance)
 
     def copy(self, tolerance: float | None = None) -> Self:
-        """Return an independent copy of the run; with another tolerance it has no tangent vectors."""
+        """Return an independent copy of the run; with a new `tolerance`, the copy has no tangent vectors."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:

@@ -141,7 +141,7 @@ def kick_stability(
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks were requested; give 1 or more.")
     if not results.plan.is_basin:
-        raise InvalidStudy("kicks need a map over the start alone; this map varies drive or specimen.")
+        raise InvalidStudy("kicks need a map that varies only the start; this map varies drive or specimen.")
     found = []
     with ThreadPoolExecutor(workers) as pool:
         for number, motion in enumerate(results.motions):

@@ -88,9 +88,9 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 def _lines_apart(parts: Complex) -> float:
     """Return the 95 % limit of the relative difference between the amplitudes of a line in two windows.
 
-    A line is the mean of its complex parts. Consecutive parts may be correlated, so the larger of two errors
-    is used, from all parts or from means of pairs (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). A
-    deviation perpendicular to the mean changes the amplitude by its square over twice the amplitude.
+    ``parts`` are the line's complex amplitudes in consecutive blocks; the line is their mean. Blocks may be
+    correlated, so the larger of two errors is used, from all blocks or from means of pairs (Flyvbjerg and
+    Petersen, J. Chem. Phys. 91 (1989) 461). A deviation d normal to the mean a changes |a| by d²/(2|a|).
     """
     line = complex(parts.mean())
     found = []

@@ -138,7 +138,7 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Time for which a non-repeating motion is finally integrated with a tangent vector, to classify it.
+        # Duration of the final run with a tangent vector, which classifies a non-repeating motion.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
         first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s

@@ -385,7 +385,7 @@ def test_the_text_of_a_forged_note_is_not_shown(record, tmp_path):
         said = facts_text(recording, whole_check(path))
     assert "glue was dry" not in said
     assert "note: ✖ " in said
-    assert "changed since they were saved: results note" in said
+    assert "results changed since they were saved: note" in said
 
 
 def test_the_summary_shows_the_state_once(begin_recording, tmp_path):

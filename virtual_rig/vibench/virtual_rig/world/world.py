@@ -114,7 +114,7 @@ class ClosedLoop(Protocol):
 
     @property
     def is_on(self) -> bool:
-        """Whether the loop plays, or delayed voltages remain; otherwise the world does not call `move`."""
+        """Whether the loop, or its delayed output, drives the amplifier; if not, `move` is not called."""
 
     def move(
         self,
