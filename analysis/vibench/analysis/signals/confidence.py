@@ -89,11 +89,11 @@ _ONE_IN = 1e-3
 
 
 def chi_square_of(squared: Reals, n_eff: float) -> Reals:
-    """Return chi square (2 degrees of freedom) of a line's squared residual over its estimated variance.
+    """Return chi square (2 degrees of freedom) of a line from ``squared``, the sum of two squared residuals.
 
-    A squared residual over a variance from n averages follows F(2, 2 (n - 1)), not chi square. The value with
-    the same probability is nu ln(1 + squared / nu), nu = 2 (n - 1). It is twice the negative logarithm of
-    Student's likelihood, except for a factor (nu + 2) / nu.
+    Each residual (real and imaginary part, say) is divided by its standard deviation from n averages, so half
+    the sum follows F(2, nu), nu = 2 (n - 1). The chi square with the same probability is
+    nu ln(1 + squared / nu): twice the negative logarithm of Student's likelihood, times nu / (nu + 2).
     """
     freedom = max(2 * (n_eff - 1), 1.0)
     return np.asarray(freedom * np.log1p(squared / freedom))
