@@ -45,7 +45,7 @@ def test_ac_coupling_does_not_shift_the_phase(harmonic):
     assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j), rel=1e-12)
 
 
-def test_a_silent_base_gives_no_response_ratio():
+def test_the_response_ratio_is_zero_if_the_base_does_not_move():
     assert CHANNELS.transmissibility(np.zeros(3, complex), np.ones(3, complex), HERTZ, 3) == 0
 
 

@@ -92,14 +92,14 @@ class TestLoad:
         assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
         generator.close()
 
-    def test_a_wrong_load_at_the_panel_is_refused_with_advice(self, panel_load):
+    def test_a_wrong_load_set_on_the_panel_is_refused_with_advice(self, panel_load):
         with pytest.raises(
             SettingRefused, match=r"set to a load of 50 ohm.*factor of two.*high-z on its panel"
         ):
             AFG1022X.open(panel_load.config)
         assert not panel_load.is_on
 
-    def test_a_correct_load_at_the_panel_needs_no_confirmation(self, panel_load):
+    def test_a_correct_load_set_on_the_panel_needs_no_confirmation(self, panel_load):
         generator = AFG1022X.open(panel_load.config.model_copy(update={"load_ohm": 50.0}))
         assert generator.unconfirmed == ()
         generator.close()

@@ -53,7 +53,7 @@ def level_db(found, time_s, frequency_hz):
 
 
 @pytest.mark.parametrize("spacing", RowSpacing)
-def test_a_sine_has_its_power_over_the_window_bandwidth(request_, spacing):
+def test_the_density_of_a_sine_is_its_power_divided_by_the_window_bandwidth(request_, spacing):
     found = recording_spectrogram(replace(request_, spacing=spacing))
     bandwidth_hz = 1.5 / found.segment_s
     assert level_db(found, 1.5, 250.0) == pytest.approx(10 * np.log10(0.5**2 / 2 / bandwidth_hz), abs=0.1)

@@ -26,7 +26,7 @@ def analysis_of(folder):
     return analyse_files(recordings_in(folder), "dwells", Simulation.LEFT_OUT)
 
 
-def test_a_copy_of_a_recording_is_counted_once_and_named(dwells):
+def test_a_copy_of_a_recording_is_reported_and_not_counted(dwells):
     found = analysis_of(dwells)
     assert [each.name for each in found.facts] == ["weak"]
     said = "weak: copies: weak_copy.h5 has the same samples as weak.h5; it is counted once"

@@ -98,7 +98,7 @@ def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_motion_remainder_too_large_for_noise_is_not_counted_as_noise(tmp_path):
+def test_a_residual_too_large_for_noise_is_not_counted_as_noise(tmp_path):
     found = measure(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1).analysis.response
     assert np.isnan(found.rest_error_i)
     assert found.with_rest_as_noise(is_known_to_repeat=True) is found

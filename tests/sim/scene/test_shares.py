@@ -50,7 +50,7 @@ def test_chaos_without_escape_has_only_a_lower_bound_of_lifetime():
     assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
 
 
-def test_share_intervals_allow_unfinished_motions_to_exchange():
+def test_share_intervals_allow_unfinished_runs_to_change_their_motion():
     one, other = shares_of([Count(4, is_final=False), Count(4, is_final=False)])
     assert (one.low, one.high) == (other.low, other.high) == (0.0, 1.0)
     settled, *open_ones = shares_of([Count(8, is_final=True), *2 * [Count(4, is_final=False)]])

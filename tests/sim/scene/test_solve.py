@@ -234,7 +234,7 @@ def stiff_specimen():
 
 
 @pytest.mark.thorough
-def test_exchange_of_displacement_and_velocity_is_not_taken_for_growth():
+def test_perturbation_swinging_between_displacement_and_velocity_does_not_count_as_growing():
     slow = Scene(stiff_specimen(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)
     assert found.memory is StartMemory.KEPT
