@@ -152,7 +152,7 @@ def _run_in_words(run: ChainRun) -> str:
         return f"{run.cells} cells{where}: {run.outcome}, {run.elapsed_s:.1f} s"
     rates = run.impacts / run.observed_s
     return (
-        f"{run.cells} cells{where}: {across}impacts a second {rates[0]:.4g} to {rates[-1]:.4g}, mean energy "
-        f"{1e6 * run.energy_j[0]:.4g} to {1e6 * run.energy_j[-1]:.4g} µJ{exponent}; {run.outcome}, "
-        f"{run.elapsed_s:.1f} s"
+        f"{run.cells} cells{where}: {across}impacts a second {rates[0]:.4g} in the first cell, "
+        f"{rates[-1]:.4g} in the last; mean energy {1e6 * run.energy_j[0]:.4g} µJ in the first cell, "
+        f"{1e6 * run.energy_j[-1]:.4g} µJ in the last{exponent}; {run.outcome}, {run.elapsed_s:.1f} s"
     )

@@ -105,8 +105,8 @@ class LineController:
             return kind.model_validate_json(line)
         except (ValueError, RecursionError) as error:  # pydantic's validation error is a ValueError
             raise InstrumentError(
-                f"the program at {where} is not a controller of loop protocol {request.vibench_loop} "
-                f"({error}); correct controller.resource, or give the name of its driver"
+                f"the program at {where} does not speak loop protocol {request.vibench_loop} "
+                f"({error}); correct controller.resource, or name its driver in controller.driver"
             ) from error
 
 

@@ -27,8 +27,8 @@ def result_with(*ensemble, by_voltage=True, why=""):
         (result_with(GOOD), None, Agreement.YES, ""),
         (result_with(GOOD, OPEN), None, Agreement.YES, "1 of 2 quantities were compared"),
         (result_with(GOOD, BAD, OPEN), None, Agreement.NO, "outside of the simulated draws: Response I"),
-        (result_with(OPEN), None, Agreement.OPEN, "too few simulated draws have the measured kind of motion"),
-        (result_with(), None, Agreement.OPEN, "too few simulated draws have the measured kind of motion"),
+        (result_with(OPEN), None, Agreement.OPEN, "too few draws have the same kind of motion as measured"),
+        (result_with(), None, Agreement.OPEN, "too few draws have the same kind of motion as measured"),
         (
             result_with(GOOD, by_voltage=False),
             None,

@@ -28,5 +28,5 @@ class Link:
 )
 def test_an_invalid_report_line_raises_one_error(line):
     config = ControllerConfig(rate_hz=10_240, latency_s=3e-4, limit_v=2, source="test")
-    with pytest.raises(InstrumentError, match="is not a controller of loop protocol"):
+    with pytest.raises(InstrumentError, match="does not speak loop protocol"):
         LineController(Link(line), config)

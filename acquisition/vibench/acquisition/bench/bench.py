@@ -371,7 +371,7 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
-        note_open_bench(simulated + next(_instruments(rig)))  # several rigs may have the same name
+        note_open_bench(simulated + next(_instruments(rig)))  # the generator, as rig names may repeat
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)

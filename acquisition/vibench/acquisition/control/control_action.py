@@ -1,4 +1,4 @@
-"""Data exchanged between a run and its controller: actions, and the samples of each."""
+"""Data exchanged between a run and its controller: actions, and the samples of their phases."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class PhaseSamples:
 
 Result = TypeVar("Result")
 Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
-"""Generator that yields actions, is sent the samples of each, and returns a result."""
+"""Generator that yields actions, is sent the samples of each phase, and returns a result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
 """Samples that the controller receives after an action without a phase: none."""

@@ -77,7 +77,7 @@ class AFG1022X(ScpiInstrument):
         InstrumentError for another instrument. The output is then off, if the generator could be reached.
         """
         generator = cls(config)
-        leave = generator.disconnect  # another kind of instrument gets no further commands
+        leave = generator.disconnect  # only disconnect: no further commands to another kind of instrument
         try:
             generator._identify()
             leave = generator.close

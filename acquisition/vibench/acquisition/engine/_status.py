@@ -245,7 +245,7 @@ class EngineStatus(FrozenModel):
 
 
 # The live twin's process (decision 0044), started and ended by an engine, which never waits for it. It is a
-# viewer like any other (`vibench twin`): it requests samples, reports its results, and keeps no run alive.
+# viewer like any other (`vibench twin`): it requests samples and reports its results, but attends no run.
 # When it is too slow, it skips samples; the recording still contains them.
 
 ENDING_S = 2.0

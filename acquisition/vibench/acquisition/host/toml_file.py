@@ -54,7 +54,7 @@ MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = 
 def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     """Return the content of a file, converted to the current version.
 
-    Raises ConfigurationError when a later vibench wrote it, or the value is not a version.
+    Raises ConfigurationError when the file's version is not an integer from 1 to the current version.
     """
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:

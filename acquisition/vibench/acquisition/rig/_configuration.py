@@ -113,7 +113,7 @@ def highest_carried_hz(grid_rate_hz: float) -> float | None:
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest sample rate on a grid [samples/s]; None (no limit) on the default grid."""
+    """Return the highest sample rate on a simulation's time grid [samples/s]; None (no limit) by default."""
     return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
 
 

@@ -289,7 +289,7 @@ class Run(ClosedOnLeaving):
             self._drive = drive_for(self._bench, self._measurement)
             self._controller = controller_for(self._bench, self._measurement)
             if self._bench_check is LowLevelCheck.AT_LOW_LEVEL:
-                self._total_s += CHECK_S + self._drive.pause_s  # the signal is announced after the check
+                self._total_s += CHECK_S + self._drive.pause_s  # the drive gets its phases after the check
             if self._drive.is_commanded:
                 self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
             self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)

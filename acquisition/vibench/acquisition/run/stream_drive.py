@@ -181,7 +181,7 @@ class StreamDrive:
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Write in advance while an earlier phase plays; yield reading times until more samples fit."""
+        """Write ahead while an earlier phase plays; yield how long to read before more is written [s]."""
         self._is_playing = True
         full_vpp = self._amplitude_vpp * full_level(phase.play)
         yield from self._split_duration(phase.duration_s, full_vpp * phase.end_level)

@@ -304,9 +304,9 @@ def withdraw(program: Program) -> None:
 
 
 class _StopTargets:
-    """List of what a stop from outside must end in this process: an engine, runs, checks.
+    """Activities of this process that a stop from outside ends: an engine, runs, checks.
 
-    The first entry is announced for the whole process until it ends; an engine thus also covers its runs.
+    Only the oldest one is announced, but a stop ends all; an engine's announcement thus covers its runs.
     """
 
     def __init__(self) -> None:

@@ -35,7 +35,7 @@ class Points(Tabular):
     """Standard deviation of the noise of displacement and velocity, divided likewise, shape (2,)."""
 
     def __post_init__(self) -> None:
-        """Raise InvalidRequest for other shapes or invalid noise, UnusableData for NaN points."""
+        """Raise InvalidRequest for wrong shapes or invalid noise, UnusableData for non-finite points."""
         points, noise = np.shape(self.value), np.shape(self.noise)
         if len(points) != _TABLE or noise != points[1:]:
             raise InvalidRequest(

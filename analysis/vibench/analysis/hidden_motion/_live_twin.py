@@ -124,7 +124,7 @@ class ChangeWatch:
         self.has_changed = False
 
     def take(self, level: float) -> bool:
-        """Add the level of a block, infinite without a track; return whether to raise the alarm."""
+        """Add a block's innovation level, infinite if not tracked; return whether to raise the alarm."""
         if self.usual is None:
             if math.isfinite(level):
                 self._learnt.append(level)
@@ -421,7 +421,7 @@ class LiveTwin:
         if not is_out and squares.size < self._block // 4:
             return
         self._level = np.inf if is_out else float(squares.mean())
-        # Before any parameter is known, a misfit means a wrong description, not a changed specimen.
+        # Before any parameter is known, a misfit may be a wrong description, not a changed specimen.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             sentences.append(

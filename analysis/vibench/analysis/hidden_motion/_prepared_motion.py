@@ -193,7 +193,7 @@ def require_channels(name: str, roles: Collection[str]) -> None:
 
 
 def white_noise(samples: Samples) -> float:
-    """Estimate the rms of white noise from the quietest high band; the median rejects impacts."""
+    """Estimate the rms of white noise in the quieter of two high-frequency bands; medians reject impacts."""
     count = samples.size // _SEGMENT
     every = -(-count // _MOST_SEGMENTS)
     pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT)[::every] * np.hanning(_SEGMENT)

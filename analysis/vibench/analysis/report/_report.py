@@ -497,7 +497,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}{known}"
     compared, every = sum(each.compared > 0 for each in overlay.ensemble), len(overlay.ensemble)
     if not compared:
-        return Agreement.OPEN, "too few simulated draws have the measured kind of motion"
+        return Agreement.OPEN, "too few draws have the same kind of motion as measured"
     return Agreement.YES, "" if compared == every else f"{compared} of {every} quantities were compared"
 
 

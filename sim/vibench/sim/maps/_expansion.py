@@ -57,7 +57,7 @@ class MapPoints(Points):
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Refuse such maps here and not in the plan, because files of earlier versions contain them.
+        # Refuse random starts with given starts here, not in `Map`: files of earlier versions have both.
         of_start = [each.field for each in plan.varying if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(

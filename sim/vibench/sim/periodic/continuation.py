@@ -52,7 +52,7 @@ class ArcEnd(StrEnum):
 
     REACHED_BOUND = "the parameter reached an end of its range"
     CLOSED = "the branch closed on itself: an isolated one"
-    JOINED = "the motion reached one with a shorter period or a higher symmetry, whose branch continues"
+    JOINED = "the branch ended at a motion with a shorter period or a higher symmetry"
     TOO_MANY_POINTS = "more points than allowed: raise most_points, or lengthen the longest step"
     OUT_OF_TIME = "the requested time was over"
     STEP_TOO_SHORT = (

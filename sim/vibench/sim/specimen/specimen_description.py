@@ -311,7 +311,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     if BASE not in table:
         return table
     if depth > DEEPEST:
-        raise ValueError(f"a specimen is based on {table[BASE]!r}, which is based on itself; give another")
+        raise ValueError(f"{table[BASE]!r} is based on itself (perhaps through others); give another {BASE}")
     specimen = str(table.pop(BASE))
     known = _shipped_texts()
     if specimen in known:

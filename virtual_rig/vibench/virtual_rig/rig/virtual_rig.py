@@ -38,9 +38,9 @@ class DiskFaults(Enum):
     """Whether a script may cause disk faults."""
 
     PLAYED = auto()
-    """This process records; the faults of a script act on its disk."""
+    """Allowed: this process records, so the script's disk faults act on its recording."""
     REFUSED = auto()
-    """Another process records; this process cannot cause faults on its disk."""
+    """Not allowed: another process records, and this one cannot cause faults on its disk."""
 
 
 class VirtualRig:
