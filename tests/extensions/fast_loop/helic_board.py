@@ -148,7 +148,7 @@ class HelicBoard:
         return self._client is not None or self._was_enabled
 
     @contextmanager
-    def answering(self):
+    def hold_state(self):
         with self._turn:
             yield self._now
 

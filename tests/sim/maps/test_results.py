@@ -93,7 +93,7 @@ def test_a_basin_map_distinguishes_attractors_that_return_after_a_small_kick():
 
 
 def test_kick_stability_requires_a_basin_map(adaptive):
-    with pytest.raises(InvalidStudy, match="over the start alone"):
+    with pytest.raises(InvalidStudy, match="that varies only the start"):
         kick_stability(adaptive)
     with pytest.raises(InvalidStudy, match="-3 kicks were requested; give 1 or more"):
         kick_stability(adaptive, kicks=-3)
