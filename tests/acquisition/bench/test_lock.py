@@ -77,17 +77,17 @@ def test_a_second_program_is_refused_until_the_first_ends(user, first, second):
 
 
 @pytest.mark.parametrize(
-    "resource",
+    ("resource", "other"),
     [
-        "USB0::1689::851::{}::INSTR",
-        "usb::0x699::0x0353::{}::0::instr",
+        ("USB0::0x0699::0x0353::C012345::INSTR", "USB0::1689::851::C012345::INSTR"),
+        ("USB0::0x0699::0x0353::C012345::INSTR", "usb::0x699::0x0353::C012345::0::instr"),
+        ("TCPIP0::127.0.0.1::5025::SOCKET", "TCPIP::localhost::5025::SOCKET"),
     ],
 )
-def test_one_generator_under_two_names_has_one_lock(user, resource):
-    serial = "C012345"
-    first = generator(resource=f"USB0::0x0699::0x0353::{serial}::INSTR")
+def test_one_generator_under_two_names_has_one_lock(user, resource, other):
+    first = generator(resource=resource)
     daq = first.daq.model_copy(update={"server": "another:31763"})
-    second = generator(resource=resource.format(serial)).model_copy(update={"daq": daq})
+    second = generator(resource=other).model_copy(update={"daq": daq})
     with closing(BenchLock.of(first)), pytest.raises(InstrumentBusy, match="in use by process"):
         BenchLock.of(second)
 

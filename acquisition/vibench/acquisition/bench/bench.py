@@ -128,7 +128,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 def _plain(resource: str) -> str:
     """Return a VISA name without its optional parts, and with decimal numbers."""
-    kind, *others = resource.upper().split("::")
+    kind, *others = resource.upper().replace("::LOCALHOST::", "::127.0.0.1::").split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(
         [re.sub(r"(?<=\D)0$", "", kind), *(each for each in numbers if each not in ("0", "INST0"))]
