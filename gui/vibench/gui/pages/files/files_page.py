@@ -283,6 +283,7 @@ class FilesPage(Page):
         browser = ScrollArea("List of recordings", self._browser())
         parts.show_parts(browser, ScrollArea("Open recording", self._viewer()), (200, 600))
         fill_box(QVBoxLayout(self), parts)
+        QWidget.setTabOrder(self._note, self.table)  # from the table, Tab leads to the histories
         self.time_histories.range_changed.connect(self._say_view)
         self.time_histories.markers.moved.connect(self._say_view)
 
