@@ -485,6 +485,8 @@ def campaign(options: argparse.Namespace, folder: Path) -> Iterable[CellResult]:
         for attempt in range(3):  # on a busy computer a check may fail, or a state may be missed
             place = folder / f"{at}-{attempt}"
             place.mkdir()
+            # A killed program stays announced until its own generator, which is gone with its rig, is opened.
+            os.environ["VIBENCH_STATE_DIR"] = str(place / "state")
             # A new rig each time, because a killed client leaves its task in the old one.
             with VirtualRig(wall_rig()) as virtual:
                 laboratory = Laboratory(virtual, place, DEAD_MAN_S if options.dead_man else None)
