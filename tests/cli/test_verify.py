@@ -62,7 +62,7 @@ def point_outside(path):
         where = [(str(path.with_name("passwd")), 0, 2000)]
         made = file.create_dataset("m0_velocity", shape=(500,), dtype="<i4", external=where)
         made.attrs.update(kept)
-        # Whoever forges samples can also forge their checksum.
+        # A person who forges samples can also forge their checksum.
         made.attrs["sha256"] = np.bytes_(hashlib.sha256(SECRET[:2000]).hexdigest())
 
 

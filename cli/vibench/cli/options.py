@@ -231,7 +231,7 @@ _WHOLE = 1000
 
 
 class SectionedGroup(TyperGroup):
-    """Group whose help lists its commands under headings, each with the first line of its own help."""
+    """Group whose help lists its commands under headings, each command with the first line of its help."""
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
         """Write a section of the command list for each heading."""

@@ -63,7 +63,7 @@ def _fields(
 
 
 FOLDER = Path(__file__).parent / "libraries"
-"""Folder of the compiled libraries ``engine-FAMILY-DIGEST.EXT``; DIGEST is that of the native sources."""
+"""Folder of the compiled libraries ``engine-FAMILY-DIGEST.EXT``; DIGEST is a hash of the native sources."""
 CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Build script; exists in a checkout, but not in an installed wheel."""

@@ -52,7 +52,7 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return a sum of powers over the magnitude of its largest term; the sign is that of the sum."""
+    """Return a sum of powers over the magnitude of its largest term; the sum keeps its sign."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 

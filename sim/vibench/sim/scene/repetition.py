@@ -279,7 +279,7 @@ class Pace:
 def pace_of(
     specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
 ) -> Pace:
-    """Return time scales and tolerances; ``slowest_rate`` is that of the slowest mode, <= 0 [1/s]."""
+    """Return time scales and tolerances; ``slowest_rate`` is the rate of the slowest mode, <= 0 [1/s]."""
     slowest_s = min(longest_s / FEWEST_TIMES, MOST_STATES / FEWEST_TIMES / frequency_hz)
     fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))

@@ -26,8 +26,8 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the stricter run. For *quick*, a hundredth of its own tolerance would not suffice, because
-collisions in closed form are more accurate than that."""
+"""Tolerance of the stricter run. It must be far below the error of collisions in closed form, which are more
+accurate than a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4

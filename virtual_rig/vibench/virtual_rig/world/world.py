@@ -275,7 +275,7 @@ class World:
             self._cables[physical_channel] = self._plan.get(physical_channel, OPEN_INPUT)
 
     def disconnect(self, physical_channel: str) -> None:
-        """Disconnect an input; the input then measures zero, or the voltage of its own excitation."""
+        """Disconnect an input; then it measures zero, or the voltage of its sensor supply."""
         with self._turn:
             self._cables[physical_channel] = OPEN_INPUT
 
