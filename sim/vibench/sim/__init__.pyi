@@ -86,7 +86,18 @@ from .scene.solve import (
     solve_scene as solve_scene,
 )
 from .specimen.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
-from .specimen.contact_law import CONTACT_LAWS as CONTACT_LAWS, ContactLaw as ContactLaw
+from .specimen.contact_laws import (
+    CONTACT_LAWS as CONTACT_LAWS,
+    ContactLaw as ContactLaw,
+    Elasticity as Elasticity,
+    Hertz as Hertz,
+    HuntCrossley as HuntCrossley,
+    LinearGap as LinearGap,
+    NoContact as NoContact,
+    PowerLaw as PowerLaw,
+    RigidStops as RigidStops,
+    hertz_stiffness as hertz_stiffness,
+)
 from .specimen.drive import (
     Drive as Drive,
     Harmonic as Harmonic,
@@ -99,18 +110,12 @@ from .specimen.frozen_model import (
     NumberWith as NumberWith,
     number_of as number_of,
 )
-from .specimen.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
-from .specimen.hunt_crossley import HuntCrossley as HuntCrossley
-from .specimen.linear_gap import LinearGap as LinearGap
 from .specimen.modes import (
     BaseResponse as BaseResponse,
     base_response as base_response,
     base_transmissibility as base_transmissibility,
 )
-from .specimen.no_contact import NoContact as NoContact
 from .specimen.outcome import Outcome as Outcome
-from .specimen.power_law import PowerLaw as PowerLaw
-from .specimen.rigid_stops import RigidStops as RigidStops
 from .specimen.specimen import Specimen as Specimen, bound_matrices as bound_matrices, gong2025 as gong2025
 from .specimen.specimen_description import (
     USUAL_SPECIMEN as USUAL_SPECIMEN,

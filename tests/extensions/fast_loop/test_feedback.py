@@ -12,7 +12,7 @@ from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
-from vibench.sim.specimen.power_law import PowerLaw
+from vibench.sim.specimen.contact_laws import PowerLaw
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
 from vibench_fast_loop.law import (
     NOISE,

@@ -7,8 +7,8 @@ import pytest
 
 from vibench.sim import FrequencyPath, integrate, periodic_orbit
 from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shoot_branches
+from vibench.sim.specimen.contact_laws import PowerLaw
 from vibench.sim.specimen.drive import Harmonic
-from vibench.sim.specimen.power_law import PowerLaw
 from vibench.sim.specimen.specimen import gong2025, state_scales
 
 PERIODS = 12

@@ -9,7 +9,7 @@ import pytest
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
 from vibench.sim.engine.batch import follow_batch, is_batchable
 from vibench.sim.engine.run import NativeRun, RunRecord
-from vibench.sim.specimen.hertz import Hertz
+from vibench.sim.specimen.contact_laws import Hertz
 from vibench.sim.specimen.specimen import Specimen
 
 STANDARD = Accuracy.STANDARD.tolerance

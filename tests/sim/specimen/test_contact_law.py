@@ -8,9 +8,13 @@ from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
-from vibench.sim.specimen.contact_law import CONTACT_LAWS, ContactLaw, law_by_name
-from vibench.sim.specimen.linear_gap import fit_linear_gap
-from vibench.sim.specimen.power_law import fit_power_law
+from vibench.sim.specimen.contact_laws import (
+    CONTACT_LAWS,
+    ContactLaw,
+    fit_linear_gap,
+    fit_power_law,
+    law_by_name,
+)
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6

@@ -5,7 +5,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, Specimen, gong2025
-from vibench.sim.specimen.hertz import Elasticity, hertz_stiffness
+from vibench.sim.specimen.contact_laws import Elasticity, hertz_stiffness
 
 
 def test_the_materials_of_the_paper_give_its_contact_stiffness():

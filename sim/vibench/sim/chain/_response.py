@@ -12,9 +12,9 @@ from ..engine.run import MAX_IMPACT_RATE_HZ, Watch
 from ..exponents.tangent_run import block_mean
 from ..motion.response import Response, steady_response, whole_periods
 from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..specimen.contact_laws import PowerLaw
 from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
-from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats
 from ..specimen.stops import member

@@ -13,7 +13,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ..specimen.hertz import Hertz
+from ..specimen.contact_laws import Hertz
 from ..specimen.modes import modal_form
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..specimen.accuracy import Accuracy
+from ..specimen.contact_laws import PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.modes import state_matrix
 from ..specimen.outcome import Outcome
-from ..specimen.power_law import PowerLaw
-from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen, gong2025
 from ..specimen.state import Y, Z
 from ..specimen.stops import require_positive

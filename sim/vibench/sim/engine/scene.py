@@ -9,13 +9,9 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from ..specimen.contact_laws import Hertz, LinearGap, NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
-from ..specimen.hertz import Hertz
-from ..specimen.linear_gap import LinearGap
 from ..specimen.modes import ModalForm, bound_motion, harmonic_motion, modal_form
-from ..specimen.no_contact import NoContact
-from ..specimen.power_law import PowerLaw
-from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen
 from ..specimen.state import Y, Z
 from .library import Engine, Structure

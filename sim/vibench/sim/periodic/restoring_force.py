@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..specimen.no_contact import NoContact
-from ..specimen.power_law import PowerLaw
-from ..specimen.rigid_stops import RigidStops
+from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
 

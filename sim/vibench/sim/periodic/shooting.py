@@ -17,11 +17,9 @@ from ..engine.run import start_motion
 from ..motion.integrate import Trajectory, integrate
 from ..motion.poincare import flow_derivative
 from ..specimen.accuracy import Accuracy
+from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
-from ..specimen.no_contact import NoContact
 from ..specimen.outcome import Outcome
-from ..specimen.power_law import PowerLaw
-from ..specimen.rigid_stops import RigidStops
 from ..specimen.specimen import Specimen, state_scales
 from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
 from ..specimen.stops import member

@@ -21,11 +21,9 @@ from ..engine.run import (
     most_impacts,
     start_motion,
 )
-from ..specimen.contact_law import ContactLaw
+from ..specimen.contact_laws import ContactLaw, LinearGap, PowerLaw
 from ..specimen.drive import WHOLE, Harmonic
-from ..specimen.linear_gap import LinearGap
 from ..specimen.outcome import Outcome
-from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen, energy_metric, state_scales
 from ..specimen.state import Floats
 

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..specimen.contact_laws import NoContact, PowerLaw
 from ..specimen.drive import Harmonic
 from ..specimen.modes import harmonic_motion, modal_form
-from ..specimen.no_contact import NoContact
-from ..specimen.power_law import PowerLaw
 from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats, X, Y, Z
 from .followed_run import whole_periods

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..specimen.accuracy import Accuracy
-from ..specimen.contact_law import ContactLaw
-from ..specimen.power_law import PowerLaw
+from ..specimen.contact_laws import ContactLaw, PowerLaw
 from ..specimen.specimen import Specimen
 from ..specimen.state import Floats
 from .followed_run import Stretch, states_of

@@ -12,9 +12,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .contact_law import ContactLaw, law_by_name
+from .contact_laws import ContactLaw, Elasticity, hertz_stiffness, law_by_name
 from .drive import Harmonic
-from .hertz import Elasticity, hertz_stiffness
 from .state import Floats
 from .stops import Strict
 

@@ -31,9 +31,8 @@ from pydantic import (
     model_validator,
 )
 
-from .contact_law import law_by_name
+from .contact_laws import Elasticity, hertz_stiffness, law_by_name
 from .frozen_model import FrozenModel
-from .hertz import Elasticity, hertz_stiffness
 from .specimen import Gaps, Specimen, Triple
 from .toml_table import fault_in_words, toml_table
 
