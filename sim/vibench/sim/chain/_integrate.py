@@ -188,6 +188,7 @@ def integrate_chain(
     ensure that no contact is missed. Contacts, in any number of cells at once, are integrated with the
     tolerance of ``accuracy``. Sampling does not change the time steps. A single cell is integrated by
     `vibench.sim.motion`. Raises ValueError when an argument is not allowed, the run would take hours, or the
+    drive ends before the run.
 
     Parameters
     ----------
