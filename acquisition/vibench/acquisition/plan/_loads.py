@@ -74,7 +74,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
         _BroadPlay(
             model,
             terminal_v,
-            partial(_of_waveform, each, number),
+            partial(_of_waveform, held_lines(each.values, HELD_SPANS), each.repetition_hz, number),
             np.arange(1.0, len(each.values) // 2) * float(each.repetition_hz),
         )
         for number, each in enumerate(waveforms)
@@ -147,9 +147,8 @@ def _band_hz(source: SampleSource) -> Floats:
     return np.linspace(source.band_start_hz, source.band_stop_hz, BAND_POINTS, dtype=np.float64)
 
 
-def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
-    lines = held_lines(waveform.values, HELD_SPANS)
-    frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
+def _of_waveform(lines: ComplexArray, repetition_hz: float, number: int, transfer: Transfer) -> Load:
+    frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(repetition_hz)
     answer = lines * transfer(frequency_hz)
     # Use twice the samples that the highest spectral line needs, so that no peak between samples is missed.
     points = 4 * len(lines)

@@ -7,6 +7,7 @@ the sum of the motion without stops and the response to this force.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,12 +30,12 @@ class LinearMotion:
     per_newton: ComplexArray
     """Motion per newton of stop force, which acts on m1 and oppositely on m2, shape (n, 5)."""
 
-    @property
+    @cached_property
     def lever(self) -> ComplexArray:
         """Motion per metre of p, if the stops impose p, shape (n, 5)."""
         return self.per_newton / self.per_newton[:, [_P]]
 
-    @property
+    @cached_property
     def stuck_motion(self) -> ComplexArray:
         """Motion per volt while m1 sticks to m2, shape (n, 5)."""
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
