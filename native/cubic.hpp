@@ -161,13 +161,14 @@ template <class T, class Stops> class CubicRun {
       : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record) {}
 
   // Advances from `begin` to `end` [s] after the start of an interval; `base` contains the terms of U.
-  Outcome advance(const double *base, double begin, double end) {
+  INLINE Outcome advance(const double *base, double begin, double end) {
     bool is_whole = begin == 0.0 && end >= t.interval * ALMOST;
     int64_t pieces = is_whole ? t.pieces : -int64_t(whole_part((begin - end) / t.length));
     double length = is_whole ? t.length : (end - begin) / double(pieces);
     CubicForce<double> force = base_force(base, t.specimen);
     for (int64_t n = 0; n < pieces; n++) {
-      Outcome outcome = pass(shifted(force, begin + double(n) * length), length, is_whole);
+      double since = begin + double(n) * length;
+      Outcome outcome = pass(since == 0.0 ? force : shifted(force, since), length, is_whole);
       if (outcome != REACHED_END) return outcome;
     }
     return REACHED_END;
@@ -198,7 +199,7 @@ template <class T, class Stops> class CubicRun {
     return STALLED;
   }
 
-  Outcome pass(const CubicForce<double> &force, double length, bool is_whole) {
+  INLINE Outcome pass(const CubicForce<double> &force, double length, bool is_whole) {
     if (record.steps_left-- <= 0) return TOO_LONG;
     if (record.samples_kept < record.sample_room) keep_samples_of(force, length);
     T tau = constant<T>(0.0);
@@ -221,7 +222,7 @@ template <class T, class Stops> class CubicRun {
 
   // Returns a bound of |d2p/dt2| over one piece in flight, from the energy E at its start. Under a base force
   // f, d/dt sqrt(2E) <= |f| / sqrt(m0), and damping only reduces E.
-  template <class F> double acceleration_bound(const CubicForce<F> &force) const {
+  template <class F> INLINE double acceleration_bound(const CubicForce<F> &force) const {
     const Specimen &s = t.specimen;
     double x = value_of(m.at[X]), y = value_of(m.at[Y]), z = value_of(m.at[Z]), h = t.length;
     double vx = value_of(m.at[VX]), vy = value_of(m.at[VY]), vz = value_of(m.at[VZ]), push = 0.0;
@@ -232,7 +233,7 @@ template <class T, class Stops> class CubicRun {
   }
 
   // Advances a flight over a whole piece. If a touch cannot be excluded, returns false and changes nothing.
-  bool cross(const CubicForce<double> &force) {
+  INLINE bool cross(const CubicForce<double> &force) {
     if (m.contact.side != 0.0) return false;
     double margin = acceleration_bound(force) * t.length * t.length / 8.0;
     double low = margin - t.specimen.lower_gap, high = t.specimen.upper_gap - margin;
