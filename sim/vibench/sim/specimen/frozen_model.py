@@ -1,6 +1,8 @@
 """Base class of all models that are read from TOML or JSON files."""
 
 import re
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
@@ -52,22 +54,38 @@ def _time(given: object) -> object:
     return given
 
 
-def _with_numbers_only(schema: Any) -> Any:
-    """Return the core schema with strict types: only numbers for numbers, only booleans for booleans."""
+def _entries(count: int, given: object) -> object:
+    if isinstance(given, list) and len(given) != count:
+        raise PydanticCustomError("tuple_length", f"give {count} entries, not {len(given)}")
+    return given
+
+
+def _check_of(schema: Any) -> Callable[[object], object] | None:
     match schema:
-        case {"type": "float" | "int" | "datetime"} | {"type": "literal", "expected": [int(), *_]}:
+        case {"type": "datetime"}:
+            return _time
+        case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
             # pydantic's strict mode is not used: it refuses 1e3 for an integer, and numpy's numbers.
-            check = _time if schema["type"] == "datetime" else _number
-            return core_schema.no_info_before_validator_function(check, {**schema})
+            return _number
+        case {"type": "tuple", "items_schema": items} if "variadic_item_index" not in schema:
+            return partial(_entries, len(items))
+        case _:
+            return None
+
+
+def _with_checks(schema: Any) -> Any:
+    """Return the core schema with strict types (only numbers for numbers) and checked lengths of lists."""
+    match schema:
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:
             # In TOML and JSON all keys of a table are text, even those of type int.
-            return {**schema, "values_schema": _with_numbers_only(values)}
+            return {**schema, "values_schema": _with_checks(values)}
         case dict():
-            return {key: _with_numbers_only(value) for key, value in schema.items()}
+            inner, check = {key: _with_checks(value) for key, value in schema.items()}, _check_of(schema)
+            return core_schema.no_info_before_validator_function(check, inner) if check else inner
         case list():
-            return [_with_numbers_only(value) for value in schema]
+            return [_with_checks(value) for value in schema]
         case _:
             return schema
 
@@ -84,5 +102,5 @@ class FrozenModel(BaseModel):
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the core schema of the model with the check of number types."""
-        schema: CoreSchema = _with_numbers_only(handler(source))
+        schema: CoreSchema = _with_checks(handler(source))
         return schema
