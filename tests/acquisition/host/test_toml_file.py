@@ -1,5 +1,6 @@
 """Errors in a TOML file name the keys of the file."""
 
+import re
 from typing import Annotated
 
 import pytest
@@ -95,7 +96,8 @@ def test_common_first_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_path,
     [
         ("few = []\n", "few = []: give 1 or more entries, not 0"),
         ("few = [1.0, 2.0, 3.0]\n", "few = [1.0, 2.0, 3.0]: give 2 entries or fewer, not 3"),
-        ("pair = [1.0, 2.0, 3.0]\n", "pair = [1.0, 2.0, 3.0]: give 2 entries or fewer, not 3"),
+        ("pair = [1.0, 2.0, 3.0]\n", "pair = [1.0, 2.0, 3.0]: give 2 entries, not 3"),
+        ("pair = [1.0]\n", "pair = [1.0]: give 2 entries, not 1"),
         ('label = ""\n', "label = '': give text of 1 or more letters"),
         ('label = "abcd"\n', "label = 'abcd': give 3 letters or fewer"),
         ("number = 2.5\n", "number = 2.5: give a whole number"),
@@ -126,3 +128,29 @@ def test_a_binary_file_is_refused_without_advice_to_save_it_as_text(tmp_path, co
     path.write_bytes(content)
     with pytest.raises(ConfigurationError, match=f"{said}; give a TOML file, saved as UTF-8"):
         load_campaign(path)
+
+
+DWELL = 'excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, duration_s = 1 }'
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (
+            ("frequency_hz", "frequencyhz"),
+            r"\.frequencyhz is not a known key \(did you mean frequency_hz\?\)",
+        ),
+        (("duration_s", "duration_ms"), r"\.duration_ms is not a known key \(did you mean duration_s\?\)"),
+        (
+            ("[[measurements]]", "[[measurement]]"),
+            r"measurement is not a known key \(did you mean measurements\?",
+        ),
+        (("excitation", "exitation"), r"measurements\.0\.exitation .*\(did you mean excitation\?\)"),
+        (('"m"', '"m"\ncolour = 1'), "colour is not a known key: check its spelling"),
+    ],
+)
+def test_an_unknown_key_is_refused_with_the_similar_known_key_only(tmp_path, change, told):
+    text = f'name = "c"\n[[measurements]]\nname = "m"\n{DWELL}\n'
+    said = refusal(load_campaign, tmp_path / "campaign.toml", text.replace(*change))
+    assert re.search(told, said)
+    assert "missing" not in said

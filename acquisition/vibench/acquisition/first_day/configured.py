@@ -328,7 +328,7 @@ def _require_within_bounds(text: str, key: str) -> None:
     try:
         Rig.model_validate(content)
     except ValidationError as error:
-        if wrong := complaints(error, content, place_of(content, key)):
+        if wrong := complaints(error, content, Rig, place_of(content, key)):
             raise ConfigurationError(wrong) from error
     except ArithmeticError as error:
         raise ConfigurationError(

@@ -1,5 +1,6 @@
 """Functions that make text from a file, a folder or an instrument printable and short."""
 
+from collections.abc import Sequence
 from unicodedata import category
 
 LONGEST_CLAUSE = 400
@@ -37,3 +38,9 @@ def shorten(text: str, longest: int = LONGEST_CLAUSE) -> str:
         return text
     kept = (longest - 3) // 2
     return f"{text[:kept]}...{text[len(text) - kept :]}"
+
+
+def leading(texts: Sequence[str], most: int = 3) -> list[str]:
+    """Return the first ``most`` texts, followed by ``and N more`` if there are more."""
+    more = [f"and {len(texts) - most} more"] if len(texts) > most else []
+    return [*texts[:most], *more]

@@ -4,9 +4,10 @@ import json
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date
+from difflib import get_close_matches
 from itertools import compress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -19,7 +20,7 @@ from vibench.sim import (
 from vibench.sim.operating_system.this import replace_file
 
 from ..errors import ConfigurationError
-from .printable import shorten
+from .printable import leading, shorten
 from .schema import FORMAT, VERSION, schema_line
 from .shipped import shipped_folder
 
@@ -76,7 +77,7 @@ def validate(content: dict[str, Any], model: type[Model], origin: str, folder: P
     try:
         return model.model_validate(content, context={"folder": folder})
     except ValidationError as error:
-        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
+        raise ConfigurationError(f"{origin}: {complaints(error, content, model)}") from error
     except ArithmeticError as error:
         raise ConfigurationError(
             f"{origin}: a number is too large or too small to compute with ({error}); correct it"
@@ -92,7 +93,7 @@ LONGEST_SENTENCE = 1600
 Place = tuple[str | int, ...]
 
 
-def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
+def complaints(error: ValidationError, content: object, model: type[BaseModel], within: Place = ()) -> str:
     """Return a clause for each fault, one for all missing keys, and one for all unknown keys.
 
     Parameters
@@ -101,21 +102,44 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
         Error of the model.
     content
         Content of the file, to distinguish its keys from the type names that pydantic adds to paths.
+    model
+        The model, for keys similar to an unknown one.
     within
         Path in the file; faults outside this path are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
-    missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
-    unknown = _key_clause(
-        details,
-        "extra_forbidden",
+    unknown = [each["loc"] for each in details if each["type"] == "extra_forbidden"]
+    similar = {place: near for place in unknown if (near := _similar_key(place, model))}
+    intended = {(*place[:-1], near) for place, near in similar.items()}
+    absent = [each["loc"] for each in details if each["type"] == "missing" and each["loc"] not in intended]
+    other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
+    other += [f"{_key(place)} is not a known key (did you mean {near}?)" for place, near in similar.items()]
+    missing = _key_clause(absent, "is missing: it is required", "are missing: they are required")
+    strange = _key_clause(
+        [place for place in unknown if place not in similar],
         "is not a known key: check its spelling and unit suffix, or remove it",
         "are not known keys: check their spelling and unit suffixes, or give another file",
     )
-    other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
-    if len(other) > MOST_CLAUSES:
-        other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
-    return shorten("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
+    return shorten("; ".join([*leading(other, MOST_CLAUSES), *missing, *strange]), LONGEST_SENTENCE)
+
+
+def _similar_key(place: Place, model: type[BaseModel]) -> str:
+    """Return the key of the model that is most similar to the unknown key at `place`; empty if none is."""
+    models = [model]
+    for part in place[:-1]:
+        fields = [each.model_fields[part] for each in models if part in each.model_fields]
+        tagged = [each for each in models if part in get_args(each.__annotations__.get("kind"))]
+        models = [each for field in fields for each in _models(field.annotation)] or tagged or models
+    known = sorted({key for each in models for key in each.model_fields})
+    return next(iter(get_close_matches(str(place[-1]), known, 1)), "")
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models in the type of a field."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for each in get_args(annotation):
+        yield from _models(each)
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:
@@ -171,21 +195,13 @@ def _closeness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
-def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:
-    keys = [_key(each) for each in details if each["type"] == kind]
-    if len(keys) > MOST_KEYS:
-        keys = [*keys[:MOST_KEYS], f"{len(keys) - MOST_KEYS} more"]
-    match keys:
-        case []:
-            return ()
-        case [key]:
-            return (f"{key} {of_one}",)
-        case _:
-            return (f"{', '.join(keys)} {of_many}",)
+def _key_clause(places: Sequence[Place], of_one: str, of_many: str) -> tuple[str, ...]:
+    keys = leading([_key(each) for each in places], MOST_KEYS)
+    return (f"{', '.join(keys)} {of_one if len(keys) == 1 else of_many}",) if keys else ()
 
 
-def _key(detail: Any) -> str:
-    return shorten(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
+def _key(place: Place) -> str:
+    return shorten(".".join(str(part) for part in place), 120) or "the whole file"
 
 
 def _complaint(detail: Any) -> str:
@@ -197,7 +213,7 @@ def _complaint(detail: Any) -> str:
             given = ""
         case value:
             given = f" = {_text_of(value)}"
-    return f"{_key(detail)}{given}: {reason[0].lower()}{reason[1:]}"
+    return f"{_key(detail['loc'])}{given}: {reason[0].lower()}{reason[1:]}"
 
 
 def _text_of(value: object) -> str:
@@ -265,9 +281,7 @@ def _table(content: Table, path: tuple[str, ...]) -> Iterator[str]:
 
 def _is_nested(value: Value) -> bool:
     match value:
-        case dict():
-            return True
-        case [dict(), *_]:
+        case dict() | [dict(), *_]:
             return True
         case _:
             return False

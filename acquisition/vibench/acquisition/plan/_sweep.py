@@ -301,7 +301,7 @@ def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitat
     try:
         turned = excitation.turned(way)
     except ValidationError as error:
-        raise ValueError(f"{name}: {complaints(error, excitation.model_dump())}") from error
+        raise ValueError(f"{name}: {complaints(error, excitation.model_dump(), type(excitation))}") from error
     if turned is None:
         raise ValueError(
             f"{name}: direction = {way.value!r} has no meaning for the excitation {excitation.kind!r} alone; "
@@ -331,7 +331,7 @@ def _measurement(content: Mapping[str, Any], name: str) -> Measurement:
     try:
         return Measurement.model_validate(content)
     except ValidationError as error:
-        raise ValueError(f"{name}: {complaints(error, content)}") from error
+        raise ValueError(f"{name}: {complaints(error, content, Measurement)}") from error
 
 
 def _words(axes: Any) -> str:
