@@ -11,6 +11,7 @@ from typing import assert_never
 
 from ..bench.bench import Bench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
+from ..host.printable import leading
 from ..plan import Campaign, Measurement, Point, distinct_drives, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run.drive import drive_for
@@ -29,6 +30,8 @@ from ._journal import (
     read_journal,
 )
 
+MOST_NAMES = 12
+"""Largest number of measurements named in one error."""
 PROGRAM_ENDED = "the program ended during the recording"
 
 
@@ -148,7 +151,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
 
     Raises LimitExceeded, or ConfigurationError when the vibrometer cannot measure at a point of a scan.
     """
-    complaints: dict[str, None] = {}
+    complaints: dict[str, str] = {}
     for point in points:
         rig_at(bench.rig, point.measurement)
     for point in distinct_drives(points):
@@ -156,9 +159,11 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
             require_within_limits(point.measurement, bench.rig)
             drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
         except LimitExceeded as error:
-            complaints[str(error)] = None
+            complaints[point.name] = str(error)
     if complaints:
-        raise LimitExceeded(" ".join(complaints))
+        _, *others = leading(list(complaints), MOST_NAMES)
+        also = f" Other measurements beyond a limit: {', '.join(others)}." if others else ""
+        raise LimitExceeded(next(iter(complaints.values())) + also)
 
 
 def planned_recordings(

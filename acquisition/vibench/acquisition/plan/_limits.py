@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation.plan import AbstractExcitation
 from ..excitation.steps import Segment, Tone
+from ..host.printable import leading
 from ..recording import SegmentLabel, open_recording
 from ..rig import (
     LARGEST_LEVEL_ERROR,
@@ -155,15 +156,16 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
     Raises
     ------
     LimitExceeded
-        Names every violation with value, limit, source and remedy. Nothing has been played.
+        Names the largest violations with value, limit, source and remedy. Nothing has been played.
     ConfigurationError
         When the rig plays back a recording that was made with another plan.
     """
     require_own_plan(measurement, rig)
     checks = limit_checks(measurement, rig)
-    violations = [check.complaint() for check in checks if check.forbids]
+    violations = sorted((check for check in checks if check.forbids), key=lambda each: -each.use)
     if violations:
-        raise LimitExceeded(f"{measurement.name}: {'; '.join(violations)}. Nothing was played.")
+        texts = "; ".join(leading([each.complaint() for each in violations]))
+        raise LimitExceeded(f"{measurement.name}: {texts}. Nothing was played.")
     return checks
 
 
