@@ -83,6 +83,22 @@ def test_non_numeric_text_shows_an_error_at_its_field_and_keeps_the_plan(form, q
     assert form.content()["ramp_s"] == MEASUREMENTS["quick-dwell"].ramp_s
 
 
+def test_text_in_a_group_that_is_switched_off_does_not_block_the_plan(qtbot):
+    form = ValidatedForm(Measurement, "test")
+    qtbot.addWidget(form)
+    form.show_value(next(iter(MEASUREMENTS.values())))
+    until = form.form.editors["until"]
+    until.show_content({})
+    widget = until.form.editors["response_i"].widget
+    widget.lineEdit().setText("rigid:2")
+    qtbot.keyClick(widget, Qt.Key.Key_Return)
+    assert form.value is None
+    assert "'rigid:2' is not a number" in form.complaint
+    until.show_content(None)
+    assert form.value is not None
+    assert form.complaint == ""
+
+
 def test_changing_the_kind_keeps_shared_values(form):
     form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
     excitation = form.editors["excitation"]

@@ -122,10 +122,7 @@ class ModelForm(QWidget):
     @property
     def is_read(self) -> bool:
         """Whether all texts typed into this form and its inner forms can be read."""
-        return all(
-            row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
-            for row in self._rows.values()
-        )
+        return not any(editor.complaint for editor in self.editors.values())
 
     def _add(self, name: str, field: FieldInfo) -> None:
         facts = field_facts(self.model, name, field)
@@ -189,8 +186,8 @@ class GroupEditor:
 
     @property
     def complaint(self) -> str:
-        """Always empty, because complaints are shown at the fields inside."""
-        return ""
+        """First complaint of a field inside; empty if all can be read."""
+        return next(filter(None, (editor.complaint for editor in self.form.editors.values())), "")
 
     def content(self) -> Any:
         """Return the content as stored in a file."""
@@ -265,6 +262,15 @@ class OptionalGroupEditor(GroupEditor):
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
         self.form.hide()
+
+    @property
+    def complaint(self) -> str:
+        """First complaint of a field inside; empty when absent."""
+        return super().complaint if self._there.isChecked() else ""
+
+    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
+        """Show complaints at the fields of the inner form; return none of them when absent."""
+        return super().complain(complaints) if self._there.isChecked() else ()
 
     def content(self) -> Any:
         """Return the content as stored in a file; None when absent."""
