@@ -83,7 +83,7 @@ def test_a_diverged_chain_run_reports_only_how_it_ended(frequency, tmp_path, mon
     assert point["outcome"] != "reached the end time"
     assert point["energy_j"] == point["transmission"][0] == [None, None]
     assert (tmp_path / "out" / "chain.png").is_file()
-    assert "1 runs ended early" in run(*options).output
+    assert "1 run ended early" in run(*options).output
 
 
 def test_a_chain_run_too_short_for_an_error_reports_error_not_known():

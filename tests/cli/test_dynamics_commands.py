@@ -49,7 +49,7 @@ def test_branches_over_amplitude_are_reported_in_sentences():
     result = run("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
     assert result.exit_code == 0, result.output
     assert "1: period 1, mirrored: 1 to 2 µm" in result.output
-    assert "1 branches (0 isolated)" in result.output
+    assert "1 branch (0 isolated)" in result.output
 
 
 SHORT_LINE = (

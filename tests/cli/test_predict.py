@@ -128,7 +128,7 @@ def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_he
     assert len(motions) > 1
     assert sum(each["starts"] for each in motions) == point["ensemble"]["starts"] >= 8
     assert all(each["share"]["low"] <= each["share"]["share"] <= each["share"]["high"] for each in motions)
-    assert "At 1 of 1 points the motion depends sensitively on the start" in ran.stderr
+    assert "At 1 of 1 point the motion depends sensitively on the start" in ran.stderr
     assert "starts are computed and chaos is integrated further, for at most 0.2 s" in ran.stderr
     told = vibench_here(*asked, cwd=tmp_path)
     assert "Motions with sensitive dependence on the start" in told.stdout

@@ -16,7 +16,7 @@ from vibench.analysis import (
     level_of_drive,
 )
 from vibench.analysis.dynamics import BranchDiagram, BranchLine, BranchRequest, branch_lines, write_diagram
-from vibench.sim import Parameter
+from vibench.sim import Parameter, count_text
 
 from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
 from .options import Fields, RequestOptions, option
@@ -186,6 +186,6 @@ def _branch_in_words(number: int, line: BranchLine, along: Parameter) -> str:
     isolated = ", isolated" if line.is_isolated else ""
     return (
         f"{number}: period {line.periods}, {line.shape}{isolated}: {place.min():.5g} to "
-        f"{place.max():.5g} {unit}, {line.points} motions, {line.is_stable.mean():.0%} stable, "
+        f"{place.max():.5g} {unit}, {count_text(line.points, 'motion')}, {line.is_stable.mean():.0%} stable, "
         f"{line.elapsed_s:.1f} s" + (f"; {named} {unit}" if named else "")
     )

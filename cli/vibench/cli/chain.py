@@ -13,7 +13,7 @@ from vibench.analysis.dynamics import (
     chain_runs,
     write_chain,
 )
-from vibench.sim import USUAL_SPECIMEN, Parameter
+from vibench.sim import USUAL_SPECIMEN, Parameter, count_text
 from vibench.sim.chain import MOST_CELLS
 
 from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
@@ -149,10 +149,10 @@ def _run_in_words(run: ChainRun) -> str:
         else f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
     )
     if not run.time_s.size:
-        return f"{run.cells} cells{where}: {run.outcome}, {run.elapsed_s:.1f} s"
+        return f"{count_text(run.cells, 'cell')}{where}: {run.outcome}, {run.elapsed_s:.1f} s"
     rates = run.impacts / run.observed_s
     return (
-        f"{run.cells} cells{where}: {across}impacts a second {rates[0]:.4g} in the first cell, "
+        f"{count_text(run.cells, 'cell')}{where}: {across}impacts a second {rates[0]:.4g} in the first cell, "
         f"{rates[-1]:.4g} in the last; mean energy {1e6 * run.energy_j[0]:.4g} µJ in the first cell, "
         f"{1e6 * run.energy_j[-1]:.4g} µJ in the last{exponent}; {run.outcome}, {run.elapsed_s:.1f} s"
     )

@@ -37,7 +37,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign, distinct_drives, require_within_limits
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
-from vibench.sim import number_of
+from vibench.sim import count_text, number_of
 
 from .engine_bars import Watching
 from .options import option
@@ -98,8 +98,7 @@ def estimate_text(expected: CampaignEstimate) -> str:
     length = f"{most}{timedelta(seconds=round(expected.duration_s))}"
     kept = f" ({expected.kept} kept)" if expected.kept else ""
     room = f"about {expected.total_bytes / 1e6:.0f} MB; {expected.free_bytes / 1e6:.0f} MB are free"
-    count = "1 recording" if expected.recordings == 1 else f"{expected.recordings} recordings"
-    lines = [f"{count}{kept}, {length} (h:min:s) of rig time, {room}"]
+    lines = [f"{count_text(expected.recordings, 'recording')}{kept}, {length} (h:min:s) of rig time, {room}"]
     if expected.rest_s:
         lines.append(f"Silence between recordings: {timedelta(seconds=round(expected.rest_s))} (included)")
     if expected.lead_in_s:

@@ -8,6 +8,7 @@ import typer
 from vibench.acquisition.campaign import verify_recordings
 from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
+from vibench.sim import count_text
 
 from .options import option
 from .output import ExitCode, console, errors, leave_output_to_json, print_json
@@ -42,7 +43,7 @@ def pack(
     }
     with transfer_bar("pack", size) as observer:
         packed = pack_folder(folder, crate, facts, untrusted, observer)
-    console.print(f"packed {len(packed)} files into {crate}")
+    console.print(f"packed {count_text(len(packed), 'file')} into {crate}")
     unfinished = [each.path for each in found if each.verdict == SealState.UNFINISHED]
     if as_json:
         print_json(

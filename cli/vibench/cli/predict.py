@@ -23,6 +23,7 @@ from vibench.sim import (
     ScenePlan,
     ScenePrediction,
     StartMemory,
+    count_text,
     number_of,
     solve_scene,
 )
@@ -205,7 +206,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
         text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
-        text += f" {len(known_s)} of {len(points)} points took {sum(known_s):.2g} s."
+        text += f" {len(known_s)} of {count_text(len(points), 'point')} took {sum(known_s):.2g} s."
     if len(points) == 1:
         return f"{worst_hz:g} Hz: {method}. {text}"
     span = f"{len(points)} points, {points[0][0]:g} to {points[-1][0]:g} Hz"
@@ -245,7 +246,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
         console.print(points[0].target.text)
     elif error is not None:
         met = sum(each.error_estimate is not None and each.error_estimate <= error for each in points)
-        console.print(f"{met} of {len(points)} points reached an error of {100.0 * error:g} %")
+        console.print(f"{met} of {count_text(len(points), 'point')} reached an error of {100.0 * error:g} %")
 
 
 def _share_text(point: ScenePrediction) -> str:
@@ -291,12 +292,12 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
         return ""
     ensembles = [point.ensemble for point in lost if point.ensemble is not None]
     starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
-    where = f"At {len(lost)} of {len(points)} points"
+    where = f"At {len(lost)} of {count_text(len(points), 'point')}"
     text = f"{where} the motion depends sensitively on the start, or did not settle."
     if not ensembles:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
         return f"{text} The result there is a mean over {averaged} starts in total." if averaged else text
     return (
         f"{text} Simulated there: {starts} starts, {followed_s:.0f} s in total; "
-        f"{sum(each.is_one_of_several for each in lost)} points have more than one motion."
+        f"several motions at {count_text(sum(each.is_one_of_several for each in lost), 'point')}."
     )

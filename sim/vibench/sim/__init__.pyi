@@ -108,6 +108,7 @@ from .specimen.drive import (
 from .specimen.frozen_model import (
     FrozenModel as FrozenModel,
     NumberWith as NumberWith,
+    count_text as count_text,
     number_of as number_of,
 )
 from .specimen.modes import (

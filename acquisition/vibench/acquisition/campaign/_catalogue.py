@@ -14,6 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from vibench.sim import count_text
+
 from ..errors import RecordingError
 from ..host.chosen import member
 from ..plan import present_word
@@ -163,7 +165,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
         concerns.append(f"near full scale: {roles}")
     lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
     if lost:
-        concerns.append(f"{lost} samples lost")
+        concerns.append(f"{count_text(lost, 'sample')} lost")
     return "; ".join(concerns) or UNCHECKED
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from vibench.sim import count_text
+
 from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
 from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
@@ -94,7 +96,7 @@ class CampaignRunner:
             if any(point.attempts for point in self._coming) or done
             else CampaignEventKind.BEGUN
         )
-        text = f"{campaign.name}: {self._count} points, {done} already done"
+        text = f"{campaign.name}: {count_text(self._count, 'point')}, {done} already done"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         self._report_damage()
         try:
@@ -183,7 +185,7 @@ class CampaignRunner:
         if request is not None:
             return f"was stopped: {request.reason}"
         failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
-        return f"is finished, {failed} points failed" if failed else "is finished"
+        return f"is finished, {count_text(failed, 'point')} failed" if failed else "is finished"
 
     def _report_end(self, text: str, reason_code: str) -> None:
         counts = {

@@ -7,6 +7,8 @@ from threading import Lock
 from time import monotonic
 from typing import TypeVar
 
+from vibench.sim import count_text
+
 from ..bench.bench import Bench
 from ..campaign import planned_recordings
 from ..check.admission import CheckRule, require_on_record
@@ -74,7 +76,8 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         campaign=campaign.name,
         folder=str(folder),
         lines=(
-            f"What: {len(missing)} recordings ({kinds})" + (f", {kept} kept from before" if kept else ""),
+            f"What: {count_text(len(missing), 'recording')} ({kinds})"
+            + f", {kept} kept from before" * bool(kept),
             f"Level: at most {loudest:g} Vpp at the generator",
             f"Limits: the closest is {closest.what}, at {closest.use:.0%} of {bound} in {tightest}",
             f"Duration: {length} (h:min:s), ramps and checks included",

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim import OrbitShape, Parameter, phase_resonance_branch
+from vibench.sim import OrbitShape, Parameter, count_text, phase_resonance_branch
 from vibench.sim.branches import (
     BranchOrigin,
     FoundBranch,
@@ -204,11 +204,12 @@ class BranchDiagram(Tabular):
         isolated = sum(line.is_isolated for line in self.lines)
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
         wanted, reached = self.request.error, ""
+        branches, motions = count_text(len(self.lines), "branch"), count_text(self.points, "motion")
         if wanted is not None:
             met = sum(int(np.sum(line.error_estimate <= wanted)) for line in self.lines)
-            reached = f" {met} of {self.points} motions reached an error of {100.0 * wanted:g} %."
+            reached = f" {met} of {motions} reached an error of {100.0 * wanted:g} %."
         return (
-            f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
+            f"{branches} ({isolated} isolated), {motions} in "
             f"{self.elapsed_s:.1f} s; error relative to the fundamental of p: {self.largest_error:.1g} "
             f"(median of the worst branch), {worst:.1g} (worst point).{reached}{over}"
         )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
-from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled
+from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled, count_text
 from vibench.sim.chain import (
     BandGap,
     Chain,
@@ -150,7 +150,7 @@ class ChainAnswer(Tabular):
         """Length, index and name of cells to draw: the last of every chain, or several of a single chain."""
         lengths = self.request.lengths
         if len(lengths) > 1:
-            return tuple((cells, cells - 1, f"{cells} cells: last") for cells in lengths)
+            return tuple((cells, cells - 1, f"{count_text(cells, 'cell')}: last") for cells in lengths)
         (cells,) = lengths
         places = np.unique(np.linspace(0, cells - 1, min(cells, MOST_SHOWN)).round().astype(int))
         return tuple((cells, int(place), f"cell {place + 1}") for place in places)
@@ -182,13 +182,13 @@ class ChainAnswer(Tabular):
             return text
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
-        complaint = f"; {lost} runs ended early" if lost else ""
+        complaint = f"; {count_text(lost, 'run')} ended early" if lost else ""
         exactly = f"; errors of contacts below {self.request.accuracy.promise:g} times 100 µm or 0.1 m/s"
         if self.request.error is not None:
             met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
             exactly = f"; {met} runs reached an error of {100.0 * self.request.error:g} %"
         return (
-            f"{text} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts "
+            f"{text} {count_text(len(self.runs), 'run')} in {self.elapsed_s:.1f} s, {impacts} impacts "
             f"observed{exactly}{complaint}."
         )
 

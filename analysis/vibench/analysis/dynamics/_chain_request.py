@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from vibench.sim import Accuracy, Harmonic, SpecimenTable
+from vibench.sim import Accuracy, Harmonic, SpecimenTable, count_text
 from vibench.sim.chain import MOST_CELLS, Chain
 from vibench.sim.study import TargetError, TargetTime, frequency_range
 
@@ -119,16 +119,16 @@ class ChainRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Title of the chain request for figures."""
-        cells = ", ".join(str(each) for each in self.lengths)
+        cells = ", ".join([*map(str, self.lengths[:-1]), count_text(self.lengths[-1], "cell")])
         match self.drive:
             case ChainDrive.NONE:
-                return f"{cells} cells without contact"
+                return f"{cells} without contact"
             case ChainDrive.RECORDED:
-                return f"{cells} cells, base of {Path(self.recording).name}"
+                return f"{cells}, base of {Path(self.recording).name}"
             case _:
                 many = self.start_hz != self.stop_hz
                 where = f"{self.start_hz:g} to {self.stop_hz:g} Hz" if many else f"{self.start_hz:g} Hz"
-                return f"{cells} cells, {where}, {1e6 * self.amplitude_m:g} µm, {self.drive.value}"
+                return f"{cells}, {where}, {1e6 * self.amplitude_m:g} µm, {self.drive.value}"
 
     @property
     def sentence(self) -> str:

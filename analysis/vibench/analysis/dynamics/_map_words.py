@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.sim import MotionKind, SpecimenTable, shipped_specimens, usual_specimen
+from vibench.sim import MotionKind, SpecimenTable, count_text, shipped_specimens, usual_specimen
 from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
 from ..comparison.curve import Curve
@@ -73,10 +73,11 @@ def motion_words(results: MapResults, motion: MapMotion) -> str:
 def map_caption(results: MapResults) -> str:
     """Return the caption: specimen, computed points, filled points and their error rate."""
     plan = results.plan
+    starts = count_text(len(plan.start_labels), "initial state")
     sentences = [
         (
             f"{', '.join((_specimen_words(plan.specimen), *_consts(plan)))}; {plan.accuracy.value}; motions "
-            f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} initial state(s)."
+            f"followed for up to {plan.periods} drive periods from {starts}."
         ),
         f"{results.points} of {plan.grid.size} points computed.",
     ]

@@ -9,7 +9,15 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.sim import Accuracy, Harmonic, LyapunovSpectrum, Parameter, PowerLaw, lyapunov_spectrum
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    LyapunovSpectrum,
+    Parameter,
+    PowerLaw,
+    count_text,
+    lyapunov_spectrum,
+)
 
 from ..signals.arrays import Reals
 from ..tables import Tabular
@@ -190,7 +198,8 @@ class ExponentSpectrum(Tabular):
         else:
             check = f"sums of exponents differ from the damping rate {self.points[0].dampers_per_s:.6g} 1/s "
             check += f"by at most {self.largest_sum_difference:.1g} of this value"
-        return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
+        points = count_text(len(self.points), "point")
+        return f"{points} in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
 
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:

@@ -26,6 +26,12 @@ def number_of(text: str, *units: str) -> float:
     return float(found[1]) * _SCALES[found[2]]
 
 
+def count_text(count: int, noun: str) -> str:
+    """Return a count with its noun, in the singular or plural: ``1 branch``, ``2 branches``."""
+    plural = "es" if noun.endswith("ch") else "s"
+    return f"{count} {noun}{'' if count == 1 else plural}"
+
+
 class NumberWith:
     """Field type: a number, or text with a number and a unit. The field's limits apply to the SI value."""
 

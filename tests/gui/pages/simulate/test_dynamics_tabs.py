@@ -61,7 +61,7 @@ def test_branches_are_drawn_with_error_and_cost(page, wait_for):
     assert view.simulator.is_busy
     wait_for(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
-    assert view.summary.startswith("Complete. 1 branches")
+    assert view.summary.startswith("Complete. 1 branch ")
     assert "relative to the fundamental of p" in view.summary
     first, _ = view.picture.plots(Parameter.FREQUENCY)
     (drawn,) = lines(first)
@@ -128,7 +128,7 @@ def test_a_chain_is_simulated_and_drawn_over_frequency_cells_and_time(page, wait
     wait_for(lambda: not view.simulator.is_busy, 280.0)
     page.refresh()
     assert view.summary.startswith("Complete. Band gaps of the infinite chain: 96.07 to 110.4 Hz")
-    assert "1 runs in" in view.summary
+    assert "1 run in" in view.summary
     (run,) = view.answer.runs
     across, motion, energies = view.picture.plots
     assert len(lines(across)) == 9  # three cells: without contact, driven, and a dot at the frequency

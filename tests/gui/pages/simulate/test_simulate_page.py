@@ -135,7 +135,7 @@ def test_coexisting_motions_are_shown_as_dots_and_table_rows_with_shares(page):
     page._end()
     for _ in page.plots.plots:
         page.refresh()
-    assert "At 1 points the motion depends sensitively on the start." in page._state.text()
+    assert "At 1 point the motion depends sensitively on the start." in page._state.text()
     dots = lines(page.plots.responses)[0]
     assert (list(dots[0]), list(dots[1])) == ([562.8], [2.15])
     assert page.motions.isVisible()

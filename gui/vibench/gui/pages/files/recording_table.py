@@ -38,6 +38,7 @@ from vibench.acquisition.recording import (
     SealState,
 )
 from vibench.analysis.live import THUMBNAIL_COLUMNS, OverviewLevel, Thumbnail, overview_levels, thumbnail
+from vibench.sim import count_text
 
 from ...forms.editor import Choice
 from ...widgets.boxes import hint_in_list, plain_tip
@@ -213,7 +214,7 @@ def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
         duration_text(recording.duration_s),
-        f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
+        f"{recording.sample_rate_hz:g} samples/s, {count_text(len(recording.roles), 'channel')}",
         f"bench {recording.bench.get('name', 'unnamed')}",
     ]
     if found is None:
@@ -224,10 +225,10 @@ def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
     elif found.verdict == SealState.INTACT:
         parts.append(found.sentence)
     if recording.overloads:
-        parts.append(f"{len(recording.overloads)} overloads (red)")
+        parts.append(f"{count_text(len(recording.overloads), 'overload')} (red)")
     if recording.gaps:
         lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
-        parts.append(f"{lost} samples lost")
+        parts.append(f"{count_text(lost, 'sample')} lost")
     parts += [f"note: {each}" for each in notes_of(recording)]
     return "  ·  ".join(parts)
 

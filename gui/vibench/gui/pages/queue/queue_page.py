@@ -28,6 +28,7 @@ from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState, EngineStatus, Supervision
 from vibench.acquisition.plan import Campaign, Range, RangeSpacing, SweepAxis
 from vibench.acquisition.rig import Rig
+from vibench.sim import count_text
 
 from ...background.background import LatestRequest
 from ...forms.editor import Choice
@@ -256,11 +257,10 @@ class QueuePage(Page):
         self._say_summary(campaign, preview)
 
     def _say_summary(self, campaign: Campaign, preview: CampaignPreview) -> None:
-        count = len(preview.levels)
         size = "" if preview.size_bytes is None else f"   ·   {preview.size_bytes / 1e9:.2f} GB"
         end = datetime.now().astimezone() + timedelta(seconds=preview.duration_s)
         self.summary.setText(
-            f"{campaign.name}: {count} recording{'' if count == 1 else 's'}   ·   "
+            f"{campaign.name}: {count_text(len(preview.levels), 'recording')}   ·   "
             f"takes {clock(preview.duration_s)}   ·   "
             f"if started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )

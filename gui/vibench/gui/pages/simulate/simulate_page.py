@@ -14,6 +14,7 @@ from vibench.analysis.prediction.progress import (
     SimulationProgress,
     SimulationRequest,
 )
+from vibench.sim import count_text
 
 from ...forms.model_form import ValidatedForm
 from ...page.app_context import AppContext, SettingKey
@@ -127,9 +128,10 @@ class SimulatePage(Page):
     def _end(self) -> None:
         self._is_stale = True
         troubles = () if self.progress is None else self.progress.troubles
-        text = "Complete." if not troubles else f"Complete except for {len(troubles)} points."
+        text = "Complete." if not troubles else f"Complete except for {count_text(len(troubles), 'point')}."
         if self.progress is not None and self.progress.sensitive:
-            text += f" At {self.progress.sensitive} points the motion depends sensitively on the start."
+            sensitive = count_text(self.progress.sensitive, "point")
+            text += f" At {sensitive} the motion depends sensitively on the start."
         self._say_progress(text)
         if troubles:
             self.context.warn(troubles[0], details="\n".join(troubles[1:]))
