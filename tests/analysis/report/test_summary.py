@@ -75,7 +75,7 @@ def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
     words = report(noise=(noise(0.05, 94.6, 266.2), second))
     assert "gone" not in words
     assert words.count("noise 0.05: Noise at 0.05 Vpp: resonances at 94.6, 266.2 Hz.") == 1
-    assert words.count("Vpp: resonances at 201.0 Hz.") == 1
+    assert words.count("Vpp: resonance at 201.0 Hz.") == 1
 
 
 def test_undecided_motion_is_named_and_long_lists_are_shortened():

@@ -186,7 +186,8 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
     levels = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]
-        where = f"resonances at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
+        plural = "s" * (len(peaks) > 1)
+        where = f"resonance{plural} at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
         levels.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
     return (
         f"Measured {rising[0].view.symbol} of {rising[0].facts.response} at {len(rising)} noise levels. "

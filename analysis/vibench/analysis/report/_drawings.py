@@ -52,8 +52,9 @@ from ._result_tables import collision_table, dwell_table, edge_text, line_table,
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
     """Yield sentences on the resonances and the simulated transmission."""
-    peaks = ", ".join(f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances)
-    where = f"resonances at {peaks} Hz" if peaks else "no significant resonance"
+    peaks = [f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances]
+    plural = "s" * (len(peaks) > 1)
+    where = f"resonance{plural} at {', '.join(peaks)} Hz" if peaks else "no significant resonance"
     yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
     yield from feedback_sentences(result.analysis.facts.feedback)
     if result.overlay is not None:
