@@ -24,6 +24,16 @@ def test_an_estimate_is_one_json_document_and_writes_no_file(output_of, tmp_path
     assert not (tmp_path / "out").exists()
 
 
+def test_an_estimate_states_the_uncertainty_of_noise_in_a_sweep(output_of, tmp_path):
+    plan, bench = short_points(tmp_path, 1), slow_rig(tmp_path)
+    noise = '{ kind = "white_noise", band_start_hz = 50, band_stop_hz = 600, realisations = 2 }'
+    text = f'name = "c"\n[[sweeps]]\nname = "noise"\nmeasurement = {{ excitation = {noise} }}\n'
+    plan.write_text(text + "amplitude_vpp = [0.05, 0.1]\n", encoding="utf-8")
+    told = output_of("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
+    assert set(told["uncertainty"]) == {"noise-0p05vpp", "noise-0p1vpp"}
+    assert all(told["uncertainty"].values())
+
+
 def test_an_estimate_refuses_a_level_beyond_the_limits(refusal, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     plan.write_text(plan.read_text(encoding="utf-8").replace("[0.05]", "[0.05, 50]"), encoding="utf-8")

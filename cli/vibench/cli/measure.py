@@ -35,7 +35,7 @@ from vibench.acquisition.engine import (
     TwinSwitch,
     serving,
 )
-from vibench.acquisition.plan import Campaign, distinct_drives, require_within_limits
+from vibench.acquisition.plan import Campaign, Family, distinct_drives, require_within_limits
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 from vibench.sim import count_text, number_of
 
@@ -85,10 +85,18 @@ def print_estimate(
 
 
 def expected_results(campaign: Campaign, rig: Rig) -> dict[str, tuple["ExpectedResult", ...]]:
-    """Return the expected results of each measurement; raise LimitExceeded for a plan beyond a limit."""
+    """Return the expected results of each measurement and each noise of a sweep, by name.
+
+    Raises LimitExceeded for a plan beyond a limit. Sines of a sweep are left out: each takes half a minute.
+    """
     for point in distinct_drives(campaign.points()):
         require_within_limits(point.measurement, rig)
-    found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
+    swept = distinct_drives(tuple(point for sweep in campaign.sweeps for point in sweep.points()))
+    noise = {
+        each.name: each.measurement for each in swept if each.measurement.excitation.family is Family.NOISE
+    }
+    plans = {each.name: each for each in campaign.measurements} | noise
+    found = {name: vibench.analysis.expected_uncertainty(each, rig) for name, each in plans.items()}
     return {name: each for name, each in found.items() if each}
 
 
