@@ -120,31 +120,23 @@ class DiskTrouble:
             self._changed.notify_all()
 
 
-class TroubledDisk:
-    """A disk with simulated faults: each operation except `close` first applies the fault."""
-
-    def __init__(self, disk: Disk, trouble: DiskTrouble) -> None:
-        self._disk = disk
-        self._trouble = trouble
+class TroubledDisk(PositionedFile):
+    """File on a disk with simulated faults: each operation except `close` first applies the faults."""
 
     def write(self, offset: int, data: Buffer) -> None:
         """Write ``data`` at ``offset`` of the file."""
-        self._trouble.apply()
-        self._disk.write(offset, data)
+        meet_trouble()
+        super().write(offset, data)
 
     def sync(self) -> None:
         """Return when everything written so far would survive a power cut."""
-        self._trouble.apply()
-        self._disk.sync()
+        meet_trouble()
+        super().sync()
 
     def reserve(self, offset: int, size: int) -> None:
         """Reserve space at this range of the file."""
-        self._trouble.apply()
-        self._disk.reserve(offset, size)
-
-    def close(self) -> None:
-        """Close the file and release its lock."""
-        self._disk.close()
+        meet_trouble()
+        super().reserve(offset, size)
 
 
 _installed: list[DiskTrouble] = []
@@ -163,13 +155,10 @@ def trouble_disks(trouble: DiskTrouble) -> Iterator[None]:
 
 def open_disk(path: Path) -> Disk:
     """Open an existing file for recording, with the active simulated faults."""
-    disk: Disk = PositionedFile(path)
-    for trouble in _installed:
-        disk = TroubledDisk(disk, trouble)
-    return disk
+    return TroubledDisk(path) if _installed else PositionedFile(path)
 
 
 def meet_trouble() -> None:
-    """Apply the active simulated faults before a whole file is written."""
+    """Apply the active simulated faults, before a write."""
     for trouble in tuple(_installed):
         trouble.apply()
