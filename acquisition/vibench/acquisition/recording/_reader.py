@@ -467,10 +467,10 @@ def _read(handle: OpenRecording) -> Recording:
         provenance=configuration.provenance_json,
         seal="" if is_part else seal_of(file),
         bench_check=configuration.bench_check_json,
-        segments=tables.segments(columns[layout.SEGMENTS.name]),
-        events=tables.events(columns[layout.EVENTS.name]),
-        overloads=tables.overloads(columns[layout.OVERLOADS.name]),
-        gaps=tables.gaps(columns[layout.GAPS.name]),
+        segments=tables.segments(columns["segments"]),
+        events=tuple(Event(*row) for row in tables.rows(columns["events"], layout.EVENTS)),
+        overloads=tuple(Overload(*row) for row in tables.rows(columns["overloads"], layout.OVERLOADS)),
+        gaps=tuple(Gap(*row) for row in tables.rows(columns["gaps"], layout.GAPS)),
         _open=handle,
     )
 

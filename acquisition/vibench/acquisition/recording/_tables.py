@@ -1,6 +1,6 @@
 """Read events, segments, overloads and gaps of a recording."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..instruments import Overload
 from . import _layout as layout
 from ._committer import Number
 from ._contents import json_object
@@ -192,27 +191,19 @@ def _clip_segments(columns: Columns, n_valid: int) -> Columns:
     }
 
 
-def events(columns: Columns) -> tuple[Event, ...]:
-    """Return the events in the table ``/events``."""
-    return tuple(
-        Event(int(row[0]), float(row[1]), decode(row[2]), decode(row[3]))
-        for row in zip(*(columns[column.name] for column in layout.EVENTS.columns), strict=True)
+def rows(columns: Columns, table: Table) -> Iterator[tuple[Any, ...]]:
+    """Return an iterator over the rows of a table, as Python numbers and text."""
+    cells = (columns[column.name] for column in table.columns)
+    return zip(
+        *(map(decode, each) if each.dtype.kind == "S" else each.tolist() for each in cells), strict=True
     )
 
 
 def segments(columns: Columns) -> tuple[Segment, ...]:
     """Return the segments in the table ``/segments``."""
     return tuple(
-        Segment(
-            label=decode(label),
-            first_sample=int(first),
-            last_sample=int(last),
-            is_complete=bool(is_complete),
-            numbers=_numbers(decode(numbers)),
-        )
-        for first, last, is_complete, label, numbers in zip(
-            *(columns[column.name] for column in layout.SEGMENTS.columns), strict=True
-        )
+        Segment(label, first, last, bool(is_complete), _numbers(numbers))
+        for first, last, is_complete, label, numbers in rows(columns, layout.SEGMENTS)
     )
 
 
@@ -222,24 +213,6 @@ def _numbers(text: str) -> dict[str, Number]:
         if not isinstance(value, int | float | str):
             raise RecordingError(f"the number {name!r} of a segment is a JSON {type(value).__name__}")
     return numbers
-
-
-def overloads(columns: Columns) -> tuple[Overload, ...]:
-    """Return the overloads in the table ``/overloads``."""
-    return tuple(
-        Overload(decode(channel), int(first), int(last))
-        for channel, first, last in zip(
-            *(columns[column.name] for column in layout.OVERLOADS.columns), strict=True
-        )
-    )
-
-
-def gaps(columns: Columns) -> tuple[Gap, ...]:
-    """Return the gaps in the table ``/gaps``."""
-    return tuple(
-        Gap(int(first), int(last))
-        for first, last in zip(*(columns[column.name] for column in layout.GAPS.columns), strict=True)
-    )
 
 
 class SegmentLabel(StrEnum):
