@@ -19,7 +19,7 @@ from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
 from ._disk import Disk
-from ._layout import Column, encode, json_text
+from ._layout import cell, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
@@ -215,16 +215,10 @@ class TableWriter:
         """Return the writes that replace an existing row."""
         columns = self._places.table.columns
         writes = [
-            (offset + row * np.dtype(column.dtype).itemsize, _raw(column, cell))
-            for offset, column, cell in zip(self._places.columns, columns, cells, strict=True)
+            (offset + row * np.dtype(column.dtype).itemsize, cell(column, value).tobytes())
+            for offset, column, value in zip(self._places.columns, columns, cells, strict=True)
         ]
         return Batch(writes=tuple(writes), counters={self._places.n_rows: self.rows})
-
-
-def _raw(column: Column, cell: Cell) -> bytes:
-    dtype = np.dtype(column.dtype)
-    value = encode(cell, dtype.itemsize) if isinstance(cell, str) else cell
-    return np.array(value, dtype=dtype).tobytes()
 
 
 Number = int | float | str

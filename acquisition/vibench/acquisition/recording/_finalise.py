@@ -30,7 +30,8 @@ from ._layout import (
     DEFLATE_LEVEL,
     RecordingState,
     Table,
-    encode,
+    cell,
+    packing,
     read_attributes,
     write_attributes,
     write_text_dataset,
@@ -90,17 +91,7 @@ IN_FLIGHT_PER_WORKER = 4
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:
     """Create a compressed one-dimensional dataset of counts; an empty dataset is contiguous instead."""
-    if samples == 0:
-        return file.create_dataset(name, shape=(0,), dtype=COUNT_DTYPE)
-    return file.create_dataset(
-        name,
-        shape=(samples,),
-        dtype=COUNT_DTYPE,
-        chunks=(min(chunk_samples, samples),),
-        compression="gzip",
-        compression_opts=DEFLATE_LEVEL,
-        shuffle=True,
-    )
+    return file.create_dataset(name, shape=(samples,), dtype=COUNT_DTYPE, **packing(samples, chunk_samples))
 
 
 def write_chunks(dataset: h5py.Dataset, pieces: Iterable[Counts]) -> None:
@@ -239,8 +230,7 @@ def _write_time(
 ) -> h5py.Dataset:
     """Write the time axis as sample numbers, which compress well, with the sample interval as factor."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
-    settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
-    dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
+    dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **packing(samples))
     digest = hashlib.sha256()
     for begin in range(0, samples, layout.CHUNK_SAMPLES):
         end = min(begin + layout.CHUNK_SAMPLES, samples)
@@ -288,15 +278,10 @@ def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
     if table is layout.EVENTS and tables.ending(source)[0] is RecordingState.RECORDING:
         last: tuple[str | float, ...] = (samples, time.time(), INTERRUPTED_KIND, INTERRUPTED_REASON)
         return {
-            column.name: np.append(columns[column.name], _cell(column.dtype, value))
+            column.name: np.append(columns[column.name], cell(column, value))
             for column, value in zip(table.columns, last, strict=True)
         }
     return columns
-
-
-def _cell(dtype: str, value: str | float) -> np.ndarray[tuple[int], np.dtype[np.generic]]:
-    kind = np.dtype(dtype)
-    return np.array([encode(value, kind.itemsize) if isinstance(value, str) else value], dtype=kind)
 
 
 def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:

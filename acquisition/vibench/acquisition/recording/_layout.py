@@ -12,6 +12,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import RecordingError
 
@@ -154,6 +155,14 @@ def tmp_of(path: Path) -> Path:
     return path.parent / (path.name + TMP_SUFFIX)
 
 
+def packing(items: int, chunk_items: int = CHUNK_SAMPLES) -> dict[str, Any]:
+    """Return the settings with which h5py creates a compressed dataset of ``items``; none for no items."""
+    if items == 0:
+        return {}
+    chunks = (min(chunk_items, items),)
+    return {"chunks": chunks, "compression": "gzip", "compression_opts": DEFLATE_LEVEL, "shuffle": True}
+
+
 ELLIPSIS = "…"
 
 
@@ -164,6 +173,12 @@ def encode(text: str, width: int) -> bytes:
         return raw
     room = width - len(ELLIPSIS.encode())
     return (raw[:room].decode("utf-8", "ignore") + ELLIPSIS).encode()
+
+
+def cell(column: Column, value: str | float) -> NDArray[np.generic]:
+    """Return a value as stored in a column, shape (1,)."""
+    dtype = np.dtype(column.dtype)
+    return np.array([encode(value, dtype.itemsize) if isinstance(value, str) else value], dtype=dtype)
 
 
 def decode(raw: bytes) -> str:

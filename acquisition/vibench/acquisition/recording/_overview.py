@@ -12,7 +12,7 @@ import numpy as np
 
 from ..instruments import Counts
 from . import _layout as layout
-from ._layout import read_attributes, write_attributes
+from ._layout import packing, read_attributes, write_attributes
 
 BIN_SAMPLES = 128
 """Samples per bin. For finer detail, a plot of 1000 columns reads at most 128 000 samples (10 ms)."""
@@ -73,7 +73,9 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
     group = file.require_group(layout.OVERVIEW)
     bins = overview.low.size
     if layout.BIN not in group:
-        axis = group.create_dataset(layout.BIN, data=np.arange(bins, dtype=layout.COUNT_DTYPE), **_pack(bins))
+        axis = group.create_dataset(
+            layout.BIN, data=np.arange(bins, dtype=layout.COUNT_DTYPE), **packing(bins)
+        )
         bin_s = BIN_SAMPLES / sample_rate_hz
         write_attributes(
             axis,
@@ -82,7 +84,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
         axis.make_scale(layout.BIN)
         write_attributes(group, {"samples_per_bin": BIN_SAMPLES})
     for suffix, counts in ((LOW_SUFFIX, overview.low), (HIGH_SUFFIX, overview.high)):
-        dataset = group.create_dataset(role + suffix, data=counts.astype(layout.COUNT_DTYPE), **_pack(bins))
+        dataset = group.create_dataset(role + suffix, data=counts.astype(layout.COUNT_DTYPE), **packing(bins))
         for name in ("scale_factor", "add_offset", "units"):
             dataset.attrs[name] = file[role].attrs[name]
         dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
@@ -108,15 +110,3 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
     except OSError:
         return None
     return CountOverview(low, high)
-
-
-def _pack(bins: int) -> dict[str, object]:
-    if bins == 0:
-        return {}
-    chunk = min(layout.CHUNK_SAMPLES, bins)
-    return {
-        "chunks": (chunk,),
-        "compression": "gzip",
-        "compression_opts": layout.DEFLATE_LEVEL,
-        "shuffle": True,
-    }
