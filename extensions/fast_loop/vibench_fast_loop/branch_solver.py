@@ -176,12 +176,7 @@ def is_new(point: MeasuredPoint, predicted: PredictedPoint) -> bool:
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:
     """Return the residual relative to the level: amplitude of the fundamental, then each harmonic.
 
-    Parameters
-    ----------
-    base_m
-        Base displacement from the first harmonic on, with phases relative to the first coefficient [m].
-    level_m
-        Required amplitude of the base displacement [m].
+    ``base_m`` starts with the first harmonic, with phases relative to the first coefficient [m].
     """
     rest = base_m[1:] / level_m
     return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])

@@ -195,27 +195,13 @@ def branch_hold(
     way: Literal["up", "down"] = "up",
     allowed: float = 1.0,
 ) -> BranchHold | None:
-    """Return the stability under a law of the model's branch at one base level.
+    """Return the stability under a law of the model's branch at one base level, of amplitude ``level_m`` [m].
 
-    Parameters
-    ----------
-    plant, law
-        Plant and law as known to the host computer; the specimen has no rigid stops.
-    level_m
-        Amplitude of the base displacement [m].
-    start_hz, range_hz
-        Start and range of the branch [Hz].
-    begin
-        Approach to the level: from rest, or from three times the level, which finds motions with impacts;
-        always from rest without stops.
-    way
-        Direction in which the frequency changes first.
-    allowed
-        Largest multiplier with which a motion counts as held.
-
-    Returns
-    -------
-    Multiplier and held range; None if the model has no motion at the start.
+    ``plant`` and ``law`` are as known to the host computer; the specimen has no rigid stops. The branch
+    starts at ``start_hz`` and stays in ``range_hz``. ``begin`` is the approach to the level: from rest, or
+    from three times the level, which finds motions with impacts; always from rest without stops. The
+    frequency first goes ``way``. A motion counts as held up to the multiplier ``allowed``. Returns None if
+    the model has no motion at the start.
     """
     spring = spring_of(plant.specimen)
     if spring.kinks:
@@ -281,20 +267,9 @@ def _last_held(
 
 
 def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
-    """Return the largest multiplier over a period for motions of a branch under a law.
+    """Return the largest multipliers over a period of the motions at the indices ``points``, shape (points,).
 
-    Parameters
-    ----------
-    plant, law
-        As in `loop_multiplier`.
-    branch
-        Branch of the plant's specimen.
-    points
-        Indices of the motions.
-
-    Returns
-    -------
-    Magnitudes of the largest multipliers, shape (points,).
+    ``plant`` and ``law`` are as in `loop_multiplier`; the branch is one of the plant's specimen.
     """
     rate_hz = plant.timing.rate_hz
     courses = [motion_slopes(plant.specimen, branch, point, rate_hz) for point in points]
@@ -306,18 +281,8 @@ def motion_slopes(
 ) -> tuple[Floats, Floats, int, int]:
     """Return the slopes of the spring force along one motion of a branch, including all harmonics.
 
-    Parameters
-    ----------
-    specimen, branch
-        Specimen, and a branch of its motions.
-    point
-        Index of the motion.
-    rate_hz
-        Sample rate of the controller [Hz].
-
-    Returns
-    -------
-    Stiffness, damping, number of periods, and parts per sample, for `loop_multiplier`.
+    The motion is that of the index ``point``. The result is stiffness, damping, number of periods, and parts
+    per sample of a controller with the sample rate ``rate_hz``, as for `loop_multiplier`.
     """
     spring = spring_of(specimen)
     drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))

@@ -43,15 +43,10 @@ class LinearLaw:
 
 
 def design_law(plant: SampledPlant) -> LinearLaw:
-    """Return the law that damps the spring between m1 and m2.
+    """Return the law that damps the spring between m1 and m2, and accounts for the latency of ``plant``.
 
     Linear-quadratic Gaussian control (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch.
     9). The estimate includes the present sample.
-
-    Parameters
-    ----------
-    plant
-        Plant model for the design; the law accounts for its latency.
     """
     step, volt, shown, cost, unknown, noise = _weigh(plant)
     value = solve_discrete_are(step, volt[:, None], cost, np.eye(1))
@@ -68,14 +63,8 @@ def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
 
     ``u = -(kp s + kd d)`` for one sample s and its low-pass filtered rate ``d += a ((s - before) / step -
     d)``, where ``a = step / (tau + step)``. Gains and tau minimise the expected cost (W. S. Levine and M.
-    Athans, IEEE Trans. Autom. Control 15 (1970) 44).
-
-    Parameters
-    ----------
-    plant
-        Plant model for the design; the law accounts for its latency.
-    sample
-        Index of the sample that is fed back: 0 for base acceleration, 1 for m0 velocity.
+    Athans, IEEE Trans. Autom. Control 15 (1970) 44). ``sample`` is the index of the sample that is fed back:
+    0 for base acceleration, 1 for m0 velocity.
     """
     problem, step_s = _weigh(plant), plant.timing.step_s
     omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]

@@ -79,14 +79,8 @@ class OpenLoopMultiplier:
 def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
     """Return the largest multiplier, from a fit of the equation of slow deviations to a perturbed motion.
 
-    Parameters
-    ----------
-    motion
-        Motion with at least about thirty periods of changes, each change several periods long.
-
-    Returns
-    -------
-    The multiplier; its error is not finite if the changes are insufficient.
+    The motion needs at least about thirty periods of changes, each change several periods long. The error of
+    the result is not finite if the changes are insufficient.
     """
     rows = 2 * motion.periods * _EACH
     steps = motion.period / _EACH
@@ -111,12 +105,7 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
 def envelope_deviation(signal: Vector, period: float) -> float:
     """Return the relative rms deviation of a signal's fundamental from its mean and drift.
 
-    Parameters
-    ----------
-    signal
-        At least about twenty periods of the signal, shape (samples,).
-    period
-        Period of the drive [samples].
+    ``signal`` has at least about twenty periods, shape (samples,); ``period`` is that of the drive [samples].
     """
     half = round(_HALF * period)
     turn = np.exp(-2j * np.pi * np.arange(len(signal)) / period)

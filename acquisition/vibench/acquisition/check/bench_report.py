@@ -48,21 +48,13 @@ def bench_report(
     """Check a bench before measurements and return the findings; the generator is silent afterwards.
 
     All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
+    ``bench`` must not be sampling; ``folder`` is that of the recordings; another thread can stop the check by
+    ``switch``, within a block of samples. ``amplitude_vpp`` is by default at most 2 % of the amplitude limit,
+    and too small for contact [V].
 
     Raises CheckStopped when somebody stopped the check, InstrumentError when an instrument fails, DataLost
     when the converter lost samples, and ConfigurationError when the bench plays a recording back. All other
     faults become findings.
-
-    Parameters
-    ----------
-    bench
-        The open bench; it must not be sampling.
-    folder
-        Folder for recordings.
-    switch
-        Switch by which another thread can stop the check, within a block of samples.
-    amplitude_vpp
-        Amplitude of the sine [V]; by default at most 2 % of the amplitude limit, and too small for contact.
     """
     if bench.rig.plays_back:
         raise ConfigurationError(

@@ -154,13 +154,7 @@ resonance may reduce the motion of a light table to about 0.2 of the linear mode
 
 
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
-    """Raise LimitExceeded, which ramps the run down, when the base hardly moves.
-
-    Parameters
-    ----------
-    acceleration
-        Measured amplitude of the base's fundamental [m/s2].
-    """
+    """Raise LimitExceeded to ramp the run down if the fundamental ``acceleration`` is too small [m/s2]."""
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(

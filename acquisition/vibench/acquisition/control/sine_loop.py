@@ -47,12 +47,9 @@ class GainEstimator:
         self._answers: deque[_Answer] = deque()
 
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
-        """Add the base phasors of a step, shape (periods,).
+        """Add the base phasors of a step, shape (periods,) [m/s2].
 
-        Parameters
-        ----------
-        modelled, target
-            Base acceleration that the linear model predicts at this setting, and that to be held [m/s2].
+        ``modelled`` is the base acceleration that the linear model predicts, ``target`` that to be held.
         """
         if not len(base):
             return

@@ -233,12 +233,8 @@ class Judgement:
 def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     """Return the judgement of a motion's newest periods by the criteria of ``rule``.
 
-    Parameters
-    ----------
-    points
-        Fourier coefficients of each drive period, shape (periods, orders).
-    noise
-        Rms of all orders together without drive, in the unit of the points.
+    ``points`` are the Fourier coefficients of each drive period, shape (periods, orders); ``noise`` is the
+    rms of all orders together without drive, in the unit of the points.
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)

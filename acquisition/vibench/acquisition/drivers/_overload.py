@@ -16,14 +16,8 @@ def overload_ranges(
 ) -> tuple[Overload, ...]:
     """Return the ranges of a block where a channel reaches 95 % of its full scale.
 
-    Parameters
-    ----------
-    volts
-        Shape (channels, samples) [V] at the converter's input.
-    roles, full_scales_v
-        Role and full scale [V] of each channel.
-    first_sample
-        Number of the block's first sample in the run.
+    ``volts`` have the shape (channels, samples) [V]; ``first_sample`` is the number of the block's first
+    sample in the run.
     """
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)

@@ -147,15 +147,8 @@ def stop_engine(
     its process runs again. The function returns when the program has confirmed that its output is off, or
     after a time limit. If no file can be written, or the program does not read it, the stop is sent over the
     engine's connection. A hold (pause) is only sent, because a hold from a file could begin too late.
-
-    Parameters
-    ----------
-    engine
-        Announcement of the program.
-    level
-        Kind of the stop.
-    reason
-        Reason stored in the recording.
+    ``engine`` is the announcement of the program, ``level`` the kind of the stop; ``reason`` is stored in the
+    recording.
 
     Raises
     ------

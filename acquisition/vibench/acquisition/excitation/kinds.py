@@ -145,16 +145,8 @@ def rows_by_kind(
 ) -> Mapping[str, Row]:
     """Return a table entry (row) per kind: from ``of_kind`` if present, else that of its family.
 
-    See decision 0062. Raises KeyError when a row is given for an unknown kind.
-
-    Parameters
-    ----------
-    of_family
-        Row for each family of excitations.
-    of_kind
-        Rows for individual kinds, by name.
-    of_packages
-        Group of entry points through which installed packages supply rows for the kinds that they add.
+    ``of_packages`` is the group of entry points through which installed packages supply rows for the kinds
+    that they add. See decision 0062. Raises KeyError when a row is given for an unknown kind.
     """
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():

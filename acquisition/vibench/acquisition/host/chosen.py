@@ -15,7 +15,7 @@ def member(kind: type[Choice], given: Choice | str) -> Choice:
 
     >>> from enum import StrEnum
     >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])
-    >>> chosen(Ground, "clay")
+    >>> member(Ground, "clay")
     <Ground.CLAY: 'clay'>
     """
     try:

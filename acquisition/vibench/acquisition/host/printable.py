@@ -8,15 +8,10 @@ LONGEST_CLAUSE = 400
 
 
 def printable(text: str) -> str:
-    r"""Escape characters that move the cursor, reorder text or are invisible; the result is one line.
+    r"""Escape characters of ``text`` that move the cursor, reorder it or are invisible; return one line.
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb
-
-    Parameters
-    ----------
-    text
-        Text from a file, a folder or an instrument.
     """
     if text.isprintable():
         return text
@@ -29,7 +24,7 @@ def printable(text: str) -> str:
 def shorten(text: str, longest: int = LONGEST_CLAUSE) -> str:
     """Return the text, with three dots in place of the middle if it is long.
 
-    >>> shortened("0123456789", 7)
+    >>> shorten("0123456789", 7)
     '01...89'
 
     ``text`` has any length; ``longest`` is the largest number of characters of the result, with dots.

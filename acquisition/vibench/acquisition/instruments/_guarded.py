@@ -89,16 +89,9 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
 
 
 def plug_in(kind: PlugInKind, name: str) -> Any:
-    """Load the object of an entry point, and return it.
+    """Load the object of an entry point, by its group ``kind`` and its ``name`` in a configuration.
 
     Raises ConfigurationError when no package or more than one provides the name, or the import fails.
-
-    Parameters
-    ----------
-    kind
-        Group of entry points.
-    name
-        Name in the hardware configuration.
     """
     found = {row.value: row for row in _rows(kind) if row.name == name}
     if not found:

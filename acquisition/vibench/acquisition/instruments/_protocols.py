@@ -311,17 +311,11 @@ class RealTimeController(Protocol):
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
-    """Return the next block; refuse an empty block, because its caller would wait for samples forever.
+    """Return the next ``samples`` of every channel of a ``digitizer`` that is sampling.
 
-    Raises InstrumentError when the block is empty, has a wrong number of channels, an overload of an unknown
-    channel, or volts that are not finite. Also raises the errors of `Digitizer.read`.
-
-    Parameters
-    ----------
-    digitizer
-        Converter that is sampling.
-    samples
-        Number of samples of every channel.
+    An empty block is refused, because its caller would wait for samples forever. Raises InstrumentError when
+    the block is empty, has a wrong number of channels, an overload of an unknown channel, or volts that are
+    not finite. Also raises the errors of `Digitizer.read`.
     """
     block = digitizer.read(samples)
     rows = len(digitizer.roles)

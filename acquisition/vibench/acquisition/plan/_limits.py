@@ -388,12 +388,7 @@ _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) *
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
     """Return a setting for a check at which p stays within a quarter of the gap; 10 mV or more [Vpp].
 
-    Parameters
-    ----------
-    wanted_vpp
-        Upper limit of the result, used if the gap were infinite [Vpp].
-    rig
-        Rig whose model includes the specimen on the table.
+    ``wanted_vpp`` is the upper limit of the result; the model of ``rig`` includes the specimen on the table.
     """
     model = RigModel(rig)
     per_vpp = 0.5 * rig.generator.terminal_factor()
@@ -427,14 +422,8 @@ def check_phasors(
     """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
     Each phasor assumes another shift of the specimen's resonances, up to 3 %. If p may come near a stop,
-    phasors for m1 bound to m2 are added.
-
-    Parameters
-    ----------
-    terminal_v
-        Peak voltage at the generator's terminal [V].
-    quantity
-        Quantity of base or specimen, in SI units, such as m/s2 for an acceleration.
+    phasors for m1 bound to m2 are added. ``terminal_v`` is the peak voltage at the generator's terminal [V];
+    the ``quantity`` of base or specimen is in SI units, such as m/s2 for an acceleration.
     """
     model = RigModel(rig)
     free = terminal_v * model.transfer(quantity, _KNOWN_HZ)
@@ -445,14 +434,6 @@ def check_phasors(
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Return the measured amplitude, limited to the range of the expected amplitudes [m/s2].
-
-    Parameters
-    ----------
-    measured
-        Acceleration amplitude of the base [m/s2].
-    expected
-        Phasors from `check_phasors`, shape (n,) [m/s2].
-    """
+    """Return the ``measured`` amplitude, limited to the range of the ``expected`` phasors [m/s2]."""
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

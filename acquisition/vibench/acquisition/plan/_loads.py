@@ -168,18 +168,10 @@ def _of_source(source: SampleSource, transfer: Transfer) -> Load:
 def needed_vpp(
     rig: Rig, acceleration: float, frequency_hz: float, on_table: OnTable = OnTable.SPECIMEN
 ) -> float:
-    """Return the setting at which the base reaches ``acceleration``, peak to peak [V].
+    """Return the setting at which the base reaches ``acceleration`` [m/s2], peak to peak [V].
 
-    Parameters
-    ----------
-    rig
-        Rig whose model is used.
-    acceleration
-        Acceleration amplitude of the base [m/s2].
-    frequency_hz
-        Frequency of the sine.
-    on_table
-        What stands on the table. Feedback assumes a bare table (smooth response), and corrects the rest.
+    ``on_table`` is what stands on the table of the rig's model. Feedback assumes a bare table (smooth
+    response), and corrects the rest.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()

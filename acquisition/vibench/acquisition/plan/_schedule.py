@@ -275,17 +275,7 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
-    """Return the phase of one ramp up or down.
-
-    Parameters
-    ----------
-    state
-        Ramp up or ramp down.
-    play
-        Signal that the ramp starts or ends.
-    measurement
-        Plan that gives the duration of the ramp.
-    """
+    """Return the phase of one ramp up or down (``state``) of the signal ``play``, as long as planned."""
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 
@@ -331,18 +321,7 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level of a half-cosine ramp from 0 to 1, whose slope is zero at both ends.
-
-    Parameters
-    ----------
-    progress
-        0 at the beginning of the ramp, 1 at its end.
-
-    Returns
-    -------
-    float
-        0 to 1.
-    """
+    """Return the level of a half-cosine ramp at ``progress``, 0 to 1 [1]; both ends have zero slope."""
     return 0.5 * (1 - cos(pi * progress))
 
 

@@ -69,12 +69,8 @@ class Dropout(NamedTuple):
 def find_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
     """Return the drop-outs: jumps away from the motion that later return to it.
 
-    Parameters
-    ----------
-    velocity
-        About one second of velocity, shape (samples,); lost samples are NaN.
-    sample_rate_hz
-        Sample rate [Hz]; below 20 kHz no drop-outs are reported.
+    ``velocity`` is about one second long, shape (samples,), with NaN for lost samples. Below a sample rate of
+    20 kHz no drop-outs are reported.
     """
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
@@ -130,14 +126,8 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 def first_undecided(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
     """Return the sample from which a drop-out may still be undetected; without one, the number of samples.
 
-    Parameters
-    ----------
-    velocity
-        Velocity of a channel that is still being recorded, shape (samples,).
-    sample_rate_hz
-        Sample rate [Hz].
-    dropouts
-        Drop-outs found in this velocity.
+    ``velocity`` belongs to a channel that is still being recorded, shape (samples,), in which ``dropouts``
+    were found.
     """
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
         return velocity.size
@@ -219,17 +209,10 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 
 
 def bridge(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
-    """Return the velocity, shape (samples,), with drop-outs bridged by linear prediction.
+    """Return the ``velocity``, shape (samples,), with drop-outs bridged by linear prediction, as a copy.
 
     The bridge minimises the prediction error of a linear predictor fitted to the samples around the drop-out
     (Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330).
-
-    Parameters
-    ----------
-    velocity
-        Velocity, shape (samples,); it is not modified.
-    dropouts
-        Drop-outs, as returned by `find_dropouts`.
     """
     bridged_velocity, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
     for each in dropouts:

@@ -100,12 +100,8 @@ class OutputDriver(Protocol):
     def open(self, physical: str, config: OutputConfig, digitizer: Any) -> AnalogOutput:
         """Set an output to zero volts, reserve it and return it.
 
-        Parameters
-        ----------
-        physical
-            Full name of the output: ``"Dev1/ao0"``.
-        digitizer
-            Digitizer opened by the driver of the same name; output and digitizer start together.
+        ``physical`` is the full name of the output, such as ``"Dev1/ao0"``. The driver of the same name has
+        opened ``digitizer``, with which the output starts.
         """
 
 

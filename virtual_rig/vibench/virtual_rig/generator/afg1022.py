@@ -81,20 +81,11 @@ class AFG1022(ScpiInstrument):
         return (*COMMANDS, LOAD) if quirks.panel_load_ohm is None else COMMANDS
 
     def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
-        """Return the mean voltage at channel 1's terminal over consecutive intervals.
+        """Return the mean voltage at channel 1's terminal over ``count`` intervals, shape (count,) [V].
 
-        Parameters
-        ----------
-        start_s
-            Rig time of the first interval [s]; must not decrease from call to call.
-        interval_s, count
-            Length of the intervals [s] and their number.
-
-        Returns
-        -------
-        NDArray
-            Shape (count,) [V], with the load of ``Terminal``. Commands act at the rig time of their arrival,
-            or at the end of the part already rendered if that is later.
+        The first interval begins at ``start_s`` [s of rig time], which must not decrease from call to call.
+        The load is that of ``Terminal``. Commands act at the rig time of their arrival, or at the end of the
+        part already rendered if that is later.
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)

@@ -398,12 +398,7 @@ def unplug(device: UsbDevice) -> None:
 def plug_in_remote(address: str) -> RemoteUsbDevice:
     """Connect the generator of a rig in another process to this process's bus.
 
-    Parameters
-    ----------
-    address
-        ``"host:port"`` of the rig's server.
-
-    Raises InstrumentLost when no rig answers there.
+    ``address`` is ``"host:port"`` of the rig's server. Raises InstrumentLost when no rig answers there.
     """
     device = RemoteUsbDevice(address)
     plug_in(device)
