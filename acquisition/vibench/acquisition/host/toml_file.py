@@ -2,7 +2,7 @@
 
 import json
 import reprlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date
 from difflib import get_close_matches
 from itertools import compress
@@ -43,30 +43,17 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
 
 def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
-    """Read the content of a TOML file as ``model``; see `load_toml`."""
-    content = migrate(content, model.__name__, str(path))
-    return validate(content, model, str(path), path.absolute().parent)
-
-
-MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""Function that converts a file's content to the next version, by model name and version of the file."""
-
-
-def migrate(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
-    """Return the content of a file, converted to the current version.
+    """Read the content of a TOML file as ``model``; see `load_toml`.
 
     Raises ConfigurationError when the file's version is not an integer from 1 to the current version.
     """
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
         raise ConfigurationError(
-            f"{origin}: {FORMAT} = {_text_of(written)} cannot be read; this version of vibench reads 1 to "
+            f"{path}: {FORMAT} = {_text_of(written)} cannot be read; this version of vibench reads 1 to "
             f"{VERSION}: install a later vibench"
         )
-    for version in range(written, VERSION):
-        if (model, version) in MIGRATIONS:
-            content = MIGRATIONS[model, version](content)
-    return content
+    return validate(content, model, str(path), path.absolute().parent)
 
 
 def validate(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
@@ -96,16 +83,8 @@ Place = tuple[str | int, ...]
 def complaints(error: ValidationError, content: object, model: type[BaseModel], within: Place = ()) -> str:
     """Return a clause for each fault, one for all missing keys, and one for all unknown keys.
 
-    Parameters
-    ----------
-    error
-        Error of the model.
-    content
-        Content of the file, to distinguish its keys from the type names that pydantic adds to paths.
-    model
-        The model, for keys similar to an unknown one.
-    within
-        Path in the file; faults outside this path are left out.
+    ``content`` of the file distinguishes its keys from the type names that pydantic adds to paths. Faults
+    outside the path ``within`` are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     unknown = [each["loc"] for each in details if each["type"] == "extra_forbidden"]
