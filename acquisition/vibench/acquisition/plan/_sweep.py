@@ -244,10 +244,12 @@ class Sweep(FrozenModel):
         """Yield the points of each chain; earlier points are the lead-in of later ones."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))
-        rising = sorted(axes.pop(along))
+        rising = tuple(sorted(axes.pop(along)))
         for chain in self._places(axes):
             way: list[LeadIn] = []
-            for word, value in _chain_values(chain.values.get(SweepAxis.DIRECTION), rising):
+            turn: Direction | None = chain.values.get(SweepAxis.DIRECTION)
+            passes = [("", rising)] if turn is None else turn.passes(rising)
+            for word, value in ((word, value) for word, values in passes for value in values):
                 there = chain.with_words(DIRECTION=word) if word else chain
                 name = f"{there.name(self.name)}-{self._word(along, value)}"
                 measurement = _measurement(self._content(name, {**chain.values, along: value}), name)
@@ -280,21 +282,6 @@ class Sweep(FrozenModel):
                 return kind if kinds.count(kind) == 1 else f"{kind}{value + 1}"
             case SweepAxis.LEVEL | SweepAxis.FREQUENCY:
                 return f"{value:.7g}{_UNITS[axis]}".replace(".", "p").replace("+", "")
-
-
-def _chain_values(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Yield the values of a chain in the order ``way``, each with the name of its direction."""
-    up = [("" if way is None else "up", value) for value in rising]
-    down = [("down", value) for value in reversed(rising)]
-    match way:
-        case None | Direction.UP:
-            yield from up
-        case Direction.DOWN:
-            yield from down
-        case Direction.UP_THEN_DOWN:
-            yield from (*up, *down)
-        case Direction.DOWN_THEN_UP:
-            yield from (*down, *up)
 
 
 def _set_direction(excitation: Excitation, way: Direction, name: str) -> Excitation:
