@@ -220,25 +220,11 @@ def _script_model(fault: Callable[..., Heal]) -> type[ScriptedFault]:
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
 """Faults of the recording program instead of the rig."""
 
-_SCRIPTED = (
-    RigFaults.pull_usb_cable,
-    RigFaults.hang_generator,
-    RigFaults.stick_output,
-    RigFaults.delay_reply,
-    RigFaults.corrupt_reply,
-    RigFaults.jump_clock,
-    RigFaults.turn_amplifier_gain,
-    RigFaults.widen_gaps,
-    RigFaults.drop_laser,
-    RigFaults.over_range,
-    RigFaults.disconnect,
-    RigFaults.overrun,
-    RigFaults.reserve_device,
-    RigFaults.fail_daq,
-    RigFaults.lose_daq_server,
-    RigFaults.fill_disk,
-    RigFaults.slow_disk,
-)
+_SCRIPTED = [
+    method
+    for name, method in vars(RigFaults).items()
+    if not name.startswith("_") and signature(method).return_annotation is Heal
+]
 if TYPE_CHECKING:
     FaultKind = ScriptedFault
 else:
