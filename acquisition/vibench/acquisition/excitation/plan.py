@@ -211,8 +211,9 @@ class AbstractExcitation(FrozenModel, ABC):
 
     def turned(self, direction: Direction) -> Self | None:
         """Return the same excitation in ``direction``; None if its kind has no such direction."""
-        del direction
-        return None
+        if "direction" not in type(self).model_fields:
+            return None
+        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
         """Return this excitation with the lead-in ``way``, and its tone; None if it has no lead-in."""

@@ -60,10 +60,6 @@ class SteppedLevel(FixedSine):
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )
 
-    def turned(self, direction: Direction) -> Self:
-        """Return a plan with the same levels in another ``direction``."""
-        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
-
     @property
     def playing_s(self) -> float:
         """Duration of settling and recording of all levels [s]."""

@@ -97,10 +97,6 @@ class FrequencySteps(AbstractExcitation):
         first, _ = next(self.passes())
         return Approach.UP if first == Direction.UP.value else Approach.DOWN
 
-    def turned(self, direction: Direction) -> Self:
-        """Return a plan with the same frequencies in another ``direction``."""
-        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
-
     @property
     def highest_frequency_hz(self) -> float:
         """The highest frequency of the list [Hz]."""
