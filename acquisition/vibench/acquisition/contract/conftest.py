@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench.bench import Bench, open_bench
+from vibench.acquisition.check.loop import fit_sine
 from vibench.acquisition.errors import AcquisitionError, BrokenPromise, ConfigurationError
 from vibench.acquisition.host.shipped import all_shipped
 from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
@@ -116,7 +117,4 @@ def measured_v(bench: Bench, duration_s: float) -> Samples:
 
 def line_v(volts: Samples, frequency_hz: float, rate_hz: float) -> float:
     """Return the amplitude of the sine at ``frequency_hz`` in a signal, by least squares [V]."""
-    angle = 2 * np.pi * frequency_hz * np.arange(len(volts)) / rate_hz
-    basis = np.stack((np.cos(angle), np.sin(angle), np.ones_like(angle)), axis=1)
-    found, *_ = np.linalg.lstsq(basis, volts)
-    return float(np.hypot(found[0], found[1]))
+    return fit_sine(volts, frequency_hz, rate_hz).amplitude
