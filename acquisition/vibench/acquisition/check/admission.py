@@ -200,19 +200,11 @@ def require_fresh(
     """Admit a bench by its last check or a new check, and return that check for the recordings.
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
-    rig that plays back a recording needs no check.
+    rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is that of the
+    recordings; another thread can stop the new check by ``switch``.
 
     Raises CheckFailed when the last check is missing, too old, failed or for another configuration (nothing
     was played then), or when the new check fails. Raises InstrumentError when an instrument fails.
-
-    Parameters
-    ----------
-    bench
-        The open bench; it must not be sampling.
-    folder
-        Folder for recordings.
-    switch
-        Switch by which another thread can stop the new check.
     """
     if bench.rig.plays_back:
         return None
