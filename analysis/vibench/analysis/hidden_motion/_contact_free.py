@@ -9,7 +9,7 @@ import numpy as np
 from vibench.sim.engine.run import native_engine
 
 from ..errors import NotEnoughData
-from ..signals.arrays import Flags, Reals, Samples
+from ..signals.arrays import Flags, Reals, Samples, runs_of
 from ..tables import Tabular
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start
@@ -137,18 +137,13 @@ def _blocks(motion: PreparedMotion) -> Iterator[tuple[int, int, int]]:
             yield max(begin - overlap, 0), begin, end
 
 
-def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], marks.astype(np.int8), [0]))))
-    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-
-
 def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     """Return one impact for every window with an impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
     # The force is held over the step before a sample, so the centre of the force is half a sample earlier.
     place = np.arange(force.size) - 0.5
-    for begin, end in _runs(latent.is_open):
+    for begin, end in runs_of(latent.is_open).tolist():
         if begin < 2 or end > force.size - 2 or latent.is_dropout[begin:end].any():
             continue
         part = slice(begin, end)

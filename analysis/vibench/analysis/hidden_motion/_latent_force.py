@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..signals.arrays import Flags, Reals
+from ..signals.arrays import Flags, Reals, runs_of
 from ._filtering import FilterPredictions, FilterState, MotionModel, RtsTrack, run_filter, smooth
 from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES
@@ -133,8 +133,7 @@ def _with_surprises(windows: Flags, run: FilterPredictions, sample_rate_hz: floa
 
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
     """Return the force variance: mean square force of each window, as in expectation maximisation."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
-    begins, ends = edges[::2], edges[1::2]
+    begins, ends = runs_of(windows).T
     squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))
     found = np.maximum((squares[ends] - squares[begins]) / (ends - begins), guess_n**2)
     variance = np.full(windows.size, closed)

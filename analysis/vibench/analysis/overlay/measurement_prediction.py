@@ -1,14 +1,13 @@
 """Prediction of a plan: responses and collision bands of the specimen."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from vibench.acquisition.plan import Approach, Measurement, base_motion
 from vibench.acquisition.rig import Rig
 
-from ..signals.arrays import Flags, Reals
+from ..signals.arrays import Flags, Reals, runs_of
 from ..tables import Tabular
 from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
@@ -71,9 +70,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
     """Return the bands of points with ``is_inside``; a band ends half way to the next point outside."""
-    middles = np.array([0.5 * (low + high) for low, high in pairwise(frequency_hz)])
+    middles = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     lows = np.concatenate([frequency_hz[:1], middles])
     highs = np.concatenate([middles, frequency_hz[-1:]])
-    change = np.diff(np.concatenate([[0], np.asarray(is_inside, dtype=np.int64), [0]]))
-    starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
-    return tuple((float(lows[a]), float(highs[b])) for a, b in zip(starts, ends, strict=True))
+    return tuple((float(lows[first]), float(highs[stop - 1])) for first, stop in runs_of(is_inside))

@@ -47,7 +47,7 @@ from ..dynamics import (
 )
 from ..errors import AnalysisError
 from ..overlay.similarity import Similarity, SimilarityCurve, similarity
-from ..signals.arrays import Reals
+from ..signals.arrays import Reals, runs_of
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
@@ -494,9 +494,8 @@ class SimulationProgress:
     def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
         """Return the frequency ranges of neighbouring points with collisions."""
         frequency_hz, impacts = self.column(model, "impacts")
-        striking = np.flatnonzero(impacts > 0)
-        groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
-        return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
+        runs = runs_of(impacts > 0)
+        return tuple((float(frequency_hz[first]), float(frequency_hz[stop - 1])) for first, stop in runs)
 
     def curves(self) -> tuple[Curve, ...]:
         """Return Responses I and II of every model as curves, to overlay on recordings."""

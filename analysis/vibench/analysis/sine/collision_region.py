@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import binary_opening, maximum_filter1d
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Flags, Reals
+from ..signals.arrays import Flags, Reals, runs_of
 from ..tables import Tabular
 from .sweep import SweptMotion
 
@@ -128,7 +128,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
     is_voted = _majority(above, votes) | binary_opening(is_clear & impacts, np.ones(2, np.bool_))
-    for run in _merge_runs(_runs(is_voted), round(_MERGE_S / sweep.interval_s)):
+    for run in _merged_runs(is_voted, round(_MERGE_S / sweep.interval_s)):
         first, last = _trim_run(above, *run, votes)
         if is_known or np.mean(_seen_impacts(sweep)[first : last + 1]) >= _ENOUGH:
             regions.append(_region(sweep, residual / threshold, first, last))
@@ -140,7 +140,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
         threshold=threshold,
         is_colliding=inside,
         is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, smooth),
-        too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(unclear)),
+        too_fast_hz=tuple((float(hz[first]), float(hz[stop - 1])) for first, stop in runs_of(unclear)),
         noise_rms=noise,
     )
 
@@ -176,18 +176,14 @@ def _majority(above: Flags, votes: int) -> Flags:
     return np.asarray(2 * (total[high] - total[low]) > high - low)
 
 
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _merge_runs(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+def _merged_runs(flags: Flags, gap: int) -> list[tuple[int, int]]:
+    """Return first and last index of each run of flags; runs at most ``gap`` apart are joined."""
     merged: list[tuple[int, int]] = []
-    for first, last in runs:
+    for first, stop in runs_of(flags).tolist():
         if merged and first - merged[-1][1] <= gap:
-            merged[-1] = (merged[-1][0], last)
+            merged[-1] = (merged[-1][0], stop - 1)
         else:
-            merged.append((first, last))
+            merged.append((first, stop - 1))
     return merged
 
 
