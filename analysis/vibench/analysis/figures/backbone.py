@@ -32,6 +32,7 @@ _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
 _LOST = "no resonance found at this level"
 _SIMULATED = "simulated from the recorded base motion"
+_MARK: dict[str, Any] = {"color": style.BOUNDS, "linestyle": "--", "linewidth": 0.8, "zorder": 1}
 _MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 2, "linewidth": 0.8}
 
 
@@ -51,7 +52,8 @@ def backbone_figure(
         _amplitudes(places["amplitude"], broken, base, simulated_m)
         _backbone(places["backbone"], broken)
         for each in ("frequency", "amplitude"):
-            _mark_lost(places[each], lost)
+            for level in lost:
+                places[each].axvline(level, label=_LOST, **_MARK)
             places[each].set_xlim(0.0, (1 + _MARGIN) * max((*base, *lost)))
         places["frequency"].sharex(places["amplitude"])
         places["frequency"].tick_params(labelbottom=False)
@@ -78,10 +80,6 @@ def _interrupt(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> lis
     return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
 
 
-def _base(levels: Sequence[TrackedResonance]) -> list[float]:
-    return [each.base_m_per_s2 for each in levels]
-
-
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
     """Return amplitudes in a readable unit, the factor from metres to this unit, and its name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
@@ -90,14 +88,13 @@ def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
 
 
 def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
-    axes.errorbar(
-        _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
-        **_MEASURED, label=_PHASE,
-    )  # fmt: skip
-    mode_hz, u_hz = rows(levels, "mode_hz u_mode_hz").values()
+    base, frequency_hz, u_hz, mode_hz, u_mode_hz = rows(
+        levels, "base_m_per_s2 frequency_hz u_frequency_hz mode_hz u_mode_hz"
+    ).values()
+    axes.errorbar(base, frequency_hz, 2 * u_hz, **_MEASURED, label=_PHASE)
     if np.isfinite(mode_hz).any():
         axes.errorbar(
-            _base(levels), mode_hz, 2 * u_hz, color=style.PREDICTED, marker="D", markerfacecolor="none",
+            base, mode_hz, 2 * u_mode_hz, color=style.PREDICTED, marker="D", markerfacecolor="none",
             linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
         )  # fmt: skip
     axes.set_ylabel("frequency [Hz]")
@@ -108,7 +105,9 @@ def _amplitudes(
     axes: Axes, levels: Sequence[TrackedResonance], base: Reals, simulated_m: Reals | None
 ) -> None:
     amplitude, scale, unit = _amplitude(levels)
-    axes.plot(_base(levels), amplitude, color=style.MEASURED, marker="o", linewidth=0.8)
+    axes.plot(
+        [each.base_m_per_s2 for each in levels], amplitude, color=style.MEASURED, marker="o", linewidth=0.8
+    )
     if simulated_m is not None:
         size = scale * simulated_m
         axes.plot(base, size, "s", color=style.SIMULATED, markerfacecolor="none", label=_SIMULATED)
@@ -119,10 +118,8 @@ def _amplitudes(
 
 def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
     amplitude, _, unit = _amplitude(levels)
-    axes.errorbar(
-        [each.frequency_hz for each in levels], amplitude,
-        xerr=[2 * each.u_frequency_hz for each in levels], **_MEASURED,
-    )  # fmt: skip
+    frequency_hz, u_hz = rows(levels, "frequency_hz u_frequency_hz").values()
+    axes.errorbar(frequency_hz, amplitude, xerr=2 * u_hz, **_MEASURED)
     axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
     axes.set_xlabel("phase resonance [Hz]" if levels[0].is_fundamental else "drive at phase resonance [Hz]")
     axes.margins(_MARGIN)
@@ -140,35 +137,19 @@ def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> Non
     axes.set_ylim(0.0, (1.0 + _MARGIN) * axes.dataLim.ymax)
 
 
-def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
-    for number, level in enumerate(lost_m_per_s2):
-        label = _LOST if number == 0 else None
-        axes.axvline(level, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
-
-
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
 ) -> Reals | None:
     """Return m0's simulated amplitude at each level; None unless it can be assigned to every level."""
-    if (
-        overlay is None
-        or not levels[0].is_fundamental
-        or overlay.response.left_out
-        or analysis.response.left_out
-    ):
+    if overlay is None or overlay.response.left_out or analysis.response.left_out:
+        return None
+    if not levels[0].is_fundamental:
         return None
     found = overlay.response.response_ii * overlay.response.drive_amplitude_m
-    return found[[each.number for each in levels]] if max(_numbers(levels)) < found.size else None
-
-
-def _numbers(levels: Sequence[TrackedResonance]) -> list[int]:
-    return [each.number for each in levels]
+    numbers = [each.number for each in levels]
+    return found[numbers] if max(numbers) < found.size else None
 
 
 def _caption(analysis: SteppedSineAnalysis, levels: Sequence[TrackedResonance]) -> str:
-    text = tracked_caption(analysis.response)
-    return " ".join(
-        each
-        for each in (text, backbone_sentence(levels), *feedback_sentences(analysis.facts.feedback))
-        if each
-    )
+    feedback = feedback_sentences(analysis.facts.feedback)
+    return " ".join(filter(None, (tracked_caption(analysis.response), backbone_sentence(levels), *feedback)))

@@ -70,10 +70,8 @@ def _shade(axes: Axes, found: ChainAnswer) -> None:
 
 def _waves(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
-    for number, band_hz in enumerate(found.bands_hz.T):
-        axes.plot(
-            band_hz, found.wave_numbers / np.pi, color=style.LINEAR, label="phase" if number == 0 else None
-        )
+    for band_hz in found.bands_hz.T:
+        axes.plot(band_hz, found.wave_numbers / np.pi, color=style.LINEAR, label="phase")
     axes.set_ylabel("phase / π")
     axes.set_ylim(0.0, 1.0)
     decay = axes.twinx()

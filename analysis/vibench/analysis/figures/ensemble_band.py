@@ -141,12 +141,14 @@ def model_resonances(specimen: Specimen) -> ModelResonances:
 
 def mark_resonances(axes: Axes, at: ModelResonances) -> None:
     """Draw dashed lines at resonances without contact, and dotted lines at those with m1 stuck to m2."""
-    for number, frequency in enumerate(at.free_hz):
-        label = _FREE_LABEL if number == 0 else None
-        axes.axvline(frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
-    for number, frequency in enumerate(at.bound_hz):
-        label = _BOUND_LABEL if number == 0 else None
-        axes.axvline(frequency, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=label, zorder=1)
+    for frequency in at.free_hz:
+        axes.axvline(
+            frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=_FREE_LABEL, zorder=1
+        )
+    for frequency in at.bound_hz:
+        axes.axvline(
+            frequency, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=_BOUND_LABEL, zorder=1
+        )
 
 
 def label_resonances(axes: Axes, at: ModelResonances) -> None:

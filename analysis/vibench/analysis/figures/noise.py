@@ -64,10 +64,8 @@ def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
 
 def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     frequency_hz = periodic.frequency_response.frequency_hz
-    noise, label = (
-        _share(periodic.noise_variance, periodic),
-        "not repeating (noise or chaos), one realisation",
-    )
+    noise = _share(periodic.noise_variance, periodic)
+    label = "not repeating (noise or chaos), one realisation"
     axes.plot(frequency_hz, noise, color=style.BOUNDS, linewidth=0.9, label=label)
     varied = periodic.distortion_variance
     if varied is not None:
@@ -147,18 +145,10 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
             found = view.apply(each.response.frequency_response)
             level = each.response.base_level.rms_acceleration
             label = f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)"
-            line, colour = (
-                style.LEVEL_STYLES[number % len(style.LEVELS)],
-                style.LEVELS[number % len(style.LEVELS)],
-            )
-            axes.plot(
-                found.frequency_hz,
-                view.place(found.magnitude),
-                line,
-                color=colour,
-                linewidth=1.0,
-                label=label,
-            )
+            line = style.LEVEL_STYLES[number % len(style.LEVELS)]
+            colour = style.LEVELS[number % len(style.LEVELS)]
+            size = view.place(found.magnitude)
+            axes.plot(found.frequency_hz, size, line, color=colour, linewidth=1.0, label=label)
         if view.scale is MagnitudeScale.LOG:
             style.magnitude_axis(axes)
         axes.set_ylabel(view.label(rising[0].facts.mass))

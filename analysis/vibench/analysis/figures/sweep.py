@@ -53,17 +53,16 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None)
     found = analysis.response
     largest = float(max(np.max(found.upper), -np.min(found.lower)))
     factor, unit = style.with_prefix(largest, "m/s")
-    for number, region in enumerate(analysis.collisions.regions):
-        label = "masses collide (measured)" if number == 0 else None
+    label = "masses collide (measured)"
+    for region in analysis.collisions.regions:
         axes.axvspan(region.start.time_s, region.stop.time_s, color=style.COLLIDING, zorder=0, label=label)
     low, high, label = factor * found.lower, factor * found.upper, f"measured {analysis.facts.mass} velocity"
     axes.fill_between(found.time_s, low, high, color=style.MEASURED, alpha=0.85, label=label)
     if overlay is not None:
-        for number, outline in enumerate((overlay.response.upper, overlay.response.lower)):
-            label = simulated_label(overlay.run) if number == 0 else None
-            axes.plot(
-                overlay.response.time_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label
-            )
+        label = simulated_label(overlay.run)
+        for outline in (overlay.response.upper, overlay.response.lower):
+            swept_s = overlay.response.time_s
+            axes.plot(swept_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label)
     axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
     axes.set_ylabel(f"{analysis.facts.mass} velocity\n[{unit}]")
     axes.set_xlabel("time of the sweep [s]")
@@ -98,11 +97,9 @@ def _responses(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None
         middle = draw_band(axes, measured.frequency_hz, overlay, what)
         simulated = getattr(overlay.response, attribute) if middle is None else middle
         axes.plot(overlay.response.frequency_hz, simulated, **style.SIMULATED_CURVE)
-    for number, jump in enumerate(analysis.jumps):
-        named = "jump" if number == 0 else None
-        axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=named)
-    ends = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
-    axes.set_xlim(*ends)
+    for jump in analysis.jumps:
+        axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label="jump")
+    axes.set_xlim(*sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1]))))
     style.magnitude_axis(axes)
     axes.set_ylabel(RESPONSE_LABELS[what])
 
@@ -221,8 +218,7 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
     ):
         size, label = factor * np.abs(response.harmonics.order(order)), order_label(order)
         axes.plot(response.harmonics_hz, size, line, color=colour, linewidth=1.0, label=label)
-    ends = sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1])))
-    axes.set_xlim(*ends)
+    axes.set_xlim(*sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1]))))
     style.magnitude_axis(axes)
     axes.set_xlabel("drive frequency [Hz]")
     axes.set_ylabel(f"displacement of {analysis.facts.mass} [{unit}]")
