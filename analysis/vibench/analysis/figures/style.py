@@ -183,20 +183,10 @@ class DrawnFigure:
     figure: Figure
     tables: tuple[Table, ...]
 
-    @cached_property
-    def png(self) -> bytes:
-        """The figure as PNG, drawn once."""
-        return self._render("png")
-
-    @cached_property
-    def svg(self) -> bytes:
-        """The figure as SVG, drawn once."""
-        return self._render("svg")
-
-    @cached_property
-    def pdf(self) -> bytes:
-        """The figure as PDF, drawn once."""
-        return self._render("pdf")
+    png = cached_property[bytes](lambda self: self._render("png"))
+    svg = cached_property[bytes](lambda self: self._render("svg"))
+    pdf = cached_property[bytes](lambda self: self._render("pdf"))
+    """The figure in each format, drawn once."""
 
     def _render(self, kind: str) -> bytes:
         target = BytesIO()
