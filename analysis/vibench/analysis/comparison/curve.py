@@ -238,11 +238,8 @@ def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tupl
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
     # Divided differences are used for speed: a chaotic curve has thousands of peaks.
     (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
-    bend, slope, top = (
-        (right - left) / (before + after),
-        (left * after + right * before) / (before + after),
-        y[1],
-    )
+    bend, top = (right - left) / (before + after), y[1]
+    slope = (left * after + right * before) / (before + after)
     offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
     peak = float(top + slope * offset + bend * offset**2)
     at_hz = float(np.exp(x[1] + offset))
