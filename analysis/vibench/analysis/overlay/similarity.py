@@ -68,11 +68,9 @@ class SimilarityCurve:
 
     def logarithm(self, of: LogarithmOf) -> Reals:
         """Return log10 of the response in the named unit, shape (points,)."""
-        match of:
-            case LogarithmOf.NORMALISED:
-                value = self.response
-            case LogarithmOf.METRES | LogarithmOf.MILLIMETRES | LogarithmOf.MICROMETRES:
-                value = self.response * self.amplitude_m * _PER_METRE[of]
+        value = self.response
+        if of is not LogarithmOf.NORMALISED:
+            value = value * self.amplitude_m * _PER_METRE[of]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.log10(value))
 
