@@ -137,6 +137,14 @@ def test_ramp_and_ringing_before_a_sweep_give_no_points():
     assert everything.response_i.max() > 2.5
 
 
+def test_live_response_curves_keep_the_newest_points_in_order(monkeypatch):
+    everything = view_of_sweep(LEAD_IN_S).history()
+    monkeypatch.setattr("vibench.analysis.live._view.MOST_POINTS", 5)
+    newest = view_of_sweep(LEAD_IN_S).history()
+    assert np.array_equal(newest.time_s, everything.time_s[-5:])
+    assert np.array_equal(newest.response_ii, everything.response_ii[-5:])
+
+
 def test_a_poincare_section_excludes_the_lead_in():
     settled = view_of_sweep(LEAD_IN_S).section.displacement_m
     assert 0 < settled.size < view_of_sweep(0.0).section.displacement_m.size

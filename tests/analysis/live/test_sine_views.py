@@ -6,14 +6,12 @@ import pytest
 from vibench.analysis.live._portrait import PoincareSection, portrait, portrait_samples
 from vibench.analysis.live._ring import RingWindow
 from vibench.analysis.live._sine_response import (
-    SinePoint,
     drive_tone,
     drive_turns,
     look_samples,
     sine_point,
     stretch_samples,
 )
-from vibench.analysis.live._view import SweepTrace
 
 RATE = 51_200.0
 A0 = 4e-6
@@ -144,12 +142,3 @@ def test_a_full_poincare_section_drops_its_oldest_points():
     section = PoincareSection(most=10)
     section.add(portrait(sine(260.0, portrait_samples(260.0, RATE) + 13_000), 0, 2, RATE))
     assert section.displacement_m.size == section.velocity_m_per_s.size == 10
-
-
-def test_a_live_trace_keeps_the_newest_points_in_order():
-    trace = SweepTrace(most=5)
-    for number in range(23):
-        trace.add(SinePoint(float(number), 100.0 + number, 1e-6, -1.0, 1.0, 2.0, 1.5))
-    assert trace.points == 5
-    assert np.array_equal(trace.history().time_s, [18, 19, 20, 21, 22])
-    assert np.array_equal(trace.history().frequency_hz, [118, 119, 120, 121, 122])

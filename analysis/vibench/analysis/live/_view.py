@@ -164,33 +164,6 @@ class SweepHistory:
     response_ii: Reals
 
 
-class SweepTrace:
-    """Sweep points in the order of time, in an array that is allocated once and keeps the newest."""
-
-    def __init__(self, most: int = MOST_POINTS) -> None:
-        self._most = most
-        self._rows = np.empty((len(_COLUMNS), 2 * most))
-        self._begin = self._end = 0
-
-    @property
-    def points(self) -> int:
-        """Number of stored sweep points."""
-        return self._end - self._begin
-
-    def add(self, point: SinePoint) -> None:
-        """Add a sweep point; the oldest point is dropped when the memory is full."""
-        if self._end == self._rows.shape[1]:
-            self._rows[:, : self.points] = self._rows[:, self._begin : self._end].copy()
-            self._begin, self._end = 0, self.points
-        self._rows[:, self._end] = [getattr(point, name) for name in _COLUMNS]
-        self._end += 1
-        self._begin = max(self._begin, self._end - self._most)
-
-    def history(self) -> SweepHistory:
-        """Return all stored sweep points."""
-        return SweepHistory(*self._rows[:, self._begin : self._end].copy())
-
-
 HELD_S = 10.0
 _POINT_EVERY_S = 0.1
 """Update interval of sweep points and portraits [s]; other pictures are updated in every frame."""
@@ -258,7 +231,7 @@ class LiveView:
         self._meters = LevelMeters(np.array([each.full_scale_v for each in channels]), sample_rate_hz)
         self.levels: tuple[Level, ...] = ()
         """Levels in the order of the channels; empty before the first sample."""
-        self._trace = SweepTrace()
+        self._points: Reals = np.empty((len(_COLUMNS), 0))
         self._pointed = 0
         self.section = PoincareSection()
         """Poincaré points of all portraits so far."""
@@ -341,7 +314,7 @@ class LiveView:
 
     def history(self) -> SweepHistory:
         """Return all sweep points: Responses I and II, velocity extremes and A0 over the drive frequency."""
-        return self._trace.history()
+        return SweepHistory(*self._points)
 
     @property
     def impacts(self) -> int:
@@ -359,4 +332,5 @@ class LiveView:
         newest = self._ring.newest(min(wanted, max(0, self._ring.next_sample - self._lead_in)))
         point = sine_point(newest, rows, self._rate_hz, self._quantity)
         if point is not None:
-            self._trace.add(point)
+            newest_point = [[getattr(point, name)] for name in _COLUMNS]
+            self._points = np.append(self._points[:, 1 - MOST_POINTS :], newest_point, axis=1)
