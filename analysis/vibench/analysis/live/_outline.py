@@ -5,7 +5,7 @@ would look like a comb. The extremes are then taken over a whole period around t
 many columns, the waveform is drawn. If a column contains a whole period, its own extremes are drawn.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
@@ -26,7 +26,7 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest
-from ..recordings.channels import RESPONSE
+from ..recordings.channels import RESPONSE, OnRead, ignore_reading
 from ..signals.arrays import Reals
 
 # Envelopes: the smallest and largest sample in every column of the picture. Every sample belongs to a column,
@@ -201,12 +201,6 @@ _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
-OnRead = Callable[[int, int], None]
-"""Callback (values read, total values) while an overview is computed."""
-
-
-def ignore_reading(done: int, total: int) -> None:
-    """Do nothing; the default callback."""
 
 
 @dataclass(frozen=True, eq=False)
