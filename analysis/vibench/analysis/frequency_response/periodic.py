@@ -410,12 +410,11 @@ class PeriodicFrequencyResponse(Tabular):
 
 @dataclass(frozen=True)
 class _Realisation:
-    """Mean spectra of one realisation, shape (lines,), and the scatter of its periods."""
+    """Mean spectra of one realisation, and the scatter of its periods."""
 
     repetition: Repetition
-    drive: Complexes
-    base: Complexes
-    response: Complexes
+    spectra: Complexes
+    """Mean spectra of drive, base and response over the periods, shape (3, lines)."""
     covariance: Complexes
     """Covariance of the means of (base, response) over the periods, shape (2, 2, lines)."""
 
@@ -480,15 +479,7 @@ class PeriodicSums:
         deviation = motion - motion.mean(axis=1, keepdims=True)
         freedom = repetition.periods * (repetition.periods - 1)
         covariance = np.einsum("ipk,jpk->ijk", np.conj(deviation), deviation) / freedom
-        self._realisations.append(
-            _Realisation(
-                repetition,
-                spectra[0].mean(axis=0),
-                motion[0].mean(axis=0),
-                motion[1].mean(axis=0),
-                covariance,
-            )
-        )
+        self._realisations.append(_Realisation(repetition, spectra.mean(axis=1), covariance))
 
     def without_each(self) -> Iterator["PeriodicSums"]:
         """For each realisation, yield the spectra of all others; nothing for a single realisation."""
@@ -502,8 +493,12 @@ class PeriodicSums:
 
     def motion(self) -> Complexes:
         """Return the mean spectra of base and response, shape (realisations, 2, lines)."""
-        lines = min(one.drive.size for one in self._realisations)
-        return np.stack([[one.base[:lines], one.response[:lines]] for one in self._realisations])
+        return self._spectra()[:, 1:]
+
+    def _spectra(self) -> Complexes:
+        """Return the mean spectra of drive, base and response, shape (realisations, 3, lines)."""
+        lines = min(one.spectra.shape[1] for one in self._realisations)
+        return np.stack([one.spectra[:, :lines] for one in self._realisations])
 
     def frequency_response(
         self, *, delay_s: float = 0.0, orders: Integers | None = None
@@ -523,10 +518,8 @@ class PeriodicSums:
         """
         if not self._realisations:
             raise NotEnoughData("no realisation was added; give at least one")
-        lines = min(one.drive.size for one in self._realisations)
-        drive = np.stack([one.drive[:lines] for one in self._realisations])
-        base = np.stack([one.base[:lines] for one in self._realisations])
-        response = np.stack([one.response[:lines] for one in self._realisations])
+        drive, base, response = self._spectra().transpose(1, 0, 2)
+        lines = drive.shape[1]
         covariance = np.mean([one.covariance[:, :, :lines] for one in self._realisations], axis=0)
         period = float(np.mean([one.repetition.period_samples for one in self._realisations]))
         frequency_hz = np.arange(lines, dtype=np.float64) * (self._sample_rate_hz / period)
