@@ -65,9 +65,8 @@ def find_hits(
     rate, low_hz, high_hz = channels.sample_rate_hz, *band_hz
     blocks = range(stretch.start, stretch.stop, _BLOCK)
     piece = max(1, min(round(_PIECE_S * rate), stretch.samples // _FEWEST_PIECES))
-    energies = np.concatenate(
-        [_energies(_drive(channels, first, min(first + _BLOCK, stretch.stop)), piece) for first in blocks]
-    )
+    powers = [_drive(channels, first, min(first + _BLOCK, stretch.stop)) ** 2 for first in blocks]
+    energies = np.concatenate([np.add.reduceat(each, np.arange(0, each.size, piece)) for each in powers])
     short = np.sort(energies)[::-1][: max(1, int(_SHORT * energies.size))]
     if not np.sum(short) > _MOST_ENERGY * np.sum(energies):
         return None
@@ -91,10 +90,6 @@ def _drive(channels: Channels, start: int, stop: int) -> Reals:
     """Return the drive without its offset; lost samples are zero."""
     drive = np.nan_to_num(channels.read(start, stop)[0])
     return np.asarray(drive - np.median(drive))
-
-
-def _energies(drive: Reals, piece: int) -> Reals:
-    return np.asarray(np.add.reduceat(drive**2, np.arange(0, drive.size, piece)))
 
 
 def _longest(clear: Reals) -> int:
