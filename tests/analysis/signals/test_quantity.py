@@ -11,15 +11,15 @@ from vibench.analysis.signals.quantity import Quantity, converted_signal, deriva
 RATE = 5120.0
 
 
-@given(given_=st.sampled_from(list(Quantity)), wanted=st.sampled_from(list(Quantity)))
-def test_a_conversion_and_its_inverse_cancel(given_, wanted):
+@given(power=st.integers(-2, 2))
+def test_a_conversion_and_its_inverse_cancel(power):
     frequency_hz = np.array([0.5, 95.0, 266.0, 4000.0])
-    both = derivative_factor(frequency_hz, given_, wanted) * derivative_factor(frequency_hz, wanted, given_)
+    both = derivative_factor(frequency_hz, power) * derivative_factor(frequency_hz, -power)
     np.testing.assert_allclose(both, 1, rtol=1e-14)
 
 
 def test_integration_at_zero_frequency_gives_nan():
-    factor = derivative_factor(np.array([0.0, 1.0]), Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    factor = derivative_factor(np.array([0.0, 1.0]), -1)
     assert np.isnan(factor[0])
     assert factor[1] == pytest.approx(1 / (2j * np.pi))
 
@@ -71,7 +71,7 @@ def test_a_converted_sine_has_the_amplitude_and_phase_of_the_factor(frequency_hz
         low_hz=20,
         high_hz=2000,
     )
-    factor = derivative_factor(np.array([frequency_hz]), Quantity.VELOCITY, steps)[0]
+    factor = derivative_factor(np.array([frequency_hz]), steps.derivatives - 1)[0]
     expected = np.real(factor * np.exp(2j * np.pi * frequency_hz * time))
     inner = slice(2000, -2000)
     np.testing.assert_allclose(result.samples[inner], expected[inner], atol=5e-3 * abs(factor))

@@ -76,9 +76,7 @@ class FrequencyResponseView:
 
     def factor(self, frequency_hz: Reals) -> Reals:
         """Return the factor from displacement over displacement to the view's quantities."""
-        start, stop = (Quantity.DISPLACEMENT, list(Quantity)[abs(self.power)])
-        steps = (start, stop) if self.power >= 0 else (stop, start)
-        return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
+        return np.abs(derivative_factor(frequency_hz, self.power))
 
     def apply(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
         """Convert displacement over displacement to the view's quantities, including bounds."""

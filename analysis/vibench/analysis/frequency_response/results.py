@@ -176,11 +176,5 @@ def converted_frequency_response(
     power = (response[1].derivatives - response[0].derivatives) - (
         drive[1].derivatives - drive[0].derivatives
     )
-    start = Quantity.ACCELERATION if power < 0 else Quantity.DISPLACEMENT
-    value = transmission.value
-    while power != 0:
-        step = max(-2, min(2, power))
-        stop = list(Quantity)[start.derivatives + step]
-        value = np.asarray(value * derivative_factor(transmission.frequency_hz, start, stop))
-        power -= step
-    return replace(transmission, value=value)
+    factor = derivative_factor(transmission.frequency_hz, power)
+    return replace(transmission, value=transmission.value * factor)

@@ -54,13 +54,9 @@ _EDGE_PERIODS = 6
 """Periods of the lower band edge after which its ringing is below 1e-3 of the disturbance."""
 
 
-def derivative_factor(frequency_hz: Reals, given: Quantity, wanted: Quantity) -> Complexes:
-    """Return the factor (i w)^n that converts a spectrum from the given to the wanted quantity.
-
-    For integrals the factor at 0 Hz is NaN.
-    """
+def derivative_factor(frequency_hz: Reals, power: int) -> Complexes:
+    """Return (i w)^power, which differentiates a spectrum; a negative power integrates, with NaN at 0 Hz."""
     omega = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
-    power = wanted.derivatives - given.derivatives
     if power >= 0:
         return np.asarray(omega**power)
     at_rest = omega == 0
@@ -103,13 +99,14 @@ def converted_signal(
     padded = fft.next_fast_len(samples.size + edge, real=True)
     frequency_hz = fft.rfftfreq(padded, 1 / sample_rate_hz)
     rest, steady = samples, np.zeros(samples.size)
+    power = wanted.derivatives - given.derivatives
     for line_hz in (each for each in lines_hz if low_hz <= each <= high_hz):
         line = steady_line(rest, line_hz / sample_rate_hz)
         rest = rest - line.real
-        steady += (line * complex(derivative_factor(np.array(line_hz), given, wanted))).real
+        steady += (line * complex(derivative_factor(np.array(line_hz), power))).real
     spectrum = fft.rfft(scipy.signal.detrend(rest), padded)
     spectrum[0] = 0.0
-    spectrum[1:] *= derivative_factor(frequency_hz[1:], given, wanted)
+    spectrum[1:] *= derivative_factor(frequency_hz[1:], power)
     spectrum[1:] *= _band(frequency_hz[1:], low_hz, high_hz)
     result = np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: samples.size])
     return ConvertedSignal(result + steady, sample_rate_hz, wanted, low_hz, high_hz, edge)

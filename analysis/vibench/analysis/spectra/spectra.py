@@ -271,7 +271,8 @@ class AmplitudeSpectrum(Tabular):
 
     def convert(self, given: Quantity, wanted: Quantity) -> "AmplitudeSpectrum":
         """Return the spectrum of another quantity, such as velocity / (i w); integrals are NaN at 0 Hz."""
-        return replace(self, value=self.value * derivative_factor(self.frequency_hz, given, wanted))
+        power = wanted.derivatives - given.derivatives
+        return replace(self, value=self.value * derivative_factor(self.frequency_hz, power))
 
 
 def amplitude_spectrum(

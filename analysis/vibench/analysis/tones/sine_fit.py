@@ -12,8 +12,7 @@ from scipy.special import log_ndtr, ndtr
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ..signals.confidence import standard_uncertainty
-from ..signals.quantity import Quantity, derivative_factor
-from ..signals.window import Window
+from ..signals.quantity import derivative_factor
 from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spectrum
 from .order_tracking import track_orders
 
@@ -237,9 +236,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
         Ends of the band.
     """
     kept = (density.frequency_hz >= low_hz) & (density.frequency_hz <= high_hz) & (density.frequency_hz > 0)
-    factor = np.abs(
-        derivative_factor(density.frequency_hz[kept], Quantity.ACCELERATION, Quantity.DISPLACEMENT)
-    )
+    factor = np.abs(derivative_factor(density.frequency_hz[kept], -2))
     spacing_hz = density.sample_rate_hz / density.segment_samples
     power = density.density[kept] * spacing_hz
     # Lines within one noise bandwidth are not independent; the rms has half the relative spread of the power.
