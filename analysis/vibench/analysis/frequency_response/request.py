@@ -11,7 +11,7 @@ from ..signals.arrays import Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE
 from ..signals.quantity import Quantity, derivative_factor
 from ..signals.window import Window, hop_samples, taper
-from .results import Estimator, FrequencyResponse, converted_frequency_response
+from .results import Estimator, FrequencyResponse, converted_frequency_response, require_estimator
 
 
 class MagnitudeScale(StrEnum):
@@ -165,21 +165,7 @@ class FrequencyResponseRequest:
                 raise InvalidRequest(f"{name} of {value:g} was requested; it must be finite and more than 0")
         if self.averages is not None and self.averages <= 1:
             raise InvalidRequest(f"{self.averages:g} averages were requested; a coherence needs more than 1")
-        if self.estimator is Estimator.HV and self.noise_ratio is None:
-            raise InvalidRequest(
-                "hv was requested without a noise ratio; give the noise density of the response over that of "
-                "the base, or use the estimator drive"
-            )
-        if self.estimator is not Estimator.HV and self.noise_ratio is not None:
-            raise InvalidRequest(f"a noise ratio has no meaning for {self.estimator.value}; only hv uses it")
-        if self.noise_ratio is not None and not (np.isfinite(self.noise_ratio) and self.noise_ratio >= 0):
-            raise InvalidRequest(
-                f"the noise ratio is {self.noise_ratio:g}; it must be a finite number, zero or more"
-            )
-        if not 0 < self.confidence < 1:
-            raise InvalidRequest(
-                f"a confidence of {self.confidence:g} was requested; it must be between 0 and 1"
-            )
+        require_estimator(self.estimator, self.noise_ratio, self.confidence)
         hop_samples(_PROXY_SAMPLES, self.overlap)
 
     @property

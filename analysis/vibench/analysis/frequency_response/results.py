@@ -29,6 +29,21 @@ class Estimator(StrEnum):
     """S_ry / S_rx: unbiased by noise on both channels, given a clean reference such as the drive voltage."""
 
 
+def require_estimator(estimator: Estimator, noise_ratio: float | None, confidence: float) -> None:
+    """Raise InvalidRequest for a missing, useless or invalid noise ratio, and for an invalid confidence."""
+    if estimator is Estimator.HV and noise_ratio is None:
+        raise InvalidRequest(
+            "hv was requested without a noise ratio; give the noise density of the response over that of "
+            "the base, or use the estimator drive"
+        )
+    if estimator is not Estimator.HV and noise_ratio is not None:
+        raise InvalidRequest(f"a noise ratio has no meaning for {estimator.value}; only hv uses it")
+    if noise_ratio is not None and not (np.isfinite(noise_ratio) and noise_ratio >= 0):
+        raise InvalidRequest(f"the noise ratio is {noise_ratio:g}; it must be a finite number, zero or more")
+    if not 0 < confidence < 1:
+        raise InvalidRequest(f"a confidence of {confidence:g} was requested; it must be between 0 and 1")
+
+
 @dataclass(frozen=True)
 class FrequencyResponseSettings:
     """Settings of a frequency response."""

@@ -10,7 +10,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
 from ..signals.window import Window
 from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
-from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
+from .results import Estimator, FrequencyResponse, FrequencyResponseSettings, require_estimator
 
 _ENOUGH_FREEDOM = 24.0
 """Degrees of freedom at which the variance of a spectral line is accurate to a third."""
@@ -314,19 +314,7 @@ def transmissibility(
 
 
 def _check(settings: FrequencyResponseSettings) -> None:
-    ratio = settings.noise_ratio
-    if settings.estimator is Estimator.HV:
-        if ratio is None:
-            raise InvalidRequest(
-                "hv was requested without a noise ratio; give noise_ratio = noise density of the response "
-                "over that of the drive, or use the estimator drive"
-            )
-        if not (ratio >= 0 and np.isfinite(ratio)):
-            raise InvalidRequest(f"noise_ratio is {ratio:g}; it must be a finite number, zero or more")
-    elif ratio is not None:
-        raise InvalidRequest(f"noise_ratio has no meaning for {settings.estimator.value}; only hv uses it")
-    if not 0 < settings.confidence < 1:
-        raise InvalidRequest(f"confidence is {settings.confidence:g}; it must be between 0 and 1")
+    require_estimator(settings.estimator, settings.noise_ratio, settings.confidence)
     if not settings.sample_rate_hz > 0:
         raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it must be more than 0")
 
