@@ -9,7 +9,7 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -161,19 +161,17 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
-    """Return the class of a command group that has these commands, in this order."""
+class LateCommands(SectionedGroup):
+    """The group of all commands, in the order of `COMMANDS`."""
 
-    class LateCommands(SectionedGroup):
-        def __init__(self, **settings: Any) -> None:
-            super().__init__(**settings)
-            self.commands = {name: LateCommand(name, place) for name, place in places.items()}
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = {name: LateCommand(name, place) for name, place in COMMANDS.items()}
 
-        def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
-            with explain_refusals([] if named.get("resilient_parsing") else args):
-                return super().make_context(info_name, args, *given, **named)
-
-    return LateCommands
+    def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
+        """Parse the arguments before the command's name."""
+        with explain_refusals([] if named.get("resilient_parsing") else args):
+            return super().make_context(info_name, args, *given, **named)
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
@@ -215,7 +213,7 @@ COMMANDS = {
 app = typer.Typer(
     name="vibench",
     help="Vibro-impact shaker experiments: measure, analyse and predict.",
-    cls=late_commands(COMMANDS),
+    cls=LateCommands,
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
@@ -223,7 +221,7 @@ app = typer.Typer(
 )
 
 
-def print_version(*, is_requested: bool) -> None:
+def print_version(is_requested: bool) -> None:
     """Print the version if ``--version`` was given."""
     if is_requested:
         from importlib.metadata import version
@@ -281,7 +279,7 @@ def vibench(
         typer.Option(
             "--version",
             is_eager=True,
-            callback=lambda is_requested: print_version(is_requested=is_requested),
+            callback=print_version,
             help="Print the version.",
         ),
     ] = False,
