@@ -8,7 +8,7 @@ from rich.console import Console
 from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus, Supervision
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import UntilNote
-from vibench.cli.engine_bars import EngineBars
+from vibench.cli.engine_bars import engine_bars
 
 UNTIL = UntilNote(
     stretch=1,
@@ -40,7 +40,7 @@ SAID = "response_ii ± 2 % of 1 %, about 12 s left"
 def test_the_terminal_shows_bound_target_and_time_left():
     log = io.StringIO()
     status = EngineStatus(state=EngineState.RUNNING, attendance=Supervision.UNATTENDED, run=RUN)
-    with EngineBars(Console(file=log, width=300, force_terminal=True)) as bars:
+    with engine_bars(Console(file=log, width=300, force_terminal=True)) as bars:
         bars.draw(status)
     assert SAID in log.getvalue()
 

@@ -1,9 +1,8 @@
 """Progress bars that show the engine's status: one for the recording, one for the campaign."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from threading import Event, Thread
-from types import TracebackType
-from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn, TimeRemainingColumn
@@ -35,23 +34,13 @@ COLUMNS = (
 class EngineBars:
     """Display of the engine's status: bars for recording and campaign, lines for results and messages."""
 
-    def __init__(self, on: Console = console) -> None:
-        self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
-        self._shown = show_bars(self._bars)
+    def __init__(self, bars: Progress) -> None:
+        self._bars = bars
         self._whole: TaskID | None = None
         self._one: TaskID | None = None
         self._name = ""
         self._reported_names: set[str] = set()
         self._messages = 0
-
-    def __enter__(self) -> Self:
-        self._shown.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
         """Draw the changes since the last status."""
@@ -102,31 +91,34 @@ def sentence(message: EngineMessage) -> str:
     return f"{message.kind.value:11} {text}"
 
 
-class Watching:
-    """Display of the newest status, in a separate thread that alone waits for a blocked terminal.
+@contextmanager
+def engine_bars(on: Console = console) -> Iterator[EngineBars]:
+    """Draw the bars of an engine's status in this context."""
+    with show_bars(Progress(*COLUMNS, console=on, speed_estimate_period=10)) as bars:
+        yield EngineBars(bars)
+
+
+@contextmanager
+def show_status(ask: Callable[[], EngineStatus], engine: Engine) -> Iterator[None]:
+    """Display the newest status, in a separate thread that alone waits for a blocked terminal.
 
     After a stop, print on standard error who stopped the engine, and whether its output is off.
     """
+    ending = Event()
 
-    def __init__(self, ask: Callable[[], EngineStatus], engine: Engine) -> None:
-        self._ask = ask
-        self._engine = engine
-        self._ending = Event()
-        self._thread = Thread(target=self._draw, name="progress", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ending.set()
-        # Do not wait longer: a blocked terminal must not keep the command from ending.
-        self._thread.join(timeout=2.0)
-
-    def _draw(self) -> None:
-        with EngineBars() as bars:
-            while not self._ending.wait(INTERVAL_S):
-                bars.draw(self._ask())
-            bars.draw(self._ask())
-        if stopped := self._engine.stop_sentence:
+    def draw() -> None:
+        with engine_bars() as bars:
+            while not ending.wait(INTERVAL_S):
+                bars.draw(ask())
+            bars.draw(ask())
+        if stopped := engine.stop_sentence:
             errors.print(f"stopped: {stopped}")
+
+    thread = Thread(target=draw, name="progress", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ending.set()
+        # Do not wait longer: a blocked terminal must not keep the command from ending.
+        thread.join(timeout=2.0)

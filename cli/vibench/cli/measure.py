@@ -39,7 +39,7 @@ from vibench.acquisition.plan import Campaign, Family, distinct_drives, require_
 from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 from vibench.sim import count_text, number_of
 
-from .engine_bars import Watching
+from .engine_bars import show_status
 from .options import option
 from .output import ExitCode, console, errors, leave_output_to_json, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
@@ -258,7 +258,7 @@ def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[E
     handler = RequestHandler(engine, JobQueue(engine))
     try:
         engine.open(rig, confirm)
-        with serving(handler, what), stop_on_signal(engine.switch, what), Watching(handler.status, engine):
+        with serving(handler, what), stop_on_signal(engine.switch, what), show_status(handler.status, engine):
             yield engine
     except BaseException as error:
         try:

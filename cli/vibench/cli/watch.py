@@ -22,7 +22,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.stop_files import SWITCH_OFF
 
-from .engine_bars import INTERVAL_S, EngineBars
+from .engine_bars import INTERVAL_S, engine_bars
 from .options import option
 from .output import console, print_json
 from .paths import AsJson
@@ -46,7 +46,7 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
     engine = the_engine(pid)
     console.print(f"{engine.what}, process {engine.pid}, since {engine.started_utc}; Ctrl-C stops watching.")
     try:
-        with EngineClient.attach(engine.address) as client, EngineBars() as bars:
+        with EngineClient.attach(engine.address) as client, engine_bars() as bars:
             while (status := client.status()).state in DRIVING:
                 bars.draw(status)
                 time.sleep(INTERVAL_S)
