@@ -5,9 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import timedelta
-from enum import StrEnum
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -47,41 +45,36 @@ from .paths import AsJson, BenchPath, FaultsPath, rig_at
 if TYPE_CHECKING:
     from vibench.analysis import ExpectedResult, TimeShare
 
+Known = Mapping[str, Sequence["ExpectedResult"]]
+EndsS = Mapping[str, tuple[float | None, float]]
 
-class Form(StrEnum):
-    """Form of the command's output: text for people or JSON for programs."""
 
-    TEXT = "text"
-    JSON = "json"
+def estimate_document(
+    expected: CampaignEstimate, shares: Sequence["TimeShare"], known: Known, ends_s: EndsS
+) -> dict[str, object]:
+    """Return a campaign's estimate, with expected uncertainties and recording times, as a JSON document."""
+    return asdict(expected) | {
+        "needed_bytes": expected.needed_bytes,
+        "fits": expected.fits,
+        "uncertainty": {name: [each.to_dict() for each in found] for name, found in known.items()},
+        "until": {name: {"expected_s": end, "longest_s": most} for name, (end, most) in ends_s.items()},
+        "within": [asdict(each) for each in shares],
+    }
 
 
 def print_estimate(
-    expected: CampaignEstimate,
-    form: Form,
-    known: Mapping[str, Sequence["ExpectedResult"]] = MappingProxyType({}),
-    shares: Sequence["TimeShare"] = (),
-    ends_s: Mapping[str, tuple[float | None, float]] = MappingProxyType({}),
+    expected: CampaignEstimate, shares: Sequence["TimeShare"], known: Known, ends_s: EndsS
 ) -> None:
     """Print a campaign's number of recordings, time, size, free space, and expected uncertainty."""
-    match form:
-        case Form.JSON:
-            document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
-            uncertainties = {name: [each.to_dict() for each in found] for name, found in known.items()}
-            ends = {name: {"expected_s": end, "longest_s": most} for name, (end, most) in ends_s.items()}
-            within = [asdict(each) for each in shares]
-            print_json(document | {"uncertainty": uncertainties, "until": ends, "within": within})
-        case Form.TEXT:
-            for share in shares:
-                console.print(share.sentence)
-            console.print(paragraph(estimate_text(expected)))
-            for name, (end_s, longest_s) in ends_s.items():
-                length = "an unknown time" if end_s is None else f"about {end_s:.3g} s"
-                console.print(
-                    f"{name}: records {length} until its results are known, at most {longest_s:.4g} s"
-                )
-            for name, found in known.items():
-                for each in found:
-                    console.print(f"{name}: {each.sentence}")
+    for share in shares:
+        console.print(share.sentence)
+    console.print(paragraph(estimate_text(expected)))
+    for name, (end_s, longest_s) in ends_s.items():
+        length = "an unknown time" if end_s is None else f"about {end_s:.3g} s"
+        console.print(f"{name}: records {length} until its results are known, at most {longest_s:.4g} s")
+    for name, found in known.items():
+        for each in found:
+            console.print(f"{name}: {each.sentence}")
 
 
 def expected_results(campaign: Campaign, rig: Rig) -> dict[str, tuple["ExpectedResult", ...]]:
@@ -214,13 +207,16 @@ def measure(
     if time_limit is not None:
         plan, shares = vibench.analysis.fit_to(plan, rig, duration_s(time_limit))
     known = expected_results(plan, rig) if only_estimate else {}
-    print_estimate(
+    estimate = (
         estimate_campaign(plan, rig, out, existing),
-        Form.JSON if as_json and only_estimate else Form.TEXT,
-        known,
         shares,
+        known,
         expected_ends_s(plan, rig) if only_estimate else {},
     )
+    if only_estimate and as_json:
+        print_json(estimate_document(*estimate))
+    else:
+        print_estimate(*estimate)
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)
