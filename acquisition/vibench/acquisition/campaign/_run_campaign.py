@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,13 +14,12 @@ from vibench.sim import count_text
 
 from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
-from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
+from ..errors import AcquisitionError, InstrumentLost, RecordingError
 from ..excitation.plan import AbstractFeedback
 from ..host.chosen import member
-from ..instruments import Knob
 from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measuring_s, require_played
 from ..recording import open_recording, sole_use
-from ..rig import Confirm, KnobSheet, Rig, channels_of, load_rig
+from ..rig import Confirm, Rig, channels_of, confirm_knobs_of, load_rig
 from ..run.ending import Progress
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import StopSwitch
@@ -136,8 +136,7 @@ class CampaignRunner:
     def _may_begin(self, point: JournalPoint) -> bool:
         """Pause, and wait until the beam has been moved, before a measurement; return False after a stop."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
-            self._attempts.pause_before(point.name)
-            self._attempts.ask_for_beam(point.measurement)
+            self._attempts.wait_before(point.name, point.measurement)
         return self._stop.request is None
 
     def _measure(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
@@ -377,16 +376,6 @@ class ReconnectingBench:
                 bench.__exit__(kind, error, trace)
         finally:
             self._power.__exit__(kind, error, trace)
-
-
-def _require_confirmed(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
-    missing = [f"{knob.instrument} {knob.setting}" for knob in knobs if knob not in sheet.knobs]
-    if missing:
-        raise CheckFailed(
-            f"the reopened bench has unconfirmed settings: {', '.join(missing)}. Nothing was "
-            "energised; check these settings and resume the campaign"
-        )
-    return sheet
 
 
 WRITTEN_SHARE = 1 / 1.7

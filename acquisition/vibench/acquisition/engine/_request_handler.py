@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from time import monotonic
@@ -12,10 +13,8 @@ from vibench.sim import count_text
 from ..bench.bench import Bench
 from ..campaign import planned_recordings
 from ..check.admission import CheckRule, require_on_record
-from ..errors import CheckFailed
-from ..instruments import Knob
 from ..plan import LimitCheck, distinct_drives, require_within_limits
-from ..rig import Confirm, KnobSheet, Rig
+from ..rig import KnobSheet, Rig, confirm_knobs_of
 from ..run.drive import drive_for
 from ..stopping.program import INTERVAL_S
 from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
@@ -93,22 +92,6 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         attendance=attendance,
         patience_s=granted_s,
     )
-
-
-def confirm_from(sheet: KnobSheet | None) -> Confirm:
-    """Return a function that confirms the settings listed on a sheet, and refuses all other settings."""
-
-    def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
-        seen = () if sheet is None else sheet.knobs
-        missing = [f"{knob.instrument}: {knob.setting} at {knob.value}" for knob in knobs if knob not in seen]
-        if sheet is None or missing:
-            raise CheckFailed(
-                f"settings made by hand are not confirmed ({'; '.join(missing)}). Nothing was energised; "
-                "check and confirm each knob, then open the bench again"
-            )
-        return sheet
-
-    return confirm
 
 
 STALL_S = 0.2
@@ -190,8 +173,8 @@ class RequestHandler:
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig."""
         self._engine.published.enter(EngineState.OPENING)
-        confirm = None if rig.virtual is not None else confirm_from(confirmations)
-        self._jobs.put(lambda: self._engine.open(rig, confirm))
+        confirm = partial(confirm_knobs_of, confirmations, "the list of knobs set by hand")
+        self._jobs.put(lambda: self._engine.open(rig, None if rig.virtual else confirm))
 
     def close_bench(self) -> None:
         """Close the bench."""

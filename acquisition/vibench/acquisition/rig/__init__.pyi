@@ -27,6 +27,7 @@ from ._knobs import (
     check_calibrations as check_calibrations,
     confirm_at_terminal as confirm_at_terminal,
     confirm_by_sheet as confirm_by_sheet,
+    confirm_knobs_of as confirm_knobs_of,
     confirm_simulated as confirm_simulated,
     save_knob_sheet as save_knob_sheet,
     sensor_name as sensor_name,

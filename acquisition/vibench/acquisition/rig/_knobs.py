@@ -10,10 +10,8 @@ from typing import Protocol, cast
 
 from pydantic import AwareDatetime, Field
 
-from vibench.sim.operating_system.this import replace_file
-
 from ..errors import CheckFailed, CheckStopped, ConfigurationError
-from ..host.toml_file import FrozenModel, load_toml
+from ..host.toml_file import FrozenModel, load_toml, save_toml
 from ..instruments import Knob, PlugInKind, SensorFacts, driver_of
 from ._configuration import ChannelConfig, Rig
 from ._sensors import Role, sensor_table
@@ -208,34 +206,27 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
                 f"{path} was confirmed at {sheet.confirmed:%Y-%m-%d %H:%M %Z}; it is valid for {valid}. "
                 "Nothing was energised; confirm the knobs again"
             )
-        missing = [_knob_text(knob) for knob in knobs if knob not in sheet.knobs]
-        if missing:
-            raise CheckFailed(
-                f"{path} does not confirm {'; '.join(missing)}. Nothing was energised; check these "
-                "knobs and confirm them again"
-            )
-        return sheet
+        return confirm_knobs_of(sheet, str(path), knobs)
 
     return confirm
+
+
+def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ...]) -> KnobSheet:
+    """Return ``sheet`` if it confirms ``knobs``; otherwise raises CheckFailed, which names ``origin``."""
+    missing = [_knob_text(knob) for knob in knobs if sheet is None or knob not in sheet.knobs]
+    if sheet is None or missing:
+        raise CheckFailed(
+            f"{origin} does not confirm {'; '.join(missing)}. Nothing was energised; check these knobs and "
+            "confirm them again"
+        )
+    return sheet
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
     """Save a sheet, replacing an older sheet; raises ConfigurationError when ``path`` is another file."""
     if path.exists():
         load_knob_sheet(path)
-    knobs = "".join(
-        f"\n[[knobs]]\ninstrument = {_quote(knob.instrument)}\nsetting = {_quote(knob.setting)}\n"
-        f"value = {_quote(knob.value)}\n"
-        for knob in sheet.knobs
-    )
-    text = f"operator = {_quote(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
-    try:
-        with replace_file(path) as coming:
-            coming.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path} cannot be written ({error.strerror}). Nothing was energised; give another path"
-        ) from error
+    save_toml(sheet, path)
 
 
 def load_knob_sheet(path: Path) -> KnobSheet:
@@ -245,12 +236,6 @@ def load_knob_sheet(path: Path) -> KnobSheet:
 
 def _knob_text(knob: Knob) -> str:
     return f"{knob.instrument} {knob.setting} at {knob.value}"
-
-
-def _quote(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    printable = "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped)
-    return f'"{printable}"'
 
 
 class CalibrationRule(StrEnum):
