@@ -82,13 +82,10 @@ class Attempts:
         self._beam = beam
         self._reopen = reopen
 
-    def ask_for_beam(self, measurement: Measurement) -> None:
-        """Wait until the operator has moved the beam to the point of a measurement; a stop ends the wait."""
-        self._beam.ask(self._bench, measurement)
-
-    def pause_before(self, name: str) -> None:
-        """Pause before the point ``name`` as the campaign requires; a stop ends the pause."""
+    def wait_before(self, name: str, measurement: Measurement) -> None:
+        """Pause before a point, and wait until the operator has moved the beam; a stop ends both waits."""
         self._pause.wait(self._bench, name)
+        self._beam.ask(self._bench, measurement)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Measure a point until it has a valid recording; ``tell`` is called after every block.
@@ -110,7 +107,9 @@ class Attempts:
                 if not (left and self._is_retryable(reason_code_of(error))):
                     raise
                 self._prepare_retry(point, path, error)
-                self._rest_before_retry(point, error)
+                self._pause.wait(self._bench, point.name)
+                if self._switch.request is not None:
+                    raise
             except BaseException as error:
                 reason = f"{type(error).__name__}: {error}".removesuffix(": ")
                 self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
@@ -129,7 +128,7 @@ class Attempts:
                     point,
                     path,
                 )
-                self.pause_before(point.name)
+                self._pause.wait(self._bench, point.name)
                 if self._switch.request is not None:
                     return point_result
         raise AssertionError("the last attempt returns or raises")
@@ -184,11 +183,6 @@ class Attempts:
         else:
             self._bench.idle(LOOK_EVERY_S)  # repeating at once seldom works
         self._note(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
-
-    def _rest_before_retry(self, point: Point, failed: AcquisitionError) -> None:
-        self.pause_before(point.name)
-        if self._switch.request is not None:
-            raise failed
 
     def _reopen_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
         began, idled_s = monotonic(), 0.0

@@ -410,7 +410,9 @@ class Journal(ClosedOnLeaving):
     def campaign(self) -> Campaign:
         """The campaign's plan, as it was at the start of the campaign."""
         with sentences(self.path):
-            return Campaign.model_validate_json(self._fact("plan_json"))
+            command = "SELECT value FROM campaign WHERE key = 'plan_json'"
+            (plan,) = self._connection.execute(command).fetchone()
+            return Campaign.model_validate_json(plan)
 
     @property
     def bench(self) -> BenchIdentity:
@@ -476,10 +478,6 @@ class Journal(ClosedOnLeaving):
     def close(self) -> None:
         """Close the journal. May be called at any time."""
         self._connection.close()
-
-    def _fact(self, key: str) -> str:
-        (value,) = self._connection.execute("SELECT value FROM campaign WHERE key = ?", (key,)).fetchone()
-        return str(value)
 
     def _insert(
         self, connection: sqlite3.Connection, points: Sequence[Point], place: int, added_after: str

@@ -83,7 +83,7 @@ class CampaignLog(ClosedOnLeaving):
         try:
             self._file = path.open("a", encoding="utf-8")
             # A killed program may have left an incomplete last line.
-            if not _ends_a_line(path):
+            if path.read_bytes()[-1:] not in (b"", b"\n"):
                 self._file.write("\n")
         except OSError as error:
             raise RecordingError(
@@ -102,11 +102,6 @@ class CampaignLog(ClosedOnLeaving):
         """Close the log. May be called at any time."""
         with suppress(OSError):
             self._file.close()
-
-
-def _ends_a_line(path: Path) -> bool:
-    content = path.read_bytes()[-1:]
-    return content in (b"", b"\n")
 
 
 STATUS_SUFFIX = ".status"

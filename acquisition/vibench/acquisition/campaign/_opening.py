@@ -107,13 +107,9 @@ def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, st
 def _end_of_attempt(
     path: Path, measurement: Measurement, errors: Mapping[str, str]
 ) -> tuple[JournalPointState, ReasonCode, str, str]:
-    if path.exists():
-        return _state_of_file(path, measurement)
-    why = errors.get(path.name, "nothing was recorded")
-    return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {why}", ""
-
-
-def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
+    if not path.exists():
+        why = errors.get(path.name, "nothing was recorded")
+        return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {why}", ""
     found = read_attempt(path, measurement, SealDepth.WHOLE)
     if found.damage:
         return JournalPointState.INTERRUPTED, ReasonCode.DAMAGED, found.damage, found.seal
@@ -121,14 +117,14 @@ def _state_of_file(path: Path, measurement: Measurement) -> tuple[JournalPointSt
         return JournalPointState.DONE, ReasonCode.CARRIED_OUT, found.reason, found.seal
     match found.state:
         case RecordingState.FAILED:
-            return JournalPointState.FAILED, ReasonCode.FAULT, found.reason, found.seal
+            ended = JournalPointState.FAILED, ReasonCode.FAULT
         case RecordingState.STOPPED:
-            return JournalPointState.INTERRUPTED, ReasonCode.STOPPED, found.reason, found.seal
-        case RecordingState.INTERRUPTED:
-            reason = f"{PROGRAM_ENDED}, after {found.duration_s:.1f} s of samples"
-            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, reason, found.seal
+            ended = JournalPointState.INTERRUPTED, ReasonCode.STOPPED
         case _:
-            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, found.reason, found.seal
+            ended = JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED
+    is_cut = found.state is RecordingState.INTERRUPTED
+    reason = f"{PROGRAM_ENDED}, after {found.duration_s:.1f} s of samples" if is_cut else found.reason
+    return *ended, reason, found.seal
 
 
 MOST_DIFFERENCES = 5

@@ -340,8 +340,7 @@ class ReconnectingBench:
         before, self._bench = self._bench, None
         if before is not None:
             self._last_check = before.last_check
-            sheet = before.confirmations
-            self._confirm = lambda knobs: _require_confirmed(sheet, knobs)
+            self._confirm = partial(confirm_knobs_of, before.confirmations, "the first opening of the bench")
             with suppress(AcquisitionError):  # only a lost instrument cannot be silenced
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
