@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from ..errors import RecordingError
 from ..instruments import Identity
-from ._header import ROLE_PATTERN, ChannelHeader
+from ._header import ROLE_PATTERN, UNPLANNED, ChannelHeader
 from ._layout import (
     CONFIGURATION,
     ROLE_WIDTH,
@@ -53,6 +53,10 @@ def _none_if_unknown(value: object) -> object:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
+def _none_if_unplanned(value: object) -> object:
+    return None if isinstance(value, int) and value == UNPLANNED else value
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Unknown = BeforeValidator(_none_if_unknown)
@@ -72,7 +76,7 @@ class FileFacts(_AbstractFacts):
 
     sample_rate_hz: Rate
     requested_sample_rate_hz: Rate
-    expected_samples: Annotated[int, Field(ge=-1)]
+    expected_samples: Annotated[Annotated[int, Field(ge=0)] | None, BeforeValidator(_none_if_unplanned)]
     origin: Annotated[Origin, Field(strict=False)]
     started_utc: Annotated[str, AfterValidator(_iso_moment)]
     recording_id: str
@@ -110,12 +114,12 @@ class ConfigurationFacts(_AbstractFacts):
 
     model_config = ConfigDict(strict=False)
 
-    plan_json: dict[str, JsonValue]
-    bench_json: dict[str, JsonValue]
-    instruments_json: dict[str, Identity]
-    confirmations_json: dict[str, str | float]
-    provenance_json: dict[str, JsonValue]
-    bench_check_json: dict[str, JsonValue] = Field(default_factory=dict)
+    plan: dict[str, JsonValue] = Field(alias="plan_json")
+    bench: dict[str, JsonValue] = Field(alias="bench_json")
+    instruments: dict[str, Identity] = Field(alias="instruments_json")
+    confirmations: dict[str, str | float] = Field(alias="confirmations_json")
+    provenance: dict[str, JsonValue] = Field(alias="provenance_json")
+    bench_check: dict[str, JsonValue] = Field(default_factory=dict, alias="bench_check_json")
     """Result of the last bench check; empty for files of earlier versions, which do not contain it."""
 
 

@@ -196,7 +196,14 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
     """Attach scalars to a file, group or dataset."""
     for name, value in values.items():
         if isinstance(value, str):
-            _write_text(target, name, value)
+            raw = encode(value, len(value.encode()))
+            if len(raw) > ATTRIBUTE_BYTES:
+                raise RecordingError(
+                    f"The text of {name!r} has {len(raw)} bytes; an HDF5 attribute holds at most "
+                    f"{ATTRIBUTE_BYTES}. Nothing was written; shorten it."
+                )
+            dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
+            target.attrs.create(name, np.array(raw, dtype=dtype), dtype=dtype)
         else:
             target.attrs[name] = value
 
@@ -230,17 +237,6 @@ def read_text_dataset(group: h5py.Group, name: str) -> str:
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
         raise ValueError(f"{group.name}/{name} is not a text")
     return decode(dataset[()])
-
-
-def _write_text(target: h5py.HLObject, name: str, text: str) -> None:
-    raw = encode(text, len(text.encode()))
-    if len(raw) > ATTRIBUTE_BYTES:
-        raise RecordingError(
-            f"The text of {name!r} has {len(raw)} bytes; an HDF5 attribute holds at most {ATTRIBUTE_BYTES}."
-            " Nothing was written; shorten it."
-        )
-    dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
-    target.attrs.create(name, np.array(raw, dtype=dtype), dtype=dtype)
 
 
 def json_text(what: str, values: Mapping[str, Any]) -> str:

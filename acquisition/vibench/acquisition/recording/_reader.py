@@ -22,6 +22,7 @@ from ._overview import CountOverview, read_overview
 from ._preallocate import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
 from ._seal import (
+    DAMAGE,
     ChannelStates,
     CheckedCounts,
     SealCheck,
@@ -140,10 +141,6 @@ class OpenRecording:
         """Open the file again, to read what has been written since."""
         self.file.close()
         self.file = open_hdf5(self.path)
-
-
-DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
-"""Exceptions that h5py raises for damaged files."""
 
 
 @dataclass(frozen=True)
@@ -446,27 +443,15 @@ def _read(handle: OpenRecording) -> Recording:
     }
     for table in layout.TABLES:
         tables.require_ranges(columns[table.name], table, facts.samples, roles)
-    configuration = configuration_facts(file)
+    stated = dict(facts)
+    del stated["roles"]
     return Recording(
         path=handle.path,
-        state=facts.state,
-        reason=facts.reason,
-        samples=facts.samples,
-        sample_rate_hz=facts.sample_rate_hz,
-        requested_sample_rate_hz=facts.requested_sample_rate_hz,
-        expected_samples=facts.expected_samples if facts.expected_samples >= 0 else None,
-        origin=facts.origin,
-        started_utc=facts.started_utc,
-        recording_id=facts.recording_id,
+        **stated,
+        **dict(configuration_facts(file)),
         samples_id="" if is_part or facts.samples == 0 else samples_id(file, roles),
         channels=require_different(channel_header(role, file[role]) for role in roles),
-        plan=configuration.plan_json,
-        bench=configuration.bench_json,
-        instruments=configuration.instruments_json,
-        confirmations=configuration.confirmations_json,
-        provenance=configuration.provenance_json,
         seal="" if is_part else seal_of(file),
-        bench_check=configuration.bench_check_json,
         segments=tables.segments(columns["segments"]),
         events=tuple(Event(*row) for row in tables.rows(columns["events"], layout.EVENTS)),
         overloads=tuple(Overload(*row) for row in tables.rows(columns["overloads"], layout.OVERLOADS)),

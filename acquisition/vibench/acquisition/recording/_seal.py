@@ -47,6 +47,8 @@ KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Environment variable with the path of the key's file; used by all commands and programs."""
 SHORTEST_KEY = 16
 AS_SEALED = "unchanged since it was sealed"
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
+"""Exceptions that h5py raises for damaged files."""
 
 
 Manifest = dict[str, dict[str, str]]
@@ -159,7 +161,7 @@ def check_seal(
         if marks.get(SHA256) != seal:
             return SealCheck(SealState.DAMAGED, "the seal itself was changed", "")
         differing = list(_differing(file, manifest, depth, states))
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+    except DAMAGE as error:
         require_reachable(file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read to check its seal ({error})", "")
     if differing:
@@ -234,7 +236,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         if not checksum:
             return _missing_seal("it was saved before results were sealed", key)
         text = _result_text(group)
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+    except DAMAGE as error:
         require_reachable(group.file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read to check its seal ({error})", "")
     if _sha256(text.encode()) != checksum:
@@ -342,7 +344,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
     roles = str(read_attributes(file).get("roles", "")).split() if depth is SealDepth.WHOLE else ()
     try:
         other = [role for role in roles if _data_sha256(file[role]) != read_attributes(file[role])["sha256"]]
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+    except DAMAGE as error:
         require_reachable(file, error)
         return SealCheck(SealState.DAMAGED, f"it has no seal, and cannot be read ({error})", "")
     if other:
@@ -452,14 +454,9 @@ def open_database(uri: str) -> sqlite3.Connection:
 
 @contextmanager
 def close_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Close a new connection if its first use fails; Windows cannot move or delete an open file.
+    """Close a new ``connection`` if its first use fails; Windows cannot move or delete an open file.
 
     Raises sqlite3.Error, or any other error of the first use, after closing.
-
-    Parameters
-    ----------
-    connection
-        New connection.
     """
     try:
         yield connection
