@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
-from enum import Enum, auto
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +32,6 @@ from ..rig import Channel, GeneratorConfig, Rig, Role, calibrations, channels_of
 from ..stopping.stop import StopSwitch
 
 
-class Found(Enum):
-    """Kinds of instruments that the computer can find."""
-
-    GENERATORS = auto()
-    """VISA resources, among which generators are found."""
-    CONVERTERS = auto()
-    """Devices of the DAQ driver, among which converters are found."""
-
-
 @dataclass(frozen=True)
 class Question:
     """Question whose answer is a value of the configuration."""
@@ -48,15 +39,20 @@ class Question:
     key: str
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
-    found: Found | None = None
+    choices: Callable[[InstrumentList], tuple[str, ...]] = lambda _: ()
+    """Function that returns the names of the found instruments that can answer the question."""
+
+
+def _converters(seen: InstrumentList) -> tuple[str, ...]:
+    return tuple(device.name for device in seen.daq_devices)
 
 
 QUESTIONS = (
     Question("name", "What is the bench called?"),
-    Question("generator.resource", "Which of these is the function generator?", Found.GENERATORS),
+    Question("generator.resource", "Which of these is the function generator?", attrgetter("visa_resources")),
     Question("generator.settle_s", "Waiting time after each message to the generator [s]? 0.1 is safe"),
     Question("generator.amplitude_limit_vpp", "Largest amplitude that you allow on this bench [Vpp]?"),
-    Question("daq.device", "Which of these is the converter?", Found.CONVERTERS),
+    Question("daq.device", "Which of these is the converter?", _converters),
     Question("daq.sample_rate_hz", "How many samples a second?"),
     Question("daq.channels.drive_voltage.physical", "Which input reads the generator's voltage?"),
     Question("daq.channels.drive_voltage.attenuation", "Voltage divider in front of this input (1: none)?"),
@@ -240,17 +236,6 @@ _SCHEMA = re.compile(r"^#:schema .*\n")
 _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
 
 
-def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
-    """Return the names of the found instruments that can answer a question."""
-    match question.found:
-        case Found.GENERATORS:
-            return seen.visa_resources
-        case Found.CONVERTERS:
-            return tuple(device.name for device in seen.daq_devices)
-        case None:
-            return ()
-
-
 def configure(
     template: Path,
     target: Path,
@@ -277,11 +262,11 @@ def configure(
     text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is relative to the template
     questions = questions_for(text) if questions is None else questions
     for question in questions:
-        if len(choices := found_choices(question, seen)) == 1:
+        if len(choices := question.choices(seen)) == 1:
             text = with_answer(text, question.key, choices[0], "the only one seen")
     while True:
         for question in questions:
-            text = _valid_answer(text, question, found_choices(question, seen), ask, note, refuse)
+            text = _valid_answer(text, question, question.choices(seen), ask, note, refuse)
         text = _with_driver(_with_product(text, seen, note), note)
         try:
             from_toml(tomllib.loads(text), Rig, target)
