@@ -40,7 +40,7 @@ from vibench.sim.maps import MapResults, open_map
 
 from .options import Fields, RequestOptions, option
 from .output import ExitCode, bold, console, errors, print_json
-from .paths import AllowExternal, AsJson, external_data, free_path, room_for_folder
+from .paths import AllowExternal, AsJson, free_path, room_for_folder
 from .progress_bars import reading_bar
 from .specimen_option import SpecimenOption, read_specimen
 
@@ -137,7 +137,7 @@ def analyse(
     ] = None,
     *,
     options: Annotated[RequestOptions[AnalysisOptions], Fields(OPTIONS, NOISE)],
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
@@ -158,18 +158,17 @@ def analyse(
         tracked_specimen(overlay)
     overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
     simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
-    with external_data(allow_external):
-        _analyse(
-            recording,
-            out,
-            request,
-            overlays,
-            (simulation, draws),
-            fit=tuple(free or ()) if fit else None,
-            hidden=_Output.STORED if keep else _Output.REPORTED if hidden else _Output.OMITTED,
-            overlay=overlay,
-            as_json=as_json,
-        )
+    _analyse(
+        recording,
+        out,
+        request,
+        overlays,
+        (simulation, draws),
+        fit=tuple(free or ()) if fit else None,
+        hidden=_Output.STORED if keep else _Output.REPORTED if hidden else _Output.OMITTED,
+        overlay=overlay,
+        as_json=as_json,
+    )
 
 
 def _analyse(

@@ -11,7 +11,7 @@ from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recording
 
 from .options import option
 from .output import ExitCode, console, errors, print_json
-from .paths import AllowExternal, AsJson, external_data
+from .paths import AllowExternal, AsJson
 
 COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "length", "size", "verdict")
 
@@ -19,12 +19,11 @@ COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "le
 def show_catalogue(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of recordings.")],
     rebuild: Annotated[bool, option("Read every file again, not only changed files.")] = False,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """List the recordings of a folder and its subfolders: excitation, date, outcome, size."""
-    with external_data(allow_external):
-        entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
+    entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
     if as_json:
         print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
     elif entries:

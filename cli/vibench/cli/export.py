@@ -20,7 +20,7 @@ from vibench.analysis.exchange import Format, Results, excerpt, export_functions
 
 from .options import option
 from .output import console, leave_output_to_json, print_json, print_warnings
-from .paths import AllowExternal, AsJson, external_data, file_at
+from .paths import AllowExternal, AsJson, file_at
 from .progress_bars import transfer_bar
 
 
@@ -51,7 +51,7 @@ def export(
         str | None,
         option("With --spectra: quantity as in 'vibench analyse'; by default displacement."),
     ] = None,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a recording's samples or spectra, with units, to a file for other programs."""
@@ -67,11 +67,10 @@ def export(
             )
         place = recording.resolve()
         request = FrequencyResponseRequest(view=parse_view(quantity or "displacement", MagnitudeScale.LOG))
-        with external_data(allow_external):
-            path = file_at(out, place / f"{place.name}.uff")
-            _report(tuple(scan_files(recordings_in(recording), request, path)), as_json=as_json)
+        path = file_at(out, place / f"{place.name}.uff")
+        _report(tuple(scan_files(recordings_in(recording), request, path)), as_json=as_json)
         return
-    with external_data(allow_external), open_recording(recording) as opened:
+    with open_recording(recording) as opened:
         chosen = excerpt(
             opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
         )

@@ -14,7 +14,7 @@ from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recor
 
 from .options import option
 from .output import console, print_json
-from .paths import AllowExternal, AsJson, external_data, file_at
+from .paths import AllowExternal, AsJson, file_at
 from .progress_bars import transfer_bar
 
 
@@ -26,15 +26,10 @@ def import_file(
     out: Annotated[
         Path | None, option("Path of the new recording or its folder; by default beside FILE.", "NAME.h5")
     ] = None,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Convert another program's file to a recording, or list its contents."""
-    with external_data(allow_external):
-        _import(file, mapping, out, as_json=as_json)
-
-
-def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool) -> None:
     if mapping is None:
         if out is not None:
             raise InvalidRequest(f"{out} cannot be written without a mapping; give --mapping MAP.toml")

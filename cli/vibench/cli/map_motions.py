@@ -26,7 +26,7 @@ from vibench.sim.study import ExistingStudy, plausibility_warnings
 from .interruption import watch_interrupt
 from .options import option
 from .output import bold, console, print_json, print_warnings
-from .paths import AllowExternal, AsJson, external_data, room_for_folder
+from .paths import AllowExternal, AsJson, room_for_folder
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 
@@ -60,7 +60,7 @@ def map_motions(
     kicks: Annotated[
         int, option("Map of initial states: number of random kicks per motion and size.", "N", min=0)
     ] = 0,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Map the motions over two parameters or two start coordinates, or along one parameter."""
@@ -91,11 +91,7 @@ def map_motions(
     levels = [recorded_response(path) for path in like or ()]
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-    with (
-        external_data(allow_external),
-        watch_interrupt() as is_stopped,
-        study_bar(request.grid.size) as observer,
-    ):
+    with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
         results = solve_map(request, out / FILE, existing, workers, cluster, observer, is_stopped)
     stability = kick_stability(results, kicks=kicks, workers=workers) if kicks and results.is_complete else ()
     from vibench.analysis.report import map_figure

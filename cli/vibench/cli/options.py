@@ -99,11 +99,12 @@ def option(
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
     max: int | None = None,  # noqa: A002
+    callback: Callable[..., None] | None = None,
 ) -> OptionInfo:
     """Return an option that is not a model's field; ``name`` if it differs from the parameter's name."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(
-        *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max
+        *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max, callback=callback
     )
     return made
 

@@ -1,9 +1,10 @@
 """Options that several commands share."""
 
 import tempfile
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from vibench.acquisition import ConfigurationError, file_path
 
@@ -23,19 +24,24 @@ FaultsPath = Annotated[
     option("Scheduled faults of a virtual rig: a file, or the name night.", "FAULTS", name="--faults"),
 ]
 AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
+
+
+def _allow_external(context: typer.Context, is_allowed: bool) -> None:
+    """Allow HDF5 files to link to other files until the command ends, if the user allows this."""
+    if is_allowed:
+        from vibench.sim.hdf5_files.door import allow_external_data
+
+        context.with_resource(allow_external_data())
+
+
 AllowExternal = Annotated[
     bool,
-    option("Read data that HDF5 files keep in other files (external or virtual).", name="--allow-external"),
+    option(
+        "Read data that HDF5 files keep in other files (external or virtual).",
+        name="--allow-external",
+        callback=_allow_external,
+    ),
 ]
-
-
-def external_data(allowed: bool) -> AbstractContextManager[None]:
-    """Return a context in which HDF5 files may link to other files, if the user allows this."""
-    if not allowed:
-        return nullcontext()
-    from vibench.sim.hdf5_files.door import allow_external_data
-
-    return allow_external_data()
 
 
 def bench_path(given: Path | None) -> Path:

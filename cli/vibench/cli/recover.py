@@ -8,17 +8,16 @@ import typer
 from vibench.acquisition.recording import recover
 
 from .output import console, print_json
-from .paths import AllowExternal, AsJson, external_data
+from .paths import AllowExternal, AsJson
 
 
 def recover_recording(
     recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="Interrupted recording.")],
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Finish an interrupted recording: all committed samples become NAME.h5."""
-    with external_data(allow_external):
-        path = recover(recording)
+    path = recover(recording)
     if as_json:
         print_json({"recording": str(path)})
     else:

@@ -19,7 +19,7 @@ from vibench.sim.study import (
 from .interruption import watch_interrupt
 from .options import option
 from .output import ExitCode, console, errors, print_json, print_warnings
-from .paths import AllowExternal, AsJson, external_data, require_suffix
+from .paths import AllowExternal, AsJson, require_suffix
 from .points import Cluster, Workers, complain_about_points, print_failures
 from .progress_bars import study_bar
 
@@ -35,7 +35,7 @@ def study(
     only_estimate: Annotated[
         bool, option("Print number of points and estimated work without computing.", name="--estimate")
     ] = False,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Predict every combination of the values in a file, starting with the longest runs."""
@@ -52,11 +52,7 @@ def study(
             console.print(f"{points} points, estimated work {work_s:.2g} s on one core")
         return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-    with (
-        external_data(allow_external),
-        watch_interrupt() as is_stopped,
-        study_bar(request.grid.size) as observer,
-    ):
+    with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
         results = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
     if as_json:
         print_json(document(results, out))

@@ -12,7 +12,7 @@ from vibench.acquisition.recording import SealDepth, seal_key
 
 from .options import option
 from .output import ExitCode, console, errors, print_json
-from .paths import AllowExternal, AsJson, external_data
+from .paths import AllowExternal, AsJson
 
 
 def verify(
@@ -24,12 +24,11 @@ def verify(
         Path | None,
         option("Key file of the signatures; by default the file named by VIBENCH_SEAL_KEY.", "FILE"),
     ] = None,
-    allow_external: AllowExternal = False,
+    _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Check all recordings of a folder, including every sample, and the journals against their seals."""
-    with external_data(allow_external):
-        found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
+    found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
     counts = Counter(each.verdict for each in found)
     if as_json:
         print_json(
