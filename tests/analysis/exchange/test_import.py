@@ -209,16 +209,19 @@ def test_wav_of_24_bits_keeps_every_bit(tmp_path):
 def test_more_bits_than_a_wav_file_states_are_refused(tmp_path):
     counts = np.random.default_rng(2).integers(-(2**22), 2**22, SAMPLES, dtype=np.int32)
     meaning = mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0"))
-    for name, stored in (("left", counts << 8), ("right", counts)):
+    for name, stored in (("left", counts << 8), ("right", counts), ("plain", counts)):
         extensible = struct.pack("<HHIIHHHHI", 0xFFFE, 1, int(RATE_HZ), 4 * int(RATE_HZ), 4, 32, 22, 24, 4)
         form = extensible + bytes.fromhex("0100000000001000800000aa00389b71")
+        if name == "plain":
+            form = struct.pack("<HHIIHH", 1, 1, int(RATE_HZ), 4 * int(RATE_HZ), 4, 25)
         body = b"WAVEfmt " + struct.pack("<I", len(form)) + form
         body += b"data" + struct.pack("<I", 4 * SAMPLES) + stored.astype("<i4").tobytes()
         (tmp_path / f"{name}.wav").write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
     _, values = read_import(tmp_path / "left.wav", meaning)
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
-    with pytest.raises(UnusableData, match="states 24 bits per sample, but its samples have more"):
-        read_import(tmp_path / "right.wav", meaning)
+    for name in ("right", "plain"):
+        with pytest.raises(UnusableData, match=r"states 2[45] bits per sample, but its samples have more"):
+            read_import(tmp_path / f"{name}.wav", meaning)
 
 
 @pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 2), (2, SAMPLES)])
@@ -551,6 +554,9 @@ def hdf5_bytes(kept):
         ("a.wav", wav_bytes(2, 44), "states 400 bytes of samples, but contains 0"),
         ("a.wav", wav_bytes(2, 30), "states 16 bytes about its samples, but contains 10"),
         ("a.wav", wav_bytes(2, 36), "it ends before its samples"),
+        ("a.wav", wav_bytes(2).replace(struct.pack("<II", 8000, 32000), bytes(8)), "its sample rate is 0"),
+        ("a.wav", wav_bytes(3).replace(b"\x06\0\x18\0", b"\x03\0\x18\0"), "3 bytes for 2 samples of 24 bits"),
+        ("a.wav", wav_bytes(2).replace(struct.pack("<I", 400), bytes(4)), "it states 0 bytes of samples"),
         ("a.uff", {"kept": 1000}, "it ends inside a dataset"),
         (
             "a.uff",

@@ -266,6 +266,7 @@ def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
     [
         ({}, {}, {"t0": 0.0025}),
         ({"delay": 0.0}, {"delay": 0.0}, {"delay": 0.0025}),
+        ({"time_shift": 0.0}, {"time_shift": 0.0}, {"time_shift": 0.0025}),
         ({}, {}, {"trigger_time": "12:00:00.0025"}),
         ({"first_sample": 0.0}, {"first_sample": 0.0}, {"first_sample": 13.0}),
         tuple({"start_time": f"01/03/2026 12:00:0{second}"} for second in (0, 0, 1)),
@@ -326,3 +327,65 @@ def test_several_start_times_or_gains_of_one_table_are_refused(tmp_path, suffix,
     names = [f"{'/' * (suffix == '.h5')}y#{number}" for number in (1, 2, 3)]
     with pytest.raises(InvalidRequest, match=said):
         read_import(tmp_path / f"a{suffix}", names)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (3, 4, 5, 0, 1, 2), (3, 0, 4, 1, 5, 2)])
+@pytest.mark.parametrize("suffix", [".csv", ".mat"])
+def test_times_that_belong_to_no_definite_channel_are_refused(tmp_path, suffix, order):
+    late = TIMES + LATE / RATE_HZ
+    columns = [TIMES, TIMES, late, *signal(TIMES)[:2], signal(late)[2]]
+    names = ("t_u", "t_a", "t_v", "u", "a", "v")
+    if suffix == ".csv":
+        text(tmp_path / "a.csv", ",".join(names[k] for k in order), [columns[k] for k in order])
+    else:
+        savemat(tmp_path / "a.mat", {names[k]: columns[k] for k in order})
+    with pytest.raises(InvalidRequest, match="has different times in "):
+        read_import(tmp_path / f"a{suffix}")
+
+
+@pytest.mark.parametrize("suffix", [".tdms", ".h5", ".mat"])
+@pytest.mark.parametrize("fact", ["SampleRate", "srate", "time"])
+def test_rates_and_times_in_another_group_of_the_file_are_used(tmp_path, suffix, fact):
+    kept = np.delete(TIMES, slice(700, 737)) if fact == "time" else TIMES
+    data, other = dict(zip("uav", signal(kept), strict=True)), {fact: kept if fact == "time" else 5000.0}
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".mat":
+        savemat(path, {"info": other, "data": data})
+    elif suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["data/u"], file["data/a"], file["data/v"] = data.values()
+            file[f"info/{fact}"] = other[fact]
+    else:
+        nptdms = pytest.importorskip("nptdms")
+        with nptdms.TdmsWriter(path) as writer:
+            group = nptdms.GroupObject("info", {} if fact == "time" else other)
+            times = [nptdms.ChannelObject("info", fact, kept)] if fact == "time" else []
+            writer.write_segment(
+                [group, *times, *(nptdms.ChannelObject("d", *each) for each in data.items())]
+            )
+    names = tuple({".mat": "data.", ".h5": "/data/", ".tdms": ""}[suffix] + each for each in "uav")
+    if fact == "time":
+        is_right(read_import(path, names), lost=37)
+    else:
+        with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping 5120"):
+            read_import(path, names)
+
+
+@pytest.mark.parametrize("fact", ["unit_string", "gain", "NI_Scale[0]_Linear_Slope"])
+def test_a_unit_or_scale_that_changes_within_a_tdms_file_is_refused(tmp_path, fact):
+    nptdms = pytest.importorskip("nptdms")
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        for value in ("m/s", "mm/s") if fact == "unit_string" else (0.5, 1.0):
+            rows = [("u", {}), ("a", {}), ("v", {fact: value})]
+            objects = [nptdms.ChannelObject("g", name, signal(TIMES)[0], facts) for name, facts in rows]
+            writer.write_segment(objects)
+    with pytest.raises((InvalidRequest, UnusableData), match=r"mm/s|gain = 0.5|NI_Scale"):
+        read_import(tmp_path / "a.tdms")
+
+
+def test_single_precision_in_the_wrong_byte_order_is_refused(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, values in zip("uav", signal(TIMES), strict=True):
+            file[name] = values.astype("<f4").view(">f4")
+    with pytest.raises(UnusableData, match="a recording stores only peaks"):
+        read_import(tmp_path / "a.h5", ("/u", "/a", "/v"))

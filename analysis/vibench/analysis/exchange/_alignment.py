@@ -24,13 +24,14 @@ UNITS = {*_HERTZ, *SECONDS, "\u00b5s"} - {""}
 _WORDS = "|".join(re.escape(each) for each in sorted(UNITS, key=len, reverse=True))
 _UNIT = rf"(?:[ _/,]*(?:in )?[\[(]?(?P<unit>{_WORDS})[\])]?)?"
 _RATE = re.compile(
-    rf"(?:(?:(?:sampl\w*?|scan|acq\w*|daq)[ _]?)?rate|sampl\w*?[ _]?freq\w*|samples[ _]?per[ _]?sec\w*"
-    rf"|f_?s(?:amp\w*)?|freq\w*[ _]?sampl\w*|sr|sps|sfreq|abtast(?:rate|frequenz)){_UNIT}",
+    rf"(?:(?:(?:samp\w*?|scan|acq\w*|daq|(?:nominal[ _]?)?s)[ _]?)?rate|sampl\w*?[ _]?freq\w*"
+    rf"|samples[ _]?per[ _]?sec\w*|f_?s(?:amp\w*)?|freq\w*[ _]?sampl\w*|sr|sps|sfreq"
+    rf"|abtast(?:rate|frequenz)){_UNIT}",
     re.IGNORECASE,
 )
 _INTERVAL = re.compile(
-    r"(?:(?:sampl\w*?|scan)[ _]?(?:interval|period|time)|interval|t_?s(?:amp\w*)?|(?:d|delta)[ _]?[tx]"
-    r"|[tx][ _]?(?:d|delta|step)|time[ _]?(?:step|delta)"
+    r"(?:(?:samp\w*?|scan)[ _]?(?:interval|period|time)|(?:t(?:ime)?[ _]?)?interval|t_?s(?:amp\w*)?"
+    r"|(?:d|delta)[ _]?[tx]|[tx][ _]?(?:d|delta|step)|time[ _]?(?:step|delta)"
     r"|(?:(?:time|wf|x|abscissa)[ _]?)?(?:inc(?:rement)?|spacing))"
     rf"{_UNIT}",
     re.IGNORECASE,
@@ -41,7 +42,7 @@ _START = re.compile(
     re.IGNORECASE,
 )
 _SHIFT = re.compile(
-    r".*(?:delay|latency|skew|trigger|first[ _]?sample|sample[ _]?offset).*"
+    r".*(?:delay|latency|skew|shift|clock|trigger|first[ _]?sample|sample[ _]?offset).*"
     r"|(?:.*[ _])?(?:lag|begin)(?:[ _].*)?",
     re.IGNORECASE,
 )
@@ -88,16 +89,19 @@ _LONGEST_PAUSE = 10
 """Largest ratio of the time span, in sample intervals, to the number of samples; more means wrong times."""
 
 
-def stated_times(facts: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+def stated_times(
+    facts: Iterable[tuple[str, Any]], elsewhere: Iterable[tuple[str, Any]] = ()
+) -> dict[str, Any]:
     """Return the time fields of a `SourceChannel` from facts in a file: the channel's own facts come first.
 
     A fact is a sample rate, an interval, a start, or a unit of these. A name may end with the unit:
-    ``"dt_ms"``, ``"Sample rate [kHz]"``.
+    ``"dt_ms"``, ``"Sample rate [kHz]"``. If no fact states a rate, rates stated elsewhere in the file apply.
     """
     facts = tuple(facts)
     units = {name.strip().casefold(): _text(value).strip() for name, value in facts if "unit" in name.lower()}
     axis = next((unit for name, unit in units.items() if _AXIS_UNIT.fullmatch(name)), "")
-    rates_hz = list(_rates_hz(facts, units, axis))
+    others = (each for each in elsewhere if _RATE.fullmatch(each[0].strip()))
+    rates_hz = list(_rates_hz(facts, units, axis)) or list(_rates_hz(others, units, axis))
     other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
     trouble = "" if other is None else f"states both {rates_hz[0]:.9g} and {other:.9g} samples/s"
     for name, value in facts:

@@ -94,9 +94,12 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
 
 def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
     known: dict[str, Facts] = {}
-    for dataset in (item for _, item in walk(file) if _holds_samples(item)):
+    items = [item for _, item in walk(file)]
+    elsewhere = [fact for item in items if isinstance(item, h5py.Group) for fact in _facts(item, known)]
+    for dataset in filter(_holds_samples, items):
         beside = _facts(dataset.parent, known)
-        times = stated_times((*dataset.attrs.items(), *beside, *_facts_above(dataset.parent, known)))
+        own = (*dataset.attrs.items(), *beside, *_facts_above(dataset.parent, known))
+        times = stated_times(own, elsewhere)
         if dataset.ndim == 1:
             channel = _channel(dataset, dataset.name, dataset.shape[0], 0, beside)
             yield replace(channel, **times), _Place(dataset.name, None)

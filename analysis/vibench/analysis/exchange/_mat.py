@@ -205,12 +205,21 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Files exported by vibench state the sample rate beside the channels.
-    about = own.get("recording")
-    yield TableSource(dict(_numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())))
+    about = tuple(_part(own, "recording").items())
+    yield TableSource(dict(_numbers(own, "", about, tuple(_all_facts(own)))))
+
+
+def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the values of a struct and of all structs in it, with their names."""
+    for name, value in struct.items():
+        yield from _all_facts(value) if isinstance(value, dict) else ((name, value),)
 
 
 def _numbers(
-    struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
+    struct: Mapping[str, Any],
+    prefix: str,
+    around: tuple[tuple[str, Any], ...],
+    elsewhere: tuple[tuple[str, Any], ...],
 ) -> Iterator[tuple[SourceChannel, Any]]:
     # Some programs store start and increment in a struct beside the values.
     axis, quantity = _part(struct, "x_values"), _part(struct, "quantity")
@@ -218,11 +227,11 @@ def _numbers(
     own = {**{name: label for name, label in labels.items() if label}, **struct, **axis}
     own |= _part(quantity, "unit_transformation")
     facts = (*((name, value) for name, value in own.items() if np.size(value) <= MOST_CHANNELS), *around)
-    times = stated_times(facts)
+    times = stated_times(facts, elsewhere)
     for name, value in struct.items():
         match value:
             case dict():
-                yield from _numbers(value, f"{prefix}{name}.", facts)
+                yield from _numbers(value, f"{prefix}{name}.", facts, elsewhere)
             case np.ndarray() if _holds_samples(value):
                 step = exact_step(value.dtype)
                 scale = "" if "scale_factor" in struct else scale_among(facts, are_counts=step is not None)

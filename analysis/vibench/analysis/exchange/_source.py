@@ -5,6 +5,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -111,23 +112,28 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
     read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
     for number, each in enumerate(source.channels):
-        above = [
-            time for time in axes if time.samples == each.samples and _group(each).startswith(_group(time))
-        ]
-        above = [time for time in above if axes[time].is_named] or above
-        nearest = max((len(_group(time)) for time in above), default=0)
-        near = [time for time in above if len(_group(time)) == nearest]
+        ranks = {time: _rank(time, each, is_named=axes[time].is_named) for time in axes}
+        best = max(ranks.values(), default=())
+        near = [time for time, rank in ranks.items() if rank == best and any(rank)]
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
-        if (
-            isinstance(source.source, Hdf5Source)
-            and len({axes[time].moments for time in near if axes[time].unit is not None}) > 1
-        ):
-            # HDF5 sorts names alphabetically, so their order does not show which times belong to a channel.
-            named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
-            axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
+        if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
+            # Only columns of times, each followed by its channels, show which times belong to a channel.
+            order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
+            is_clear = order[0] and not any(one and two for one, two in pairwise(order))
+            if isinstance(source.source, Hdf5Source) or not is_clear:  # HDF5 sorts names alphabetically
+                named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
+                axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
         yield axes[chosen[0]].of(channel) if chosen else channel
+
+
+def _rank(time: SourceChannel, channel: SourceChannel, *, is_named: bool) -> tuple[bool, bool, int]:
+    """Return how likely times belong to a channel; all zero if they do not."""
+    if time.samples != channel.samples:
+        return False, False, 0
+    is_above = _group(channel).startswith(_group(time))
+    return is_above, is_named, len(_group(time)) + 1 if is_above else 0
 
 
 def _group(channel: SourceChannel) -> str:

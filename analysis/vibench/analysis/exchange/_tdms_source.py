@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -97,10 +98,14 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
 
 
 def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]]) -> SourceChannel:
-    own = channel.properties
-    paths = (channel.path, file[channel.group_name].path, "/")
-    facts = [fact for path in paths for each in statements.get(path, {}).values() for fact in each]
-    times = stated_times((*own.items(), *facts))
+    def facts(path: str) -> list[tuple[str, Any]]:
+        return [fact for each in statements.get(path, {}).values() for fact in each]
+
+    own, group = facts(channel.path), file[channel.group_name].path
+    everywhere = chain.from_iterable(map(facts, statements))
+    times = stated_times((*channel.properties.items(), *own, *facts(group), *facts("/")), everywhere)
+    if changed := sorted(n for n, v in own if n.startswith("NI_Scale") and v != channel.properties[n]):
+        raise ValueError(f"{changed[0]} of {channel.name} changes within the file")
     starts_s = {
         first: start_s
         for first, each in (statements[channel.path] if own else {}).items()
@@ -110,14 +115,14 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
     times["time_trouble"] = times["time_trouble"] or jumps
     times["start_s"] = next(iter(starts_s.values()), times["start_s"])
     step = exact_step(channel.dtype)
-    unknown = [f"{n} = {v}" for n, v in own.items() if _SCALE_TYPE.fullmatch(n) and v not in SCALES]
+    unknown = [f"{n} = {v}" for n, v in own if _SCALE_TYPE.fullmatch(n) and v not in SCALES]
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
         step=step,
-        unit="s" if channel.dtype.kind == "M" else unit_among(own.items()),
-        stated_scale=", ".join(unknown) or scale_among(own.items(), are_counts=step is not None),
+        unit="s" if channel.dtype.kind == "M" else unit_among(own),
+        stated_scale=", ".join(unknown) or scale_among(own, are_counts=step is not None),
         start_error_s=START_ERROR_S,
         runs=runs,
         **times,

@@ -64,8 +64,8 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """Byte orders of the sizes; RF64 files above 4 GiB store sizes elsewhere and are not read."""
 FIRST_CHUNK = 12
-EXTENSIBLE_BYTES = 40
-"""Size of a format chunk that states how many bits of a sample are used."""
+FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
+"""Sizes of a format chunk, and of one that states how many bits of a sample are used."""
 UNKNOWN_SIZE = 2**32 - 1
 """Size field of a streamed file, whose size was unknown when it was written."""
 OFFSETS = {"u": 128.0}
@@ -132,12 +132,23 @@ def _valid_bits(path: Path) -> int:
             chunks += name == b"data"
             if chunks > 1:
                 raise ValueError("it has samples in several chunks; only one can be read")
+            if name == b"data" and not size:
+                raise ValueError("it states 0 bytes of samples")
             after = file.tell() + size + size % 2
-            if name == b"fmt " and size >= EXTENSIBLE_BYTES:
-                container, valid = struct.unpack(f"{order}14xHxxH", file.read(20))
-                bits = valid or container
+            if name == b"fmt " and size >= FORMAT_BYTES:
+                bits = _format_bits(file.read(EXTENSIBLE_BYTES), order, size)
             file.seek(after)
         return bits
+
+
+def _format_bits(form: bytes, order: str, size: int) -> int:
+    channels, rate, width, bits = struct.unpack(f"{order}2xHI4xHH", form[:FORMAT_BYTES])
+    if not rate:
+        raise ValueError("its sample rate is 0")
+    if not channels or width % channels or 8 * width < channels * bits:
+        raise ValueError(f"it states {width} bytes for {channels} samples of {bits} bits")
+    valid = struct.unpack_from(f"{order}H", form, 18)[0] if size >= EXTENSIBLE_BYTES else 0
+    return min(valid or bits, 8 * BYTES)
 
 
 def _read(path: Path) -> tuple[int, NDArray[Any]]:
