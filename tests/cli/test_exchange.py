@@ -113,3 +113,20 @@ def test_a_refusal_is_one_sentence_on_standard_error(vibench, h5_path, tmp_path)
     assert (result.returncode, result.stdout) == (1, "")
     assert "error: run.csv exists, and nothing is ever overwritten; choose another name" in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_an_existing_file_is_refused_before_a_folder_is_analysed(run, h5_path):
+    h5_path.with_name("a.uff").touch()
+    refused = run("export", ".", "--to", "uff", "--spectra", "--out", "a.uff")  # there is no scan to analyse
+    assert "a.uff exists, and nothing is ever overwritten" in str(refused.exception)
+
+
+@pytest.mark.parametrize("kind", ["stepped_level", "dwell"])
+def test_branches_like_a_recording_at_one_frequency_are_refused_before_its_analysis(run, tmp_path, kind):
+    channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
+    plan = json.dumps({"name": "n", "excitation": {"kind": kind, "amplitude_vpp": 1.0, "frequency_hz": 20.0}})
+    header = RecordingHeader((channel,), 1000.0, 9, Origin.SIMULATED, plan_json=plan)
+    with create_recording(tmp_path / "one.h5", header) as writer:  # without drive: no analysis is possible
+        writer.append(Block(0, np.zeros((1, 9))))
+    refused = run("branches", "--like", "one.h5")
+    assert "has no level over a range of frequencies" in str(refused.exception)

@@ -6,15 +6,7 @@ from typing import Annotated
 
 from vibench.acquisition.plan import loop_time_s
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import (
-    Curve,
-    CurveOrigin,
-    FrequencyResponseRequest,
-    InvalidRequest,
-    Simulation,
-    compare_recording,
-    level_of_drive,
-)
+from vibench.analysis import Curve, CurveKind, InvalidRequest, recorded_response
 from vibench.analysis.dynamics import BranchDiagram, BranchLine, BranchRequest, branch_lines, write_diagram
 from vibench.sim import Parameter, count_text
 
@@ -117,7 +109,8 @@ def _drive(
                 "amplitude; leave out --amplitude (--frequency START:STOP is allowed, within the "
                 "range of the recording)"
             )
-        curves, level = _recorded_curves(like)
+        recorded = recorded_response(like, tuple(CurveKind))
+        curves, level = recorded.measured, recorded.pairs
         low, high = level[0][0], level[-1][0]
         if frequency is not None:
             chosen = range_of(frequency, Parameter.FREQUENCY, (2,))
@@ -169,11 +162,6 @@ def _axis_options(amplitude: Range, frequency: Range) -> dict[str, object]:
         "start": amplitude.start,
         "stop": amplitude.stop,
     }
-
-
-def _recorded_curves(path: Path) -> tuple[Sequence[Curve], tuple[tuple[float, float], ...]]:
-    found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
-    return [each for each in found.curves if each.origin is CurveOrigin.MEASURED], level_of_drive(found)
 
 
 def _branch_in_words(number: int, line: BranchLine, along: Parameter) -> str:

@@ -92,16 +92,16 @@ SUFFIXES = frozenset({".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".uff", "
 def file_at(out: Path | None, usual: Path) -> Path:
     """Return the path of a new file: ``out`` or, if that is a folder, the usual name in it.
 
-    If ``out`` has no suffix, it becomes a folder. Raises ConfigurationError for another format's suffix.
+    If ``out`` has no suffix, it becomes a folder. Raises ConfigurationError when the file exists, or for
+    another format's suffix.
     """
-    if out is None:
-        return usual
-    if not out.suffix and not out.exists():
+    if out is not None and not out.suffix and not out.exists():
         out.mkdir(parents=True)
-    if out.is_dir():
-        return out / usual.name
-    require_suffix(out, usual.suffix)
-    return out
+    new = usual if out is None else out / usual.name if out.is_dir() else out
+    require_suffix(new, usual.suffix)
+    if new.exists():
+        raise ConfigurationError(f"{new} exists, and nothing is ever overwritten; choose another name")
+    return new
 
 
 def require_suffix(path: Path, suffix: str) -> None:

@@ -1,7 +1,7 @@
 """Measured and simulated curves of one recording, computed for a comparison."""
 
 import pickle
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -95,20 +95,19 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
     return found
 
 
-def recorded_response(path: Path) -> RecordedLevel:
-    """Return drive level and measured Response I of a stepped sine or a sweep, to draw on a map.
+def recorded_response(path: Path, kinds: Collection[CurveKind] = (CurveKind.RESPONSE_I,)) -> RecordedLevel:
+    """Return drive level and measured curves of a stepped sine or a sweep, to draw on a map or on branches.
 
     Raises NotEnoughData when the recording is of another kind, or has a single frequency; RecordingError when
     the file is not a recording.
     """
     with open_recording(path) as recording:  # raise the error before a long analysis
-        if family_of(recording.plan) in {"noise", "dwell"}:
+        is_at_one_frequency = "frequency_hz" in (recording.plan.get("excitation") or {})
+        if is_at_one_frequency or family_of(recording.plan) in {"noise", "dwell"}:
             raise NotEnoughData(_NO_LEVEL.format(path.name))
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [
-        each
-        for each in found.curves
-        if each.origin is CurveOrigin.MEASURED and each.response is CurveKind.RESPONSE_I
+        each for each in found.curves if each.origin is CurveOrigin.MEASURED and each.response in kinds
     ]
     return RecordedLevel(path.stem, level_of_drive(found), measured)
 
