@@ -162,6 +162,18 @@ def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
     assert found.verdict is not Verdict.WARNING
 
 
+@pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-5), ("m0_velocity", 1e-5)])
+def test_a_scale_that_makes_the_response_absurd_is_reported(dwell_file, role, factor):
+    facts = analysis_of(dwell_file("weak")).facts
+    assert "Scales" not in {each.what for each in measurement_checks(facts)}
+    level = facts.level(role)
+    scaled = replace(level.envelope, lower=factor * level.envelope.lower, upper=factor * level.envelope.upper)
+    levels = tuple(replace(each, envelope=scaled) if each is level else each for each in facts.channels)
+    (found,) = [each for each in measurement_checks(replace(facts, channels=levels)) if each.what == "Scales"]
+    assert found.verdict is Verdict.WARNING
+    assert "check the scales or sensitivities of m0_velocity and base_acceleration" in found.text
+
+
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
 def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
     facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})

@@ -14,7 +14,7 @@ from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig
 
 from ..tables import Tabular
-from .channels import DRIVE
+from .channels import BASE, DRIVE
 from .facts import RecordingFacts
 
 
@@ -39,6 +39,8 @@ class Check:
 
 _LEAST_SHARE_OF_RANGE = 1e-3
 """Smallest share of its input range that a channel should use, to be resolved by the converter."""
+_FARTHEST = 1000.0
+"""Largest plausible ratio of the motions of mass and base, or of base and mass."""
 _OFTEN_DARK = 0.01
 """Share of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
@@ -74,6 +76,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         *_drive(facts),
         *_late(facts),
         *_ranges(facts),
+        *_scales(facts),
         _rates(facts),
         *_import_time_checks(facts),
         _calibrations(facts),
@@ -199,6 +202,21 @@ def _ranges(facts: RecordingFacts) -> Iterator[Check]:
     for each in weak:
         text = f"{each.header.role} used {100 * each.share_of_range:.2g} % of its range; a smaller range fits"
         yield Check("Range", Verdict.NOTE, text)
+
+
+def _scales(facts: RecordingFacts) -> Iterator[Check]:
+    base, response = (facts.level(role) for role in (BASE, facts.response))
+    order = {"velocity": 1, "displacement": 2}.get(response.header.quantity, 0)
+    ratios = [
+        response.span / base.span * (2 * pi * hz) ** order if base.span else 1.0
+        for hz in facts.measurement.excitation.band_hz
+    ]
+    if min(ratios) > _FARTHEST or max(ratios) < 1 / _FARTHEST:
+        text = (
+            f"the mass moved about {min(ratios):.2g} times as far as the base; check the scales or "
+            f"sensitivities of {facts.response} and {BASE}"
+        )
+        yield Check("Scales", Verdict.WARNING, text)
 
 
 def _rates(facts: RecordingFacts) -> Check:
