@@ -554,8 +554,12 @@ def hdf5_bytes(kept):
         ("a.wav", wav_bytes(2, 44), "states 400 bytes of samples, but contains 0"),
         ("a.wav", wav_bytes(2, 30), "states 16 bytes about its samples, but contains 10"),
         ("a.wav", wav_bytes(2, 36), "it ends before its samples"),
-        ("a.wav", wav_bytes(2).replace(struct.pack("<II", 8000, 32000), bytes(8)), "its sample rate is 0"),
-        ("a.wav", wav_bytes(3).replace(b"\x06\0\x18\0", b"\x03\0\x18\0"), "3 bytes for 2 samples of 24 bits"),
+        ("a.wav", wav_bytes(2).replace(struct.pack("<II", 8000, 32000), bytes(8)), "it states 0 Hz"),
+        (
+            "a.wav",
+            wav_bytes(3).replace(b"\x06\0\x18\0", b"\x03\0\x18\0"),
+            "and 3 bytes for 2 samples of 24 bits",
+        ),
         ("a.wav", wav_bytes(2).replace(struct.pack("<I", 400), bytes(4)), "it states 0 bytes of samples"),
         ("a.uff", {"kept": 1000}, "it ends inside a dataset"),
         (

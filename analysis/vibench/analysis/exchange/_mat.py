@@ -23,7 +23,7 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._alignment import stated_times
 from ._excerpt import Excerpt, TransferObserver, facts_document, ignore_progress
-from ._hdf5_source import Hdf5Source, open_hdf5_source
+from ._hdf5_source import FEWEST_SAMPLES, Hdf5Source, open_hdf5_source
 from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_step, scale_among, unit_among
 
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
@@ -180,9 +180,6 @@ def _segments(excerpt: Excerpt) -> dict[str, Any]:
         "is_complete": np.array([each.is_complete for each in touched], dtype=bool),
         "numbers_json": np.array([json.dumps(dict(each.numbers)) for each in touched], dtype=object),
     }
-
-
-FEWEST_SAMPLES = 2
 
 
 @contextmanager

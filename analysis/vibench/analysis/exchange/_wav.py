@@ -68,8 +68,6 @@ FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
 """Sizes of a format chunk, and of one that states how many bits of a sample are used."""
 UNKNOWN_SIZE = 2**32 - 1
 """Size field of a streamed file, whose size was unknown when it was written."""
-OFFSETS = {"u": 128.0}
-"""Zero level of unsigned integers, which WAV uses for eight bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +81,8 @@ class WavSource:
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
         """Read the samples of a channel from ``start`` to ``stop``."""
         column = np.asarray(self.data[start:stop, self.channels.index(channel)], dtype=np.float64)
-        return (column - OFFSETS.get(self.data.dtype.kind, 0.0)) / _full_count(self.data.dtype)
+        fractions = column / _full_count(self.data.dtype)
+        return fractions - 1.0 if self.data.dtype.kind == "u" else fractions
 
 
 @contextmanager
@@ -126,14 +125,12 @@ def _valid_bits(path: Path) -> int:
                 raise ValueError("it ends before its samples")
             (size,) = struct.unpack(f"{order}I", size_bytes)
             left = path.stat().st_size - file.tell()
-            if left < size != UNKNOWN_SIZE and not chunks:
+            if not chunks and (left < size != UNKNOWN_SIZE or (name == b"data" and not size)):
                 what = "of samples" if name == b"data" else "about its samples"
                 raise ValueError(f"it states {size} bytes {what}, but contains {left}")
             chunks += name == b"data"
             if chunks > 1:
                 raise ValueError("it has samples in several chunks; only one can be read")
-            if name == b"data" and not size:
-                raise ValueError("it states 0 bytes of samples")
             after = file.tell() + size + size % 2
             if name == b"fmt " and size >= FORMAT_BYTES:
                 bits = _format_bits(file.read(EXTENSIBLE_BYTES), order, size)
@@ -143,10 +140,8 @@ def _valid_bits(path: Path) -> int:
 
 def _format_bits(form: bytes, order: str, size: int) -> int:
     channels, rate, width, bits = struct.unpack(f"{order}2xHI4xHH", form[:FORMAT_BYTES])
-    if not rate:
-        raise ValueError("its sample rate is 0")
-    if not channels or width % channels or 8 * width < channels * bits:
-        raise ValueError(f"it states {width} bytes for {channels} samples of {bits} bits")
+    if not (rate and channels) or width % channels or 8 * width < channels * bits:
+        raise ValueError(f"it states {rate} Hz, and {width} bytes for {channels} samples of {bits} bits")
     valid = struct.unpack_from(f"{order}H", form, 18)[0] if size >= EXTENSIBLE_BYTES else 0
     return min(valid or bits, 8 * BYTES)
 

@@ -207,13 +207,10 @@ def _ranges(facts: RecordingFacts) -> Iterator[Check]:
 def _scales(facts: RecordingFacts) -> Iterator[Check]:
     base, response = (facts.level(role) for role in (BASE, facts.response))
     order = {"velocity": 1, "displacement": 2}.get(response.header.quantity, 0)
-    ratios = [
-        response.span / base.span * (2 * pi * hz) ** order if base.span else 1.0
-        for hz in facts.measurement.excitation.band_hz
-    ]
-    if min(ratios) > _FARTHEST or max(ratios) < 1 / _FARTHEST:
+    low, high = ((2 * pi * hz) ** order * response.span for hz in facts.measurement.excitation.band_hz)
+    if low > _FARTHEST * base.span > 0 or high * _FARTHEST < base.span:
         text = (
-            f"the mass moved about {min(ratios):.2g} times as far as the base; check the scales or "
+            f"the mass moved about {low / base.span:.2g} times as far as the base; check the scales or "
             f"sensitivities of {facts.response} and {BASE}"
         )
         yield Check("Scales", Verdict.WARNING, text)
