@@ -130,3 +130,11 @@ def test_branches_like_a_recording_at_one_frequency_are_refused_before_its_analy
         writer.append(Block(0, np.zeros((1, 9))))
     refused = run("branches", "--like", "one.h5")
     assert "has no level over a range of frequencies" in str(refused.exception)
+
+
+def test_an_import_warns_if_the_plan_is_longer_than_the_file(run, h5_path):
+    h5_path.with_name("map.toml").write_text(MAPPING.replace("duration_s = 1", "duration_s = 5"))
+    run("export", "run.h5", "--to", "uff")
+    made = run("import", "run.uff", "--mapping", "map.toml", "--out", "back.h5", "--json")
+    assert json.loads(made.stdout) == {"recording": "back.h5"}
+    assert "the file contains only 0 of 1 planned parts completely" in made.stderr

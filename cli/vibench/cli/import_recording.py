@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import load_toml
+from vibench.acquisition import load_toml, open_recording
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, open_source
 
 from .options import option
-from .output import console, print_json
-from .paths import AllowExternal, AsJson, file_at
+from .output import console, print_json, print_warnings
+from .paths import AllowExternal, AsJson, external_data, file_at
 from .progress_bars import transfer_bar
 
 
@@ -41,6 +41,8 @@ def import_file(
     target = file_at(out, file.with_suffix(".h5"))
     with transfer_bar("import", longest * len(meaning.channels)) as observer:
         made = import_recording(file, meaning, target, observer)
+    with open_recording(made) as recording:
+        print_warnings(recording.bench["imported"]["time"])
     if as_json:
         print_json({"recording": str(made)})
     else:

@@ -173,6 +173,10 @@ def import_recording(
         samples, rate = aligned.places, aligned.rate_hz
         wanted = tuple(map(_ChannelImport, mapping.channels, found, aligned.pieces, aligned.late_s))
         parts = place_parts(mapping, rate, samples)
+        planned = len(mapping.parts) or len(list(_recorded_steps(mapping.measurement.excitation)))
+        if (whole := sum(each.stop <= samples for each in parts)) < planned:
+            text = f"the file contains only {whole} of {planned} planned parts completely"
+            aligned = replace(aligned, remarks=(*aligned.remarks, text))
         header = RecordingHeader(
             channels=tuple(_header(path.name, source, each) for each in wanted),
             sample_rate_hz=rate,
