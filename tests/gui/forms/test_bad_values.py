@@ -112,7 +112,7 @@ def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(qtbot):
     form.refused.connect(refused.append)
     form.wanted.connect(lambda *given: wanted.append(given))
     for label, edit in (("From (Vpp)", form.start), ("To (Vpp)", form.stop), ("Points", form.count)):
-        good = edit.value()
+        good = edit.content()
         for bad in BAD:
             refused.clear()
             wanted.clear()
@@ -120,4 +120,4 @@ def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(qtbot):
             form._add()
             assert wanted or label in refused[0] or "Range" in refused[0], (bad, refused)
             assert wanted == [] or edit.complaint == ""
-        edit.set_value(good)
+        edit.show_content(good)

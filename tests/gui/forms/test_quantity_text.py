@@ -52,7 +52,7 @@ def type_text(qtbot, edit, text, *keys):
     edit.lineEdit().setText(text)
     for key in keys or (Qt.Key.Key_Return,):
         qtbot.keyClick(edit, key)
-    return edit.value()
+    return edit.content()
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def field(qtbot):
         edit = QuantityEdit(unit, kind)
         qtbot.addWidget(edit)
         edit.show()
-        edit.set_value(value)
+        edit.show_content(value)
         return edit
 
     return make
@@ -103,7 +103,7 @@ def test_a_value_1000_times_larger_than_before_must_be_confirmed(qtbot, field):
     assert "Return" in edit.complaint
     type_text(qtbot, edit, "7 mm", Qt.Key.Key_Tab)
     edit.clearFocus()
-    assert edit.value() == 5e-6, "leaving the field does not confirm"
+    assert edit.content() == 5e-6, "leaving the field does not confirm"
     assert type_text(qtbot, edit, "8 mm") == 5e-6, "another value is asked about again"
     assert type_text(qtbot, edit, "8 mm") == 8e-3
     assert edit.complaint == ""

@@ -39,30 +39,6 @@ _LEFT_OPEN = "default"
 """Placeholder of an empty optional field."""
 
 
-class QuantityEditor:
-    """Editor of a number with its unit."""
-
-    def __init__(
-        self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
-    ) -> None:
-        self._edit = QuantityEdit(facts.unit, kind, empty)
-        self._edit.changed.connect(changed)
-        self.widget = self._edit
-
-    @property
-    def complaint(self) -> str:
-        """Reason why the typed text is not a number; empty if it is one."""
-        return self._edit.complaint
-
-    def content(self) -> float | int | None:
-        """Return the typed number; None for an empty field."""
-        return self._edit.value()
-
-    def show_content(self, content: Any) -> None:
-        """Show a number in the field."""
-        self._edit.set_value(content)
-
-
 class Choice(QComboBox):
     """Combo box that ignores the space bar, and the mouse wheel unless it has the focus.
 
@@ -280,7 +256,9 @@ def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None
     """Return the editor for a plain value."""
     plain, may_be_missing = unwrap_optional(annotation)
     if plain in (float, int):
-        return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")
+        edit = QuantityEdit(facts.unit, plain, _LEFT_OPEN if may_be_missing else "")
+        edit.changed.connect(changed)
+        return edit
     if get_origin(plain) is Literal:
         return ChoiceEditor(get_args(plain), changed)
     if isinstance(plain, type) and issubclass(plain, Enum):

@@ -125,14 +125,19 @@ class QuantityEdit(QAbstractSpinBox):
         self._is_confirmed = False
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.set_value(None)
+        self.show_content(None)
         self.editingFinished.connect(self._take)
 
-    def value(self) -> float | int | None:
+    @property
+    def widget(self) -> QWidget:
+        """The field itself, which is the editor of a number in a form."""
+        return self
+
+    def content(self) -> float | int | None:
         """Return the number; None if the field is empty."""
         return self._value
 
-    def set_value(self, value: float | int | None) -> None:
+    def show_content(self, value: float | int | None) -> None:
         """Set the number that the field shows."""
         self._value, self.complaint, self._value_to_confirm = value, "", None
         text = "" if value is None else quantity_text(value, self._unit)
@@ -144,7 +149,7 @@ class QuantityEdit(QAbstractSpinBox):
     def show_unit(self, unit: str) -> None:
         """Change the unit of the quantity and clear the field."""
         self._unit = unit
-        self.set_value(None)
+        self.show_content(None)
 
     def stepBy(self, steps: int) -> None:
         """Change the value by five per cent per step, or by one for integers."""
@@ -152,9 +157,9 @@ class QuantityEdit(QAbstractSpinBox):
         if self._value is None:
             return
         if self._kind is int:
-            self.set_value(int(self._value) + steps)
+            self.show_content(int(self._value) + steps)
         else:
-            self.set_value(float(f"{self._value * (1 + STEP) ** steps:.4g}"))
+            self.show_content(float(f"{self._value * (1 + STEP) ** steps:.4g}"))
         self.changed.emit()
 
     def stepEnabled(self) -> QAbstractSpinBox.StepEnabledFlag:
@@ -200,7 +205,7 @@ class QuantityEdit(QAbstractSpinBox):
             if self._is_far(value) and not (self._is_confirmed and value == self._value_to_confirm):
                 self._ask_about(value)
             else:
-                self.set_value(value)
+                self.show_content(value)
         if (self._value, self.complaint) != before:
             self.changed.emit()
 

@@ -61,7 +61,7 @@ def test_a_new_kind_gets_a_name_and_values_within_the_rig(form, word):
 def test_each_kind_remembers_its_own_duration(form):
     choose(form, "sine_sweep")
     choose(form, "dwell")
-    form.form.editors["excitation"].form.editors["duration_s"].widget.set_value(3.0)
+    form.form.editors["excitation"].form.editors["duration_s"].widget.show_content(3.0)
     form.form.changed.emit()
     choose(form, "sine_sweep")
     assert form.value.excitation.duration_s == 60.0

@@ -70,7 +70,7 @@ class SweepForm(QGroupBox):
         self.spacing = Choice(items=RangeSpacing)
         self.start, self.stop = QuantityEdit("Vpp", float), QuantityEdit("Vpp", float)
         self.count = QuantityEdit("", int)
-        self.count.set_value(5)
+        self.count.show_content(5)
         layout = QFormLayout(self)
         for text, widget in (
             ("Axis", self.axis),
@@ -89,7 +89,7 @@ class SweepForm(QGroupBox):
         _word, unit, low, high = list(_AXES.values())[self.axis.currentIndex()]
         for edit, value in ((self.start, low), (self.stop, high)):
             edit.show_unit(unit)
-            edit.set_value(value)
+            edit.show_content(value)
 
     def _add(self) -> None:
         unit = list(_AXES.values())[self.axis.currentIndex()][1]
@@ -103,9 +103,9 @@ class SweepForm(QGroupBox):
             self.refused.emit("; ".join(unread))
             return
         given = {
-            "start": self.start.value(),
-            "stop": self.stop.value(),
-            "count": self.count.value(),
+            "start": self.start.content(),
+            "stop": self.stop.content(),
+            "count": self.count.content(),
             "spacing": self.spacing.currentText(),
         }
         try:
