@@ -1,7 +1,6 @@
 """Base class of all plots: labelled axes whose range follows the data in steps, and a legend."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from html import escape
 from math import isfinite
 
@@ -58,16 +57,6 @@ _MARGIN = 4
 """Margin above and below the legend [pixels]."""
 
 
-@dataclass(frozen=True)
-class LegendEntry:
-    """Entry of a legend: a curve's name, with the colour and sign of its line."""
-
-    sign: str
-    """Line style as text: ``━━``, ``╍╍``, ``●``."""
-    colour: str
-    name: str
-
-
 class LegendLine(QLabel):
     """Legend whose entries are side by side and wrapped to the width; no entry is split."""
 
@@ -88,16 +77,17 @@ class LegendLine(QLabel):
         font.setPointSizeF(0.85 * font.pointSizeF())
         self.setFont(font)
 
-    def show_entries(self, entries: tuple[LegendEntry, ...]) -> None:
-        """Show the names of these curves in the legend."""
+    def show_entries(self, entries: list[tuple[LineStyle, str, str]], theme: Theme) -> None:
+        """Show these curves in the legend; an entry has line style, sign (``━━``, ``●``) and name."""
+        names = [printable(UNITS.convert(name)) for _, _, name in entries]
         text = "&nbsp;&nbsp;&nbsp; ".join(
-            f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
-            f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
-            for each in entries
+            f'<span style="color:{line_style.colour(theme)}">{sign}</span>&nbsp;'
+            f"{escape(name).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
+            for (line_style, sign, _), name in zip(entries, names, strict=True)
         )
         if text != self.text():
             self.setText(text)
-            self.setAccessibleName("Legend: " + ", ".join(printable(each.name) for each in entries))
+            self.setAccessibleName("Legend: " + ", ".join(names))
 
     def height_for(self, width: int) -> int:
         """Return the height of the entries; zero without entries."""
@@ -136,7 +126,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self.scales = [across.scale, up.scale]
-        self._inked: list[tuple[LineStyle, Callable[[Theme], None]]] = []
+        self._inked: list[Callable[[Theme], None]] = []
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
@@ -185,23 +175,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Add a line; ``setData(x, y)`` sets its points."""
         item = LogicalLine()
         item.setSkipFiniteCheck(False)
-        self._add(item, name)
-        if name:
-            self._legend_entries.append((line_style, SIGNS[line_style.dash], name))
-        self._line_style(
-            line_style, lambda theme: item.setPen(curve_pen(line_style, theme, self.devicePixelRatioF()))
-        )
-        self._relegend()
+        self._add(item, line_style, SIGNS[line_style.dash], name)
+        self._line_style(lambda theme: item.setPen(curve_pen(line_style, theme, self.devicePixelRatioF())))
         return item
 
     def dots(self, line_style: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
         """Add a set of points that no line connects."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
-        self._add(item, name)
-        if name:
-            self._legend_entries.append((line_style, _DOT, name))
-        self._line_style(line_style, lambda theme: item.setSymbolBrush(pg.mkBrush(line_style.colour(theme))))
-        self._relegend()
+        self._add(item, line_style, _DOT, name)
+        self._line_style(lambda theme: item.setSymbolBrush(pg.mkBrush(line_style.colour(theme))))
         return item
 
     def band(self, line_style: LineStyle, of: str = "") -> Band:
@@ -209,23 +191,21 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         band = Band(of)
         self.bands.append(band)
         self.addItem(band.item, ignoreBounds=True)
-        self._line_style(line_style, lambda theme: band.paint(shade_of(line_style, theme)))
+        self._line_style(lambda theme: band.paint(shade_of(line_style, theme)))
         return band
 
     def stripes(self, line_style: LineStyle) -> Stripes:
         """Add vertical stripes for frequency or time ranges."""
         item = Stripes(self.scales[0].position)
         self.addItem(item, ignoreBounds=True)
-        self._line_style(line_style, lambda theme: item.dress(shade_of(line_style, theme)))
+        self._line_style(lambda theme: item.dress(shade_of(line_style, theme)))
         return item
 
     def rules(self, line_style: LineStyle) -> Rules:
         """Add a set of vertical lines without labels."""
         item = Rules(self.scales[0].position)
         self.addItem(item, ignoreBounds=True)
-        self._line_style(
-            line_style, lambda theme: item.dress(straight_pen(line_style, theme, self.devicePixelRatioF()))
-        )
+        self._line_style(lambda theme: item.dress(straight_pen(line_style, theme, self.devicePixelRatioF())))
         return item
 
     def upright(
@@ -267,7 +247,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for axis in (self.across, self.up):
             axis.setPen(pg.mkPen(theme.line, width=self.devicePixelRatioF()))
             axis.setTextPen(pg.mkPen(theme.text))
-        for _, paint in self._inked:
+        for paint in self._inked:
             paint(theme)
         self._relegend()
 
@@ -381,15 +361,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
                 item.label.setColor(line_style.colour(theme))
                 item.label.fill = pg.mkBrush(theme.base)
 
-        self._line_style(line_style, paint)
+        self._line_style(paint)
         return item
 
-    def _line_style(self, line_style: LineStyle, paint: Callable[[Theme], None]) -> None:
-        self._inked.append((line_style, paint))
+    def _line_style(self, paint: Callable[[Theme], None]) -> None:
+        self._inked.append(paint)
         paint(self.theme)
 
-    def _add(self, item: pg.PlotDataItem, name: str) -> None:
+    def _add(self, item: pg.PlotDataItem, line_style: LineStyle, sign: str, name: str) -> None:
         self.named_curves.append((name, item))
+        if name:
+            self._legend_entries.append((line_style, sign, name))
+            self._relegend()
         self.addItem(item)
         item.sigPlotChanged.connect(self._look_for_points)
         item.sigPlotChanged.connect(self.reading.reread)
@@ -420,15 +403,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.reading.reread()
 
     def _relegend(self) -> None:
-        if self._legend is None:
-            return
-        self._legend.show_entries(
-            tuple(
-                LegendEntry(sign, line_style.colour(self.theme), UNITS.convert(name))
-                for line_style, sign, name in self._legend_entries
-            )
-        )
-        self._place_legend()
+        if self._legend is not None:
+            self._legend.show_entries(self._legend_entries, self.theme)
+            self._place_legend()
 
     def _place_legend(self) -> None:
         """Move the legend into the row that pyqtgraph reserves for a title."""
