@@ -21,21 +21,21 @@ class SignalCurve:
         self._plot = plot
         self._curve = plot.curve(line_style, name)
         self._samples: NDArray[np.float64] = np.empty(0)
-        self._rate_hz, self._start_s = 1.0, 0.0
+        self._rate_hz = 1.0
         self._drawn: tuple[int, int, int] | None = None
         plot.getViewBox().sigXRangeChanged.connect(self._redraw)
 
-    def set_samples(self, samples: NDArray[np.floating], sample_rate_hz: float, start_s: float = 0.0) -> None:
+    def set_samples(self, samples: NDArray[np.floating], sample_rate_hz: float) -> None:
         """Set the samples of the signal, shape (samples,)."""
         self._samples = np.asarray(samples)
-        self._rate_hz, self._start_s = sample_rate_hz, start_s
+        self._rate_hz = sample_rate_hz
         self._drawn = None
         self._draw(0, len(self._samples))
 
     def _redraw(self, *_: object) -> None:
         (low_s, high_s), _range = self._plot.getViewBox().viewRange()
-        first = int(np.floor((low_s - self._start_s) * self._rate_hz)) - 1
-        last = int(np.ceil((high_s - self._start_s) * self._rate_hz)) + 2
+        first = int(np.floor(low_s * self._rate_hz)) - 1
+        last = int(np.ceil(high_s * self._rate_hz)) + 2
         count = len(self._samples)
         if self._plot.getViewBox().autoRangeEnabled()[0]:
             # The range of the axis follows the data, so draw the whole signal.
@@ -49,12 +49,11 @@ class SignalCurve:
         self._drawn = (first, last, columns)
         visible = self._samples[first:last]
         if len(visible) <= 2 * columns:
-            time_s = self._start_s + np.arange(first, last) / self._rate_hz
-            self._curve.setData(time_s, visible)
+            self._curve.setData(np.arange(first, last) / self._rate_hz, visible)
             return
         low, high = outline(visible, columns)
         edges = np.arange(columns) * len(visible) // columns
-        time_s = self._start_s + (first + np.repeat(edges, 2)) / self._rate_hz
+        time_s = (first + np.repeat(edges, 2)) / self._rate_hz
         self._curve.setData(time_s, zigzag(np.asarray(low, float), np.asarray(high, float)))
 
 
