@@ -89,8 +89,8 @@ def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, wait_f
 
 
 def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
-    page._show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
-    across, up = page.map._levels[0].getOriginalDataset()
+    page.map.show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
+    across, up = page.map.levels[0].getOriginalDataset()
     assert across.tolist() == [100.0, 140.0]
     assert up.tolist() == [6e-6, 7e-6]
 
@@ -130,7 +130,7 @@ def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot):
     qtbot.addWidget(page)
     page.resize(900, 700)
     page.show()
-    page._show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), ()))
+    page.map.show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), ()))
     page.form.show_value(MapRequest(**SMALL))
     qtbot.wait(50)
     (left, right), (low, high) = page.map.in_sight

@@ -60,7 +60,8 @@ class MapPlot(QWidget):
         self.image = pg.ImageItem(axisOrder="row-major")
         self.plot.addItem(self.image)
         self._mark = self.plot.dots(ON_TOP, size=10)
-        self._levels = [self.plot.curve(ON_TOP)]
+        self.levels: list[pg.PlotDataItem] = []
+        """Base levels of recordings, over frequency."""
         self._range: tuple[tuple[float, float], tuple[float, float]] | None = None
         self.plot.scene().sigMouseClicked.connect(self._click)
         fill_box(QVBoxLayout(self), self.plot, margin=0)
@@ -97,12 +98,10 @@ class MapPlot(QWidget):
         """Mark the point whose motion is shown below."""
         self._mark.setData([frequency_hz], [amplitude_m])
 
-    def show_level(self, level: RecordedLevel, number: int) -> None:
+    def show_level(self, level: RecordedLevel) -> None:
         """Draw the base level of a recording, over frequency, on the map."""
-        while len(self._levels) <= number:
-            self._levels.append(self.plot.curve(ON_TOP))
-        frequency_hz, amplitude_m = np.array(level.pairs).T
-        self._levels[number].setData(frequency_hz, amplitude_m)
+        self.levels.append(self.plot.curve(ON_TOP))
+        self.levels[-1].setData(*np.array(level.pairs).T)
 
     def _click(self, event: MouseClickEvent) -> None:
         box = self.plot.getViewBox()
@@ -203,7 +202,6 @@ class MapsPage(Page):
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
         self._motion_of: MotionRequest | None = None
-        self._levels: list[RecordedLevel] = []
         self._is_stale = False
         side = titled_box("Map", self.form)
         parts = SideAndPicture(context, MAPS, side, self._answer(), self._buttons())
@@ -291,7 +289,7 @@ class MapsPage(Page):
     def add_recordings(self, paths: object) -> None:
         """Draw the base levels of recordings on the map, if they have a level over frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
-            self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
+            self.context.background.ask(recorded_response, self.map.show_level, _ignore, Path(path))
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         for part in parts:
@@ -313,10 +311,6 @@ class MapsPage(Page):
         self._motion_of = None
         self.motion.show_nothing(str(error))
         self._validate()
-
-    def _show_level(self, level: RecordedLevel) -> None:
-        self._levels.append(level)
-        self.map.show_level(level, len(self._levels) - 1)
 
     def _validate(self) -> None:
         wanted = self.form.value
