@@ -120,9 +120,7 @@ def simulate(context: AppContext) -> None:
     progress = SimulationProgress(5e-6, 1000, "")
     for model in ("a", "b"):
         progress.add(
-            tuple(
-                SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(500)
-            )
+            tuple(SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, 3.0) for n in range(500))
         )
     report("Simulate: draw 2 x 500 points", lambda: page.plots.show_progress(progress))
     page.close()

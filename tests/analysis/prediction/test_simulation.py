@@ -85,7 +85,7 @@ def test_no_point_is_computed_after_a_cancellation():
 
 
 def point(model, frequency_hz, response, impacts=0):
-    return SimulatedPoint(model, frequency_hz, response, response, impacts, "periodic", -3.5, 1e-6)
+    return SimulatedPoint(model, frequency_hz, response, response, impacts, -3.5)
 
 
 def test_similarity_uses_the_frequencies_common_to_both_models():

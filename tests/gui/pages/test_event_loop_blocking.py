@@ -87,9 +87,7 @@ def simulated_progress():
     progress = SimulationProgress(5e-6, 2 * SIMULATED, "")
     time_s = np.arange(5000) / 50e3
     for model in ("hertz", "linear"):
-        found = [
-            SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(SIMULATED)
-        ]
+        found = [SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, 3.0) for n in range(SIMULATED)]
         motion = 4e-5 * np.sin(2e3 * time_s)
         progress.add((*found, SimulatedSignal(model, 260.0, time_s, motion, 0.5 * motion, (4.5e-5, 4.5e-5))))
     return progress

@@ -247,9 +247,7 @@ class SimulatedPoint:
     response_i: float | None
     response_ii: float | None
     impacts: int
-    motion: str
     lyapunov_per_s: float | None
-    error_estimate: float | None
     memory: StartMemory = StartMemory.UNKNOWN
     ensemble: Ensemble | None = None
     """Motions from other initial states; computed if the motion depends sensitively on its initial state."""

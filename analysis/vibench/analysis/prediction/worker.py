@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from vibench.acquisition import AcquisitionError
-from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
+from vibench.sim import Harmonic, Outcome, integrate
 from vibench.sim.background import Cancelled
 from vibench.sim.study import (
     MESSAGE,
@@ -20,6 +20,7 @@ from vibench.sim.study import (
 )
 
 from ..dynamics import BranchRequest, ChainRequest, SpectrumRequest, branch_lines, chain_runs, spectrum_points
+from ..tables import columns
 from .progress import (
     MapRequest,
     MotionRequest,
@@ -63,7 +64,8 @@ class _TellingStore(MemoryStore):
             found = prediction_at(
                 self.arrays, answer.number, frequency_hz, amplitude_m, study.accuracy, Start.REST.value
             )
-            yield simulated_point(model, found)
+            keys = "frequency_hz response_i response_ii impacts lyapunov_per_s memory ensemble"
+            yield SimulatedPoint(model, **columns(found, keys))
 
 
 def simulate(
@@ -113,22 +115,6 @@ def simulated_signal(
         displacement_m=states[:, 0],
         relative_m=states[:, 1] - states[:, 2],
         gaps_m=specimen.gaps_m,
-    )
-
-
-def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
-    """Return a prediction in the form that is sent to the window."""
-    return SimulatedPoint(
-        model=model,
-        frequency_hz=found.frequency_hz,
-        response_i=found.response_i,
-        response_ii=found.response_ii,
-        impacts=found.impacts,
-        motion=str(found.motion),
-        lyapunov_per_s=found.lyapunov_per_s,
-        error_estimate=found.error_estimate,
-        memory=found.memory,
-        ensemble=found.ensemble,
     )
 
 

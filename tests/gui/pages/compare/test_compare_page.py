@@ -196,8 +196,8 @@ def test_colour_shows_the_recording_and_dash_the_kind_of_curve(page):
     }
     page.add_prediction(tuple(curves.values()))
     progress = SimulationProgress(5e-6, 2, "a scene")
-    progress.add((SimulatedPoint("hertz", 150.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
-    progress.add((SimulatedPoint("hertz", 250.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
+    progress.add((SimulatedPoint("hertz", 150.0, 2.0, 1.0, 0, None),))
+    progress.add((SimulatedPoint("hertz", 250.0, 2.0, 1.0, 0, None),))
     page.add_prediction(progress.curves())
     styles = {key: page.curves.line_style(curve) for key, curve in curves.items()}
     for source in ("sweep", "other"):

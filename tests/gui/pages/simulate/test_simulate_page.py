@@ -35,7 +35,7 @@ def lines(plot):
 
 
 def point(model, frequency_hz, response=2.0, impacts=0, exponent=None):
-    return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, "periodic", exponent, 1e-6)
+    return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, exponent)
 
 
 def test_a_simulation_completes_and_is_drawn(page, wait_for):
