@@ -1,6 +1,6 @@
 """HDF5 files of branches, spectra and chains, with units and the request."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
@@ -15,6 +15,7 @@ from vibench.sim.study import software
 from ..comparison.curve import Curve
 from ..errors import InvalidRequest
 from ..exchange import new_file
+from ..tables import unit_of
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent
 from ._branch_request import BranchRequest
 from ._chain_computing import ChainAnswer
@@ -23,62 +24,34 @@ from ._spectrum_request import ExponentSpectrum
 BRANCHES_FORMAT, SPECTRUM_FORMAT = "vibench branches", "vibench spectrum"
 CHAIN_FORMAT = "vibench chain"
 FORMAT_VERSION = 1
-_UNITS = {
-    "frequency_hz": "Hz",
-    "amplitude_m": "m",
-    "response_i": "1",
-    "response_ii": "1",
+_OWN_UNITS = {
     "states": "m, m, m, m/s, m/s, m/s",
-    "multiplier_real": "1",
-    "multiplier_imaginary": "1",
-    "impacts": "1",
-    "error_estimate": "1",
-}
-"""Units of the columns of a branch; each column is an HDF5 dataset."""
-_WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
-"""Fields of a branch that are stored as attributes."""
-_EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
-_SPECTRUM_UNITS = {
-    "frequency_hz": "Hz",
-    "amplitude_m": "m",
-    "exponents_per_s": "1/s",
-    "low_per_s": "1/s",
-    "high_per_s": "1/s",
-    "sum_per_s": "1/s",
-    "dampers_per_s": "1/s",
-    "dimension": "1",
-    "dimension_low": "1",
-    "dimension_high": "1",
-    "impact_rate_hz": "Hz",
-    "blocks": "1",
-    "elapsed_s": "s",
-}
-_SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
-_CHAIN_UNITS = {
-    "over_hz": "Hz",
-    "transmission": "1",
-    "largest_m": "m",
-    "impacts": "1",
-    "energy_j": "J",
-    "energy_error_j": "J",
-    "transmission_error": "1",
-    "time_s": "s",
-    "motion_m": "m",
-    "impact_time_s": "s",
-    "impact_cell": "1",
-}
-"""Units of the results of a run of a chain; each result is a dataset."""
-_RUN_WORDS = (
-    "cells", "frequency_hz", "observed_s", "exponent_per_s", "exponent_error_per_s", "outcome", "elapsed_s",
-)  # fmt: skip
-_LINEAR_UNITS = {
     "wave_numbers": "rad",
-    "bands_hz": "Hz",
     "gaps": "Hz",
-    "linear_hz": "Hz",
     "attenuation_db": "dB",
 }
-"""Units of the results for the infinite chain without contact."""
+"""Units of datasets whose names have no unit suffix."""
+_COLUMNS = (
+    "frequency_hz amplitude_m response_i response_ii states multiplier_real multiplier_imaginary impacts "
+    "error_estimate"
+)
+"""Columns of a branch; each column is an HDF5 dataset."""
+_WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
+"""Fields of a branch that are stored as attributes."""
+_EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
+_SPECTRUM_COLUMNS = (
+    "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
+    "dimension_low dimension_high impact_rate_hz blocks elapsed_s"
+)
+_SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
+_CHAIN_COLUMNS = (
+    "over_hz transmission largest_m impacts energy_j energy_error_j transmission_error time_s motion_m "
+    "impact_time_s impact_cell"
+)
+"""Results of a run of a chain; each result is a dataset."""
+_RUN_WORDS = "cells frequency_hz observed_s exponent_per_s exponent_error_per_s outcome elapsed_s"
+_LINEAR_COLUMNS = "wave_numbers bands_hz gaps linear_hz attenuation_db"
+"""Results for the infinite chain without contact."""
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
@@ -89,7 +62,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
-            _write(group, line, _WORDS, _UNITS)
+            _write(group, line, _WORDS, _COLUMNS)
             group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
             events = group.create_group("events")
             for name in _EVENT_COLUMNS:
@@ -135,8 +108,8 @@ def branch_curves(path: Path) -> tuple[Curve, ...]:
 
 
 def _read_line(group: h5py.Group) -> BranchLine:
-    kept: dict[str, object] = {name: group[name][()] for name in _UNITS}
-    for name in _WORDS:
+    kept: dict[str, object] = {name: group[name][()] for name in _COLUMNS.split()}
+    for name in _WORDS.split():
         value = group.attrs[name]
         kept[name] = value.item() if isinstance(value, np.generic) else value
     events = group["events"]
@@ -153,8 +126,8 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
     Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
-        for name, units in _SPECTRUM_UNITS.items():
-            file.create_dataset(name, data=found.column(name)).attrs["units"] = units
+        for name in _SPECTRUM_COLUMNS.split():
+            _write_column(file, name, found.column(name))
         for name in _SPECTRUM_WORDS:
             words = [getattr(each, name) for each in found.points]
             file.create_dataset(name, data=words, dtype=h5py.string_dtype("utf-8"))
@@ -167,18 +140,23 @@ def write_chain(found: ChainAnswer, path: Path) -> Path:
     Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
-        _write(file, found, (), _LINEAR_UNITS)
+        _write(file, found, "", _LINEAR_COLUMNS)
         for number, run in enumerate(found.runs):
-            _write(file.create_group(f"run_{number:05d}"), run, _RUN_WORDS, _CHAIN_UNITS)
+            _write(file.create_group(f"run_{number:05d}"), run, _RUN_WORDS, _CHAIN_COLUMNS)
     return path
 
 
-def _write(group: h5py.Group, source: object, words: Sequence[str], units: Mapping[str, str]) -> None:
+def _write(group: h5py.Group, source: object, words: str, columns: str) -> None:
     """Write fields of an object to HDF5: strings as attributes, arrays as datasets with their units."""
-    for name in words:
+    for name in words.split():
         group.attrs[name] = getattr(source, name)
-    for name, unit in units.items():
-        group.create_dataset(name, data=np.asarray(getattr(source, name))).attrs["units"] = unit
+    for name in columns.split():
+        _write_column(group, name, getattr(source, name))
+
+
+def _write_column(group: h5py.Group, name: str, values: object) -> None:
+    unit = _OWN_UNITS.get(name) or unit_of(name).replace("s-1", "1/s") or "1"
+    group.create_dataset(name, data=np.asarray(values)).attrs["units"] = unit
 
 
 @contextmanager
