@@ -9,15 +9,8 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.sim import (
-    Accuracy,
-    Harmonic,
-    LyapunovSpectrum,
-    Parameter,
-    PowerLaw,
-    count_text,
-    lyapunov_spectrum,
-)
+from vibench.sim import Accuracy, Harmonic, LyapunovSpectrum, Parameter, PowerLaw, lyapunov_spectrum
+from vibench.sim.study import frequency_range
 
 from ..signals.arrays import Reals
 from ..tables import Tabular
@@ -26,8 +19,6 @@ from ._specimen_choice import SpecimenChoice
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
 """Longest averaging time [s]; longer times would need more than some hundreds of megabytes."""
-ROUNDING = 1e-9
-"""Relative rounding tolerance when the range is a multiple of the step."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
 """Elastic contact laws, for which the sum of the exponents follows from the dampers."""
 
@@ -58,26 +49,16 @@ class SpectrumRequest(SpecimenChoice):
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
-        if self.start > self.stop:
-            raise ValueError(
-                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
-            )
-        if self.points > MOST_POINTS:
-            raise ValueError(
-                f"{self.points} points were requested; at most {MOST_POINTS}: take a larger step"
-            )
+        points = len(self.values)
+        if points > MOST_POINTS:
+            raise ValueError(f"{points} points were requested; at most {MOST_POINTS}: take a larger step")
         Harmonic(*self.drive(self.stop))  # raises for an impossible drive
         return self
 
     @property
-    def points(self) -> int:
-        """Number of values of the varied parameter."""
-        return math.floor((self.stop - self.start) / self.step * (1.0 + ROUNDING) + ROUNDING) + 1
-
-    @property
     def values(self) -> tuple[float, ...]:
         """Values of the varied parameter [Hz or m]."""
-        return tuple(self.start + k * self.step for k in range(self.points))
+        return frequency_range(self.start, self.stop, self.step)
 
     def drive(self, value: float) -> tuple[float, float]:
         """Return frequency [Hz] and amplitude [m] for a value of the varied parameter."""
