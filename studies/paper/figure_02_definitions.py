@@ -42,14 +42,7 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         ),
         figure=figure,
         tables=(
-            report.table(
-                "figure_2",
-                frequency_hz=curve.frequency_hz,
-                response_i=curve.response_i,
-                response_ii=curve.response_ii,
-            ),
-            report.table(
-                "figure_2_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude
-            ),
+            report.table("figure_2", **curve.columns("response_i", "response_ii")),
+            signal.spectrum_table("figure_2_spectrum"),
         ),
     )

@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from vibench.analysis import report
 from vibench.sim.study import Study, StudyResults
 
@@ -54,15 +52,8 @@ def four_levels(
             background(axes, curve, amplitude_m)
             draw_responses(axes, curve)
             axes.set_title(f"Case {number}: A0 = {1e6 * amplitude_m:g} µm")
-            tables.append(
-                report.table(
-                    f"{name}_{1e6 * amplitude_m:g}um",
-                    frequency_hz=curve.frequency_hz,
-                    response_i=curve.response_i,
-                    response_ii=curve.response_ii,
-                    collides=curve.collides.astype(np.int64),
-                )
-            )
+            columns = curve.columns("response_i", "response_ii", "collides")
+            tables.append(report.table(f"{name}_{1e6 * amplitude_m:g}um", **columns))
         for axes in panels[1]:
             axes.set_xlabel("drive frequency [Hz]")
         for axes in panels[:, 1]:

@@ -1,7 +1,5 @@
 """Fig. 4: linear and colliding motion at 5 um: response, p, exponent, and time signal at 260 Hz."""
 
-import numpy as np
-
 from vibench.analysis import report
 from vibench.sim import Harmonic
 from vibench.sim.study import Study, StudyResults
@@ -59,15 +57,8 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         figure=figure,
         tables=(
             report.table(
-                "figure_4",
-                frequency_hz=f,
-                response_i=curve.response_i,
-                relative_i=curve.relative_i,
-                exponent_per_s=curve.exponent_per_s,
-                collides=curve.collides.astype(np.int64),
+                "figure_4", **curve.columns("response_i", "relative_i", "exponent_per_s", "collides")
             ),
-            report.table(
-                "figure_4_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude
-            ),
+            signal.spectrum_table("figure_4_spectrum"),
         ),
     )

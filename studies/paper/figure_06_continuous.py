@@ -42,9 +42,8 @@ def draw(options: FigureOptions, results: StudyResults) -> DrawnFigure:
         for line in found.lines:
             draw_line(axes, line, line.frequency_hz, line.response_ii[:, 0])
         folds_hz = [each.frequency_hz for line in found.lines for each in line.events if each.kind == "fold"]
-        for number, at_hz in enumerate(folds_hz):
-            label = "fold: a jump" if number == 0 else None
-            axes.axvline(at_hz, color=TERMINAL, linestyle=":", linewidth=0.8, label=label)
+        for at_hz in folds_hz:
+            axes.axvline(at_hz, color=TERMINAL, linestyle=":", linewidth=0.8, label="fold: a jump")
 
     return four_levels(
         "figure_6",

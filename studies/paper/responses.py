@@ -30,6 +30,10 @@ class Responses:
     collides: Flags
     """Whether m1 and m2 collided within the window."""
 
+    def columns(self, *names: str) -> dict[str, Reals]:
+        """Return columns of a table: the frequencies and these quantities; flags become 0 and 1."""
+        return {name: getattr(self, name) + 0 for name in ("frequency_hz", *names)}
+
 
 def responses(results: StudyResults, **fixed: float | str) -> Responses:
     """Return one curve of a study; each axis except frequency is fixed or has one value."""
@@ -60,9 +64,8 @@ def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
     """Shade the flagged frequencies, each halfway to its neighbours."""
     between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
-    for number, (first, end) in enumerate(stretches(flags)):
-        only_once = label if number == 0 else None
-        axes.axvspan(edges[first], edges[end], color=report.COLLIDING, zorder=0, linewidth=0, label=only_once)
+    for first, end in stretches(flags):
+        axes.axvspan(edges[first], edges[end], color=report.COLLIDING, zorder=0, linewidth=0, label=label)
 
 
 def draw_linear(axes: "Axes", frequency_hz: Reals, specimen: Specimen) -> None:

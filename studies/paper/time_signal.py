@@ -33,6 +33,10 @@ class TimeSignal:
     amplitude: Reals
     """Amplitude of each spectral line of the window, over A0; shape (lines,)."""
 
+    def spectrum_table(self, name: str) -> report.Table:
+        """Return the spectrum as a table."""
+        return report.table(name, frequency_hz=self.frequency_hz, amplitude_over_a0=self.amplitude)
+
 
 def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> TimeSignal:
     """Simulate a dwell from rest and return its outline and the spectrum of its end."""
