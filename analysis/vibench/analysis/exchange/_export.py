@@ -19,10 +19,10 @@ from ..recordings.facts import require_intact
 from ..tables import Table, table, write_csv
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, facts_path, ignore_progress, write_facts
-from ._mat import require_small, write_mat
+from ._mat import write_mat
 from ._nexus import write_nexus
 from ._uff import UniversalFunction, write_uff, write_uff_functions, write_uff_scan
-from ._wav import require_sound, write_wav
+from ._wav import write_wav
 
 UNFINISHED = ".unfinished"
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -264,12 +264,6 @@ def export_scan(
 
 
 WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]
-
-
-def _accept(_excerpt: Excerpt) -> None:
-    """Accept an excerpt of any length."""
-
-
 WriteSamples = Callable[[Excerpt, Path, TransferObserver], None]
 WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
@@ -279,9 +273,10 @@ class Exporter:
     """Functions that export to one format, an entry of `EXPORTERS`."""
 
     write: WriteSamples | None = None
-    """Function that writes the samples; facts and results go to separate files."""
-    require: Callable[[Excerpt], None] = _accept
-    """Function that raises InvalidRequest for an excerpt that the format cannot store."""
+    """Function that writes the samples; facts and results go to separate files.
+
+    It raises InvalidRequest for an excerpt that the format cannot store.
+    """
     write_functions: WriteFunctions | None = None
     """Function that writes frequency responses and spectra; None if the format cannot store them."""
     write_all: WriteAll | None = None
@@ -293,7 +288,6 @@ class Exporter:
         """Check that all file names are free, write the files, and return them."""
         recording, facts, written = excerpt.recording, facts_path(path), [path]
         are_included = results is Results.INCLUDED
-        self.require(excerpt)
         if self.write_all is not None:
             structs = matlab_results(recording) if are_included else {}
             with new_file(path) as unfinished:
@@ -313,8 +307,8 @@ class Exporter:
 EXPORTERS: Mapping[Format, Exporter] = {
     Format.CSV: Exporter(write_csv_samples),
     Format.UFF: Exporter(write_uff, write_functions=write_uff_functions),
-    Format.MAT: Exporter(require=require_small, write_all=write_mat),
+    Format.MAT: Exporter(write_all=write_mat),
     Format.NEXUS: Exporter(write_nexus),
-    Format.WAV: Exporter(write_wav, require_sound),
+    Format.WAV: Exporter(write_wav),
 }
 """Exporters by format. A new format needs a writer module, a value in `Format`, and an entry here."""

@@ -27,8 +27,7 @@ LARGEST_BYTES = 2**32 - 1024
 FULL_COUNT = 2**31
 
 
-def require_sound(excerpt: Excerpt) -> None:
-    """Raise InvalidRequest for a fractional sample rate, or too many samples for a WAV file."""
+def _require_sound(excerpt: Excerpt) -> None:
     rate = excerpt.recording.sample_rate_hz
     if rate != round(rate):
         raise InvalidRequest(
@@ -46,8 +45,10 @@ def require_sound(excerpt: Excerpt) -> None:
 def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
     """Write all channels in blocks; lost samples become zero, larger values are clipped to full scale.
 
-    Counts of converters of up to 32 bits stay exact.
+    Counts of converters of up to 32 bits stay exact. Raises InvalidRequest for a fractional sample rate, or
+    too many samples for a WAV file.
     """
+    _require_sound(excerpt)
     full_scales = np.array([[abs(each.physical_per_volt) * each.range_v] for each in excerpt.channels])
     with path.open("xb") as raw, wave.open(raw, "wb") as file:
         file.setnchannels(len(excerpt.channels))
