@@ -19,7 +19,7 @@ import numpy as np
 from ..signals.arrays import Reals
 from ._alignment import UNITS, stated_times
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._source_channel import SourceChannel, TableSource
+from ._source_channel import Source, SourceChannel, read_from
 
 _NAMES = (
     "jan feb mar apr may jun jul aug sep oct nov dec jan feb m\u00e4r apr mai jun jul aug sep okt nov dez"
@@ -179,7 +179,7 @@ BLANK = " \t\r\n"
 
 
 @contextmanager
-def open_csv(path: Path) -> Iterator[TableSource]:
+def open_csv(path: Path) -> Iterator[Source]:
     """Open a text file; its channels are named ``"1"``, ``"2"``, ..., with labels from the heading.
 
     Raises ValueError when the first 200 lines contain no numbers, or a later line has another format.
@@ -199,9 +199,9 @@ def open_csv(path: Path) -> Iterator[TableSource]:
             rows = (layout.cells(line) for line in islice(file, first, None))
             _require_decimals(int(place), [row[place].strip() for row in rows if len(row) > place])
     columns = zip(*_headings(head, layout), _facts(head, layout), table.T, strict=True)
-    yield TableSource(
+    yield Source(
         {
-            _channel(str(number), len(table), label, unit, *facts): np.ascontiguousarray(column)
+            _channel(str(number), len(table), label, unit, *facts): read_from(np.ascontiguousarray(column))
             for number, (label, unit, facts, column) in enumerate(columns, start=1)
         }
     )

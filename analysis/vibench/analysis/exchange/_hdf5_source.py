@@ -1,9 +1,10 @@
 """Read HDF5 of any layout, including netCDF-4, MATLAB 7.3 and formats of instrument makers."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 from ..errors import UnusableData
 from ..signals.arrays import Reals
 from ._alignment import stated_times
-from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
+from ._source_channel import Read, Source, SourceChannel, exact_step, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
@@ -27,55 +28,15 @@ MOST_LETTERS = 1000
 Facts = tuple[tuple[str, Any], ...]
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Location of a channel's values in the file."""
-
-    path: str
-    row: int | None
-    """Index of the row or column of a two-dimensional dataset; None for a one-dimensional dataset."""
-    has_time_first: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Hdf5Source:
-    """Channels in an HDF5 file: 1-D datasets, and rows or columns of 2-D ones, named ``"/data#1"``, ...
+@contextmanager
+def open_hdf5_source(path: Path) -> Iterator[Source]:
+    """Open a file; channels are 1-D datasets, and rows or columns of 2-D ones, named ``"/data#1"``, ...
 
     CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Files that refer to data in other
     files (external links and storage, virtual datasets) are refused unless external data are allowed.
+
+    Raises UnusableData when it is not HDF5.
     """
-
-    file: h5py.File
-    places: Mapping[SourceChannel, _Place]
-
-    @property
-    def channels(self) -> tuple[SourceChannel, ...]:
-        """Channels in the order of their names."""
-        return tuple(self.places)
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read the samples of a channel from ``start`` to ``stop``."""
-        place = self.places[channel]
-        dataset = self.file[place.path]
-        match place:
-            case _Place(row=None):
-                raw = dataset[start:stop]
-            case _Place(row=row, has_time_first=True):
-                raw = dataset[start:stop, row]
-            case _Place(row=row):
-                raw = dataset[row, start:stop]
-        values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0, place.row or 0)
-        values += _number(dataset, "add_offset", 0.0, place.row or 0)
-        for name in {"_FillValue", "missing_value"} & dataset.attrs.keys():
-            values[raw == dataset.attrs[name]] = np.nan
-        if dataset.chunks:
-            _mark_unwritten(dataset, 0 if place.has_time_first else 1, start, values)
-        return values
-
-
-@contextmanager
-def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
-    """Open a file; raises UnusableData when it is not HDF5."""
     try:
         file = open_hdf5(path, locking=False)
     except UnsafeHdf5 as error:
@@ -89,10 +50,10 @@ def open_hdf5_source(path: Path) -> Iterator[Hdf5Source]:
             raise UnusableData(f"{path.name} could not be read ({reason}); check the disk") from error
         raise UnusableData(f"{path.name} is not an HDF5 file ({error}); copy or export it again") from error
     with file:
-        yield Hdf5Source(file, dict(_places(file)))
+        yield Source(dict(_readers(file)), are_in_order=False)
 
 
-def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
+def _readers(file: h5py.File) -> Iterator[tuple[SourceChannel, Read]]:
     known: dict[str, Facts] = {}
     items = [item for _, item in walk(file)]
     elsewhere = [fact for item in items if isinstance(item, h5py.Group) for fact in _facts(item, known)]
@@ -102,14 +63,29 @@ def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
         times = stated_times(own, elsewhere)
         if dataset.ndim == 1:
             channel = _channel(dataset, dataset.name, dataset.shape[0], 0, beside)
-            yield replace(channel, **times), _Place(dataset.name, None)
+            yield replace(channel, **times), partial(_read, file, dataset.name, 0, 0)
             continue
-        has_time_first = dataset.shape[0] >= dataset.shape[1]
-        samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
+        axis = int(dataset.shape[0] < dataset.shape[1])
+        samples, rows = dataset.shape[axis], dataset.shape[1 - axis]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
             channel = _channel(dataset, name, samples, row, beside)
-            yield replace(channel, **times), _Place(dataset.name, row, has_time_first)
+            yield replace(channel, **times), partial(_read, file, dataset.name, axis, row)
+
+
+def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int) -> Reals:
+    """Read samples along an axis of a dataset; ``row`` is the place along the other axis of a 2-D dataset."""
+    dataset = file[name]
+    place: list[int | slice] = [row] * dataset.ndim
+    place[axis] = slice(start, stop)
+    raw = dataset[tuple(place)]
+    values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0, row)
+    values += _number(dataset, "add_offset", 0.0, row)
+    for attribute in {"_FillValue", "missing_value"} & dataset.attrs.keys():
+        values[raw == dataset.attrs[attribute]] = np.nan
+    if dataset.chunks:
+        _mark_unwritten(dataset, axis, start, values)
+    return values
 
 
 def _mark_unwritten(dataset: h5py.Dataset, axis: int, start: int, values: Reals) -> None:

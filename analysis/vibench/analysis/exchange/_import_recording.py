@@ -31,12 +31,12 @@ from vibench.acquisition.recording import (
 
 from ..errors import InvalidRequest, UnusableData
 from ..recordings.channels import DRIVE
-from ..signals.arrays import Flags, Reals
+from ..signals.arrays import Reals, runs_of
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
 from ._mapping import ChannelMapping, ImportMapping
-from ._source import Source, channel_blocks, find_channel, open_source
-from ._source_channel import SourceChannel
+from ._source import find_channel, open_source
+from ._source_channel import Source, SourceChannel
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ def _header(name: str, source: Source, each: _ChannelImport) -> ChannelHeader:
 
 def _peak(source: Source, channel: SourceChannel) -> float:
     peak = 0.0
-    for block in channel_blocks(source, channel):
+    for block in source.blocks(channel):
         values = np.abs(block)
         peak = max(peak, float(values[np.isfinite(values)].max(initial=0.0)))
     return peak
@@ -344,7 +344,7 @@ def _write(
 
 def _blocks(values: Reals, first: int, wanted: Sequence[_ChannelImport]) -> Iterator[Block]:
     """Yield blocks without missing values, with marks on samples near full scale."""
-    for start, stop in _runs(np.all(np.isfinite(values), axis=0)):
+    for start, stop in runs_of(np.all(np.isfinite(values), axis=0)).tolist():
         kept = np.ascontiguousarray(values[:, start:stop])
         yield Block(first + start, kept, tuple(_overloads(kept, first + start, wanted)))
 
@@ -353,11 +353,5 @@ def _overloads(values: Reals, first: int, wanted: Sequence[_ChannelImport]) -> I
     for row, each in zip(values, wanted, strict=True):
         full_scale = each.mapped.full_scale or each.source.full_scale
         if full_scale is not None:
-            for start, stop in _runs(np.abs(row) >= NEAR_FULL_SCALE * full_scale):
+            for start, stop in runs_of(np.abs(row) >= NEAR_FULL_SCALE * full_scale).tolist():
                 yield Overload(each.mapped.role, first + start, first + stop - 1)
-
-
-def _runs(flags: Flags) -> list[tuple[int, int]]:
-    """Return the ranges (start, stop) of samples whose flag is set."""
-    changes = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
-    return [(int(start), int(stop)) for start, stop in changes.reshape(-1, 2)]

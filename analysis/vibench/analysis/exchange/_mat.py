@@ -23,8 +23,16 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._alignment import stated_times
 from ._excerpt import Excerpt, TransferObserver, facts_document, ignore_progress
-from ._hdf5_source import FEWEST_SAMPLES, Hdf5Source, open_hdf5_source
-from ._source_channel import MOST_CHANNELS, SourceChannel, TableSource, exact_step, scale_among, unit_among
+from ._hdf5_source import FEWEST_SAMPLES, open_hdf5_source
+from ._source_channel import (
+    MOST_CHANNELS,
+    Source,
+    SourceChannel,
+    exact_step,
+    read_from,
+    scale_among,
+    unit_among,
+)
 
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #
@@ -183,7 +191,7 @@ def _segments(excerpt: Excerpt) -> dict[str, Any]:
 
 
 @contextmanager
-def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
+def open_mat(path: Path) -> Iterator[Source]:
     """Open a MATLAB file; channels are named ``"name"``, ``"struct.field"`` or ``"name#2"``.
 
     Raises ValueError when the file is damaged.
@@ -202,14 +210,9 @@ def open_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Files exported by vibench state the sample rate beside the channels.
-    about = tuple(_part(own, "recording").items())
-    yield TableSource(dict(_numbers(own, "", about, tuple(_all_facts(own)))))
-
-
-def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the values of a struct and of all structs in it, with their names."""
-    for name, value in struct.items():
-        yield from _all_facts(value) if isinstance(value, dict) else ((name, value),)
+    about = own.get("recording")
+    numbers = _numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())
+    yield Source({channel: read_from(values) for channel, values in numbers})
 
 
 def _numbers(

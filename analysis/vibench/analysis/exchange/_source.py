@@ -2,12 +2,10 @@
 
 import re
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -18,26 +16,13 @@ from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._alignment import time_axis
 from ._csv import open_csv
-from ._excerpt import BLOCK_SAMPLES
-from ._hdf5_source import Hdf5Source, open_hdf5_source
+from ._hdf5_source import open_hdf5_source
 from ._mapping import unit_in_name
 from ._mat import open_mat
-from ._source_channel import NAME_SHOWN, SourceChannel
+from ._source_channel import NAME_SHOWN, Read, Source, SourceChannel
 from ._tdms_source import open_tdms
 from ._uff import open_uff
 from ._wav import open_wav
-
-
-class Source(Protocol):
-    """An open file to import."""
-
-    @property
-    def channels(self) -> tuple[SourceChannel, ...]:
-        """All data in the file that can become channels of a recording."""
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return samples of a channel, scaled as the file states and NaN if lost, shape (stop - start,)."""
-
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
     ".uff": open_uff,
@@ -103,13 +88,14 @@ def open_source(path: Path) -> Iterator[Source]:
                     f"{path.name} has {len(source.channels)} rows or columns of numbers, but a measurement "
                     f"has at most {MOST_CHANNELS} channels; export fewer channels"
                 )
-        plain = _CheckedSource(path, source, {each: each for each in source.channels})
-        yield replace(plain, found=dict(zip(_channels_with_times(plain), source.channels, strict=True)))
+        readers = {each: _checked(read, each, path) for each, read in source.readers.items()}
+        timed = _channels_with_times(replace(source, readers=readers))
+        yield Source(dict(zip(timed, readers.values(), strict=True)))
 
 
-def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
+def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
     """Yield the channels, each with the times that the file contains for it."""
-    read = {each: time_axis(each, channel_blocks(source, each)) for each in source.channels}
+    read = {each: time_axis(each, source.blocks(each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
     for number, each in enumerate(source.channels):
         ranks = {time: _rank(time, each, is_named=axes[time].is_named) for time in axes}
@@ -117,13 +103,11 @@ def _channels_with_times(source: "_CheckedSource") -> Iterator[SourceChannel]:
         near = [time for time, rank in ranks.items() if rank == best and any(rank)]
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
-        if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
-            # Only columns of times, each followed by its channels, show which times belong to a channel.
-            order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
-            is_clear = order[0] and not any(one and two for one, two in pairwise(order))
-            if isinstance(source.source, Hdf5Source) or not is_clear:  # HDF5 sorts names alphabetically
-                named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
-                axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
+        moments = {axes[time].moments for time in near if axes[time].unit is not None}
+        if not source.are_in_order and len(moments) > 1:
+            # The order of names does not show which times belong to a channel.
+            named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
+            axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
         yield axes[chosen[0]].of(channel) if chosen else channel
 
@@ -141,35 +125,21 @@ def _group(channel: SourceChannel) -> str:
     return re.sub(r"[^/.]*$", "", channel.name)
 
 
-def channel_blocks(source: Source, channel: SourceChannel) -> Iterator[Reals]:
-    """Yield the samples of a channel in blocks."""
-    for start in range(0, channel.samples, BLOCK_SAMPLES):
-        yield source.read(channel, start, min(start + BLOCK_SAMPLES, channel.samples))
+def _checked(read: Read, channel: SourceChannel, path: Path) -> Read:
+    """Return a function that reads a channel and converts every failure to a vibench error."""
 
-
-@dataclass(frozen=True)
-class _CheckedSource:
-    """A source that converts every failure to a vibench error with a one-sentence message."""
-
-    path: Path
-    source: Source
-    found: Mapping[SourceChannel, SourceChannel]
-    """Channels as the reader lists them, keyed by the same channels with times."""
-
-    @property
-    def channels(self) -> tuple[SourceChannel, ...]:
-        return tuple(self.found)
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+    def read_checked(start: int, stop: int) -> Reals:
         # Ignore the warning on a signalling NaN: it is a lost sample like any other NaN.
-        with _readable(self.path), np.errstate(invalid="ignore"):
-            values = self.source.read(self.found[channel], start, stop)
+        with _readable(path), np.errstate(invalid="ignore"):
+            values = read(start, stop)
         if values.shape != (stop - start,):
             raise UnusableData(
-                f"{self.path.name} contains only {values.size} of the {stop - start} numbers of "
+                f"{path.name} contains only {values.size} of the {stop - start} numbers of "
                 f"{channel.name} from sample {start} on; copy or export it again"
             )
         return values
+
+    return read_checked
 
 
 @contextmanager

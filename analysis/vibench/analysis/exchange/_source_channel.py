@@ -1,7 +1,7 @@
-"""One channel of a foreign file, and a table in memory as a source of channels."""
+"""The channels of a foreign file, and functions that read their samples."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -13,6 +13,7 @@ from vibench.acquisition import shorten
 from vibench.acquisition.recording import Origin
 
 from ..signals.arrays import Reals
+from ._excerpt import BLOCK_SAMPLES
 
 EXACT_KINDS = {"i": 4, "u": 2}
 """Largest size in bytes of signed and unsigned integers that a recording can store exactly."""
@@ -161,17 +162,36 @@ class SourceChannel:
         return (self.rate_bounds_hz or (0.0, inf)) if exact is None else (exact, exact)
 
 
-@dataclass(frozen=True, eq=False)
-class TableSource:
-    """A table of channels in memory."""
+Read = Callable[[int, int], Reals]
+"""Function that returns the samples of one channel between two indices, shape (stop - start,).
 
-    numbers: Mapping[SourceChannel, Reals]
+Samples are scaled as the file states, and NaN if lost.
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """An open file to import: all data that can become channels of a recording."""
+
+    readers: Mapping[SourceChannel, Read]
+    are_in_order: bool = True
+    """Whether channels have the order of the file; HDF5 sorts them by name."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        """Channels in the order of the file."""
-        return tuple(self.numbers)
+        """All channels."""
+        return tuple(self.readers)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
         """Read the samples of a channel from ``start`` to ``stop``."""
-        return self.numbers[channel][start:stop]
+        return self.readers[channel](start, stop)
+
+    def blocks(self, channel: SourceChannel) -> Iterator[Reals]:
+        """Yield the samples of a channel in blocks."""
+        for start in range(0, channel.samples, BLOCK_SAMPLES):
+            yield self.read(channel, start, min(start + BLOCK_SAMPLES, channel.samples))
+
+
+def read_from(values: Reals) -> Read:
+    """Return the function that reads a channel in memory."""
+    return lambda start, stop: values[start:stop]

@@ -4,8 +4,7 @@ import logging
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from itertools import chain
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._alignment import restarts, stated_start_s, stated_times
-from ._source_channel import SourceChannel, exact_step, scale_among, unit_among
+from ._source_channel import Source, SourceChannel, exact_step, scale_among, unit_among
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
@@ -27,28 +26,9 @@ START_ERROR_S = 1e-6
 """Resolution of start times, which are stored in microseconds [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class TdmsSource:
-    """Channels named ``"group/channel"``, scaled as the file states."""
-
-    found: Mapping[SourceChannel, Any]
-
-    @property
-    def channels(self) -> tuple[SourceChannel, ...]:
-        """Channels in the order of the file."""
-        return tuple(self.found)
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read the samples of a channel from ``start`` to ``stop``."""
-        values = self.found[channel][start:stop]
-        if values.dtype.kind == "M":
-            return np.asarray(values.astype("M8[ns]").astype(np.int64) % LONGEST_NS * 1e-9)
-        return np.asarray(values, dtype=np.float64)
-
-
 @contextmanager
-def open_tdms(path: Path) -> Iterator[TdmsSource]:
-    """Open a TDMS file.
+def open_tdms(path: Path) -> Iterator[Source]:
+    """Open a TDMS file; channels are named ``"group/channel"`` and scaled as the file states.
 
     Raises InvalidRequest when npTDMS is not installed, and UnusableData when it is not TDMS.
     """
@@ -94,7 +74,14 @@ def open_tdms(path: Path) -> Iterator[TdmsSource]:
             for each in group.channels()
             if len(each) > 1 and each.dtype.kind in "iufM"
         ]
-        yield TdmsSource({_channel(file, each, statements): each for each in found})
+        yield Source({_channel(file, each, statements): partial(_read, each) for each in found})
+
+
+def _read(channel: Any, start: int, stop: int) -> Reals:
+    values = channel[start:stop]
+    if values.dtype.kind == "M":
+        return np.asarray(values.astype("M8[ns]").astype(np.int64) % LONGEST_NS * 1e-9)
+    return np.asarray(values, dtype=np.float64)
 
 
 def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]]) -> SourceChannel:

@@ -12,9 +12,10 @@ dataset differs between makers.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import IntEnum
+from functools import cache, partial
 from math import isfinite
 from pathlib import Path
 from typing import BinaryIO
@@ -29,7 +30,7 @@ from ..errors import UnusableData
 from ..signals.arrays import Complexes, Reals
 from ._alignment import agrees
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
+from ._source_channel import SECONDS, Read, Source, SourceChannel, rate_bounds, text_of
 
 DELIMITER = "    -1"
 TIME_RESPONSE = 1
@@ -160,41 +161,30 @@ class _Body:
     order: str
     """``"<"`` or ``">"`` for binary numbers, empty for text."""
 
+    def reader(self, path: Path, name: str) -> Read:
+        """Return the function that reads the numbers; text is parsed once and kept in memory."""
+        if self.order:
+            return partial(self._read, path)
+        parsed = cache(partial(_text_numbers, path, name, self))
+        return lambda start, stop: parsed()[start:stop]
 
-@dataclass(frozen=True, eq=False)
-class UffSource:
-    """Channels named by the number of their dataset 58 in the file: ``"1"``, ``"2"``, ..."""
-
-    path: Path
-    bodies: Mapping[SourceChannel, _Body]
-    parsed: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Numbers parsed from text, keyed by channel."""
-
-    @property
-    def channels(self) -> tuple[SourceChannel, ...]:
-        """Channels in the order of the file."""
-        return tuple(self.bodies)
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Return samples from ``start`` to ``stop``; text is parsed once and kept in memory."""
-        body = self.bodies[channel]
-        if not body.order:
-            if channel.name not in self.parsed:
-                self.parsed[channel.name] = _text_numbers(self.path, channel.name, body)
-            return self.parsed[channel.name][start:stop]
-        size = SIZES[body.kind]
-        with self.path.open("rb") as file:
-            file.seek(body.offset + start * size)
+    def _read(self, path: Path, start: int, stop: int) -> Reals:
+        size = SIZES[self.kind]
+        with path.open("rb") as file:
+            file.seek(self.offset + start * size)
             raw = file.read((stop - start) * size)
-        return np.frombuffer(raw, dtype=f"{body.order}f{size}").astype(np.float64)
+        return np.frombuffer(raw, dtype=f"{self.order}f{size}").astype(np.float64)
 
 
 @contextmanager
-def open_uff(path: Path) -> Iterator[UffSource]:
-    """Open the time responses of a file; raises ValueError when a dataset 58 is damaged."""
+def open_uff(path: Path) -> Iterator[Source]:
+    """Open the time responses of a file, named by the number of their dataset 58: ``"1"``, ``"2"``, ...
+
+    Raises ValueError when a dataset 58 is damaged.
+    """
     with path.open("rb") as file:
         bodies = dict(_bodies(file))
-    yield UffSource(path, bodies)
+    yield Source({each: body.reader(path, each.name) for each, body in bodies.items()})
 
 
 def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:

@@ -8,7 +8,7 @@ import warnings
 import wave
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from scipy.io import wavfile
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._source_channel import SourceChannel
+from ._source_channel import Source, SourceChannel
 
 BYTES = 4
 LARGEST_BYTES = 2**32 - 1024
@@ -71,24 +71,12 @@ UNKNOWN_SIZE = 2**32 - 1
 """Size field of a streamed file, whose size was unknown when it was written."""
 
 
-@dataclass(frozen=True, eq=False)
-class WavSource:
-    """Channels of a WAV file, named ``"1"``, ``"2"``, ..."""
-
-    data: NDArray[Any]
-    """Samples, shape (samples, channels); memory-mapped except for 24 bits."""
-    channels: tuple[SourceChannel, ...]
-
-    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read the samples of a channel from ``start`` to ``stop``."""
-        column = np.asarray(self.data[start:stop, self.channels.index(channel)], dtype=np.float64)
-        fractions = column / _full_count(self.data.dtype)
-        return fractions - 1.0 if self.data.dtype.kind == "u" else fractions
-
-
 @contextmanager
-def open_wav(path: Path) -> Iterator[WavSource]:
-    """Open a WAV file; raises ValueError when it is not WAV, compressed or truncated."""
+def open_wav(path: Path) -> Iterator[Source]:
+    """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped except for 24 bits.
+
+    Raises ValueError when it is not WAV, compressed or truncated.
+    """
     bits = _valid_bits(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
@@ -96,19 +84,23 @@ def open_wav(path: Path) -> Iterator[WavSource]:
     unused = 2 ** max(8 * table.itemsize - bits, 0) - 1
     if table.dtype.kind == "i" and np.bitwise_or.reduce(table, axis=None) & unused:
         raise ValueError(f"it states {bits} bits per sample, but its samples have more")
-    yield WavSource(
-        table,
-        tuple(
+    yield Source(
+        {
             SourceChannel(
                 name=str(number),
                 samples=len(table),
                 sample_rate_hz=float(rate),
                 step=1 / _full_count(table.dtype) if is_integer else None,
                 full_scale=1.0 if is_integer else None,
-            )
-            for number in range(1, table.shape[1] + 1)
-        ),
+            ): partial(_read_column, column)
+            for number, column in enumerate(table.T, start=1)
+        }
     )
+
+
+def _read_column(column: NDArray[Any], start: int, stop: int) -> Reals:
+    values = np.asarray(column[start:stop], dtype=np.float64)
+    return (values - OFFSETS.get(column.dtype.kind, 0.0)) / _full_count(column.dtype)
 
 
 def _valid_bits(path: Path) -> int:
