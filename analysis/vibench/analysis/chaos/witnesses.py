@@ -37,18 +37,10 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
     return np.hstack([columns[first : first + points] for first in range(delays)])
 
 
-@dataclass(frozen=True, eq=False)
-class Neighbours:
-    """Pairs of a point and its nearest neighbour; points without a neighbour are left out."""
-
-    point: Integers
-    neighbour: Integers
-    distance: Reals
-    """Distance of the two points of each pair, shape (pairs,)."""
-
-
-def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> Neighbours:
+def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> tuple[Integers, Integers]:
     """Find for each point the nearest point that is not near in time.
+
+    Returns the indices of the points that have such a neighbour, and of their neighbours.
 
     Parameters
     ----------
@@ -65,7 +57,6 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     tree = cKDTree(points[:last])
     wanted = np.arange(last)
     found = np.full(last, -1, dtype=np.int64)
-    distance = np.full(last, np.nan)
     tried = 4
     while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
         # A list of neighbour ranks keeps the result two-dimensional.
@@ -76,11 +67,10 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
         first = np.argmax(allowed, axis=1)
         rows = np.flatnonzero(has)
         found[wanted[rows]] = index[rows, first[rows]]
-        distance[wanted[rows]] = reach[rows, first[rows]]
         wanted = wanted[~has]
         tried *= 4
     point = np.flatnonzero(found >= 0)
-    return Neighbours(point, found[point], distance[point])
+    return point, found[point]
 
 
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
@@ -107,12 +97,8 @@ FEWEST_PAIRS = 50
 
 @dataclass(frozen=True, eq=False)
 class Divergence:
-    """Mean logarithm of the distance of initially neighbouring points after each step."""
+    """Growth of the distance of initially neighbouring points, from its mean logarithm after each step."""
 
-    logarithm: Reals
-    """Mean ln(distance) of all pairs after each step, shape (steps + 1,)."""
-    size: float
-    """Logarithm of the typical distance of two points of the motion."""
     first: int
     last: int
     """First and last step of the fitted line; equal if there were too few steps for a line."""
@@ -120,7 +106,6 @@ class Divergence:
     """Slope of the fitted line [1/step]; NaN if no line was fitted."""
     sd_exponent: float
     """Scatter of the slope between tenths of the record."""
-    pairs: int
 
     @property
     def is_resolved(self) -> bool:
@@ -150,21 +135,19 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     count, dimensions = points.shape
     last = count - steps
     floor = noise * np.sqrt(2 * dimensions)
-    found = nearest_neighbours(points, apart, last, floor=floor) if last > 1 else None
-    if found is None or found.point.size < FEWEST_PAIRS:
-        have = 0 if found is None else found.point.size
+    point, neighbour = nearest_neighbours(points, apart, max(last, 0), floor=floor)
+    if point.size < FEWEST_PAIRS:
         raise NotEnoughData(
-            f"{have} of {count} points have a neighbour that can be followed for {steps} steps, but "
+            f"{point.size} of {count} points have a neighbour that can be followed for {steps} steps, but "
             f"{FEWEST_PAIRS} are needed; measure longer"
         )
-    logarithms = np.empty((steps + 1, found.point.size))
+    logarithms = np.empty((steps + 1, point.size))
     for step in range(steps + 1):
-        distance = np.linalg.norm(points[found.point + step] - points[found.neighbour + step], axis=1)
+        distance = np.linalg.norm(points[point + step] - points[neighbour + step], axis=1)
         logarithms[step] = np.log(np.maximum(distance, np.finfo(np.float64).tiny))
     mean = logarithms.mean(axis=1)
-    size = _typical(points)
-    first, final = _fit_range(mean, size, floor, apart)
-    return Divergence(mean, size, first, final, *_slope(logarithms, first, final), int(found.point.size))
+    first, final = _fit_range(mean, _typical(points), floor, apart)
+    return Divergence(first, final, *_slope(logarithms, first, final))
 
 
 def _typical(points: Reals) -> float:
