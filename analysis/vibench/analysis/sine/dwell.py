@@ -27,7 +27,7 @@ from ..tones.order_tracking import (
     order_turns,
     track_signals,
 )
-from ..tones.sine_fit import DriveLevel, drive_level, noise_lift, peaks, steady_phase
+from ..tones.sine_fit import DriveLevel, drive_level, largest_peak, noise_lift, steady_phase
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
@@ -473,15 +473,8 @@ def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) ->
         omega = 2 * np.pi * drive_hz * order
         size = float(whole.amplitude[index, 0])
         spread = standard_uncertainty(parts.value[index])
-        lines.append(
-            Line(
-                order_label(order),
-                drive_hz * order,
-                size / omega,
-                spread / omega,
-                _decibel(size / order, reference),
-            )
-        )
+        level = _decibel(size / order, reference)
+        lines.append(Line(order_label(order), drive_hz * order, size / omega, spread / omega, level))
     return tuple(lines)
 
 
@@ -490,7 +483,8 @@ def _peak_lines(
 ) -> tuple[Line, ...]:
     lines = []
     for target in towards_hz:
-        for peak in peaks(spectrum, low_hz=0.9 * target, high_hz=1.1 * target, count=1):
+        peak = largest_peak(spectrum, 0.9 * target, 1.1 * target)
+        if peak is not None:
             label = f"peak towards {target:g} Hz"
             level = _decibel(peak.amplitude, reference_m)
             lines.append(Line(label, peak.frequency_hz, peak.amplitude, peak.floor, level))

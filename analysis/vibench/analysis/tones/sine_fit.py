@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import islice
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -20,8 +19,6 @@ _NOISE_NEIGHBOURS = 50
 """Number of spectral lines on each side of a peak whose median is the noise floor."""
 _LEAST_RATIO = 5.0
 """Smallest ratio of a peak to the noise floor."""
-_MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
-"""Median of the magnitude of complex noise, in standard deviations of one component."""
 
 
 @dataclass(frozen=True)
@@ -29,32 +26,20 @@ class Peak:
     """A peak of a spectrum."""
 
     frequency_hz: float
-    sd_frequency_hz: float
-    """Standard deviation of the frequency [Hz], from the noise around the peak; zero without noise."""
     amplitude: float
     """Amplitude of the peak, corrected for its position between lines [unit of the spectrum]."""
     floor: float
     """Median amplitude of the spectral lines around the peak [unit of the spectrum]."""
 
 
-def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
-    """Find the largest peaks of a Hann spectrum in a band, the largest first.
+def largest_peak(spectrum: AmplitudeSpectrum, low_hz: float, high_hz: float) -> Peak | None:
+    """Return the largest peak of a Hann spectrum in a band; None if no peak stands above the noise.
 
     For a sine between two lines, d = (2a - 1) / (a + 1) is its distance from the larger line [lines]; a is
     the ratio of the smaller to the larger line (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355). The
-    amplitude is the larger line times (pi d / sin(pi d)) (1 - d^2).
-
-    Parameters
-    ----------
-    low_hz, high_hz
-        Band to search, at least two lines away from 0 and from half the sample rate.
-    count
-        Largest number of peaks to return.
+    amplitude is the larger line times (pi d / sin(pi d)) (1 - d^2). The band must be at least two lines away
+    from 0 and from half the sample rate.
     """
-    if spectrum.window is not Window.HANN:
-        raise InvalidRequest(
-            f"only peaks of Hann spectra can be located; this spectrum has window {spectrum.window.value}"
-        )
     amplitude = spectrum.amplitude
     first = max(2, int(np.ceil(low_hz / spectrum.spacing_hz)))
     last = min(amplitude.size - 3, int(np.floor(high_hz / spectrum.spacing_hz)))
@@ -64,29 +49,17 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
         )
     found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]
-    placed = (_peak_at(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])])
-    return tuple(islice((peak for peak in placed if peak.amplitude > _LEAST_RATIO * peak.floor), count))
-
-
-def _peak_at(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
-    side = 1 if amplitude[line + 1] >= amplitude[line - 1] else -1
-    ratio = amplitude[line + side] / amplitude[line]
-    offset = (2 * ratio - 1) / (ratio + 1)
-    around = np.concatenate(
-        (
-            amplitude[max(1, line - _NOISE_NEIGHBOURS) : max(1, line - 3)],
-            amplitude[line + 4 : line + 1 + _NOISE_NEIGHBOURS],
-        )
-    )
-    floor = float(np.median(around)) if around.size else 0.0
-    # d(offset)/d(ratio) = 3 / (ratio + 1)^2. Noise of neighbouring Hann lines has a correlation of 2/3.
-    sd_ratio = floor / _MEDIAN_OF_RAYLEIGH / amplitude[line] * np.sqrt(1 + ratio**2 - 4 / 3 * ratio)
-    return Peak(
-        frequency_hz=float((line + side * offset) * spectrum.spacing_hz),
-        sd_frequency_hz=float(3 / (ratio + 1) ** 2 * sd_ratio * spectrum.spacing_hz),
-        amplitude=float(amplitude[line] / np.sinc(offset) * (1 - offset**2)),
-        floor=floor,
-    )
+    for line in found[np.argsort(-amplitude[found])].tolist():
+        side = 1 if amplitude[line + 1] >= amplitude[line - 1] else -1
+        ratio = amplitude[line + side] / amplitude[line]
+        offset = (2 * ratio - 1) / (ratio + 1)
+        below = amplitude[max(1, line - _NOISE_NEIGHBOURS) : max(1, line - 3)]
+        around = np.concatenate((below, amplitude[line + 4 : line + 1 + _NOISE_NEIGHBOURS]))
+        floor = float(np.median(around)) if around.size else 0.0
+        height = float(amplitude[line] / np.sinc(offset) * (1 - offset**2))
+        if height > _LEAST_RATIO * floor:
+            return Peak(float((line + side * offset) * spectrum.spacing_hz), height, floor)
+    return None
 
 
 _ITERATIONS = 10
@@ -102,10 +75,7 @@ class FittedSine:
     frequency_hz: float
     sd_frequency_hz: float
     amplitude: float
-    sd_amplitude: float
     phase_rad: float
-    sd_phase_rad: float
-    residual_rms: float
 
 
 def fit_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
@@ -130,12 +100,12 @@ def _fit_cached(recorded: bytes, sample_rate_hz: float, near_hz: float) -> Fitte
     """Fit a sine, with a cache, because all draws of a recording share its drive."""
     samples = np.frombuffer(recorded)
     spectrum = amplitude_spectrum(samples, sample_rate_hz)
-    found = peaks(spectrum, low_hz=near_hz * (1 - _SEARCH), high_hz=near_hz * (1 + _SEARCH), count=1)
-    if not found:
+    peak = largest_peak(spectrum, near_hz * (1 - _SEARCH), near_hz * (1 + _SEARCH))
+    if peak is None:
         raise UnusableData(f"no sine was found near {near_hz:g} Hz; check the channel and the frequency")
     # Centred time decorrelates frequency and phase, so that the fit is well conditioned.
     time = (np.arange(samples.size) - (samples.size - 1) / 2) / sample_rate_hz
-    omega = 2 * np.pi * found[0].frequency_hz
+    omega = 2 * np.pi * peak.frequency_hz
     for _ in range(_ITERATIONS):
         cosine, sine = np.cos(omega * time), np.sin(omega * time)
         basis = np.stack((cosine, sine, np.ones_like(time), time))
@@ -150,18 +120,11 @@ def _fit_cached(recorded: bytes, sample_rate_hz: float, near_hz: float) -> Fitte
     residual = samples - solution @ full
     variance = float(residual @ residual) / max(1, samples.size - 5)
     covariance = variance * np.linalg.inv(full @ full.T)
-    amplitude = float(np.hypot(a, b))
-    sd_omega = float(np.sqrt(covariance[-1, -1]))
-    sd_middle = float(np.sqrt((covariance[0, 0] + covariance[1, 1]) / 2))
-    to_start = float(time[0])
     return FittedSine(
         frequency_hz=float(omega / (2 * np.pi)),
-        sd_frequency_hz=sd_omega / (2 * np.pi),
-        amplitude=amplitude,
-        sd_amplitude=sd_middle,
-        phase_rad=float(np.angle((a - 1j * b) * np.exp(1j * omega * to_start))),
-        sd_phase_rad=float(np.hypot(sd_middle / amplitude, sd_omega * to_start)),
-        residual_rms=float(np.sqrt(np.mean(residual**2))),
+        sd_frequency_hz=float(np.sqrt(covariance[-1, -1]) / (2 * np.pi)),
+        amplitude=float(np.hypot(a, b)),
+        phase_rad=float(np.angle((a - 1j * b) * np.exp(1j * omega * time[0]))),
     )
 
 
