@@ -252,7 +252,11 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
     unknown = _LAW_UNKNOWN * abs(float(solution[-1]))
     places = iter(range(len(usable_sides)))
     gaps = [
-        _gap(float(solution[n := next(places)]), covariance[n, n], unknown, each)
+        FreeGap(
+            float(solution[n := next(places)]),
+            float(np.hypot(np.sqrt(covariance[n, n]), unknown)),
+            int(each.sum()),
+        )
         if each.sum() >= FEWEST_IMPACTS
         else None
         for each in sides
@@ -278,10 +282,6 @@ def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:
         weight = np.sqrt(np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(left), _LEAST_SCATTER_M)))
     normal = (matrix * weight[:, None] ** 2).T @ matrix
     return np.asarray(solution), np.asarray(scale**2 * np.linalg.pinv(normal))
-
-
-def _gap(value: float, variance: float, unknown: float, side: Flags) -> FreeGap:
-    return FreeGap(value, float(np.hypot(np.sqrt(variance), unknown)), int(side.sum()))
 
 
 def free_numbers(

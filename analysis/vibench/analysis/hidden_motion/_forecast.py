@@ -108,8 +108,7 @@ def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> M
     a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
     a[:, _YIELDING] += np.outer(base, weights)
     tables = model.tables
-    flows = (exact_flow(a, base, tables.step_s / parts) for parts in (1, tables.small_steps))
-    flow, small_flow = flows
+    flow, small_flow = (exact_flow(a, base, tables.step_s / parts) for parts in (1, tables.small_steps))
     return replace(
         model,
         tables=replace(tables, flow=flow, small_flow=small_flow),

@@ -17,7 +17,7 @@ from ..recordings.channels import BASE, RESPONSE
 from ..recordings.facts import require_checked, specimen_of
 from ..recordings.response import ResponseChannel, response_roles
 from ..signals.arrays import Reals, Samples
-from ..tables import Tabular
+from ..tables import Tabular, plain
 from ._contact_free import (
     Collisions,
     FreeGap,
@@ -218,10 +218,10 @@ class HiddenMotion(Tabular):
 
     def to_dict(self) -> dict[str, object]:
         """Return the results as JSON, without the motion itself."""
-        return {
+        document = {
             "share_followed": self.tracked.tracked_share,
             "impacts": self.tracked.collisions.count,
-            "innovation_level": finite(self.tracked.innovation_level),
+            "innovation_level": self.tracked.innovation_level,
             "p_sd_m": self.tracked.median_sd_m,
             "measured_masses": [{**asdict(each), "confirms": each.confirms} for each in self.mass_checks],
             "not_followed": [
@@ -234,9 +234,9 @@ class HiddenMotion(Tabular):
             ],
             "parameters": {
                 each.what.value: {
-                    "value": finite(each.value) if each.is_determined else None,
-                    "low": finite(each.low) if each.is_determined else None,
-                    "high": finite(each.high) if each.is_determined else None,
+                    "value": each.value if each.is_determined else None,
+                    "low": each.low if each.is_determined else None,
+                    "high": each.high if each.is_determined else None,
                     "described": each.described,
                     "not_determined": each.not_determined or None,
                 }
@@ -249,16 +249,12 @@ class HiddenMotion(Tabular):
                 "gaps_sd_m": [gap and (gap.sd_m if self.is_confirmed else None) for gap in self.free_gaps],
             },
         }
+        return dict(plain(document))
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """Return sentences on tracked and lost parts, and on the parameters."""
         return tuple(_sentences(self))
-
-
-def finite(value: float) -> float | None:
-    """Return the value, or None if it is not finite: JSON has no such numbers."""
-    return value if np.isfinite(value) else None
 
 
 def hidden_motion(
