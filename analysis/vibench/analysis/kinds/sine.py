@@ -155,10 +155,6 @@ DWELL = AnalysisKind(
 Setting = Callable[[Steps, Stretch], float]
 
 
-def _stepped_quantities(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
-    return stepped_quantities(analysis.response)
-
-
 def stepped_analysis(
     setting_vpp: Setting,
     label: SegmentLabel = SegmentLabel.STEP,
@@ -185,7 +181,7 @@ def stepped_analysis(
         family="stepped_sine",
         analyse=analyse,
         draws=lambda analysis: partial(draw, analysis),
-        compared=_stepped_quantities,
+        compared=lambda analysis: stepped_quantities(analysis.response),
         lay=stepped_overlay,
         curves=stepped_traces,
         budgets=stepped_budgets,
