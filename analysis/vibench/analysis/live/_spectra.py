@@ -11,7 +11,6 @@ from scipy import fft
 
 from vibench.acquisition import open_recording
 
-from ..errors import InvalidRequest
 from ..frequency_response.results import (
     Estimator,
     FrequencyResponse,
@@ -32,23 +31,6 @@ _LEAST_SEGMENTS = 2
 _OVERLAP = 0.5
 
 
-@dataclass(frozen=True)
-class SpectrumSettings:
-    """Length and number of the averaged segments."""
-
-    segment_samples: int = 8192
-    """Length of a segment [samples]; at 51.2 kS/s, spectral lines are 6.25 Hz apart."""
-    averages: int = 24
-    """Number of averaged segments; older segments are dropped."""
-
-    def __post_init__(self) -> None:
-        if self.segment_samples < 2 or self.averages < _LEAST_SEGMENTS:
-            raise InvalidRequest(
-                f"{self.averages} segments of {self.segment_samples} samples were requested; "
-                "give 2 or more of both"
-            )
-
-
 @dataclass(frozen=True, eq=False)
 class LiveSpectrum(Tabular):
     """Amplitude spectral density of every channel."""
@@ -60,29 +42,24 @@ class LiveSpectrum(Tabular):
     """Number of independent averages."""
 
 
-DEFAULT_SETTINGS = SpectrumSettings()
-
-
 class LiveSpectra:
     """Welch average of the newest segments; each segment is transformed once.
 
-    Segments with lost samples are skipped.
+    Segments with lost samples are skipped. By default, spectral lines are 6.25 Hz apart at 51.2 kS/s.
     """
 
     def __init__(
-        self, channels: int, sample_rate_hz: float, settings: SpectrumSettings = DEFAULT_SETTINGS
+        self, channels: int, sample_rate_hz: float, segment_samples: int = 8192, averages: int = 24
     ) -> None:
         self._rate_hz = sample_rate_hz
-        self._settings = settings
-        self._hop = hop_samples(settings.segment_samples, _OVERLAP)
-        self._taper = taper(Window.HANN, settings.segment_samples)
+        self._size = segment_samples
+        self._hop = hop_samples(segment_samples, _OVERLAP)
+        self._taper = taper(Window.HANN, segment_samples)
         self._short_taper = self._taper.astype(np.float32)
-        lines = settings.segment_samples // 2 + 1
-        self._spectra: NDArray[np.complex64] = np.zeros(
-            (settings.averages, channels, lines), dtype=np.complex64
-        )
-        self._power: NDArray[np.float32] = np.zeros((settings.averages, channels, lines), dtype=np.float32)
-        self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
+        shape = averages, channels, segment_samples // 2 + 1
+        self._spectra: NDArray[np.complex64] = np.zeros(shape, dtype=np.complex64)
+        self._power: NDArray[np.float32] = np.zeros(shape, dtype=np.float32)
+        self._is_used: Flags = np.zeros(averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
         """Number of completed segments; when it changes, earlier results are out of date."""
@@ -90,11 +67,10 @@ class LiveSpectra:
     def add(self, values: Values) -> None:
         """Add the next samples, shape (channels, samples)."""
         data = np.concatenate((self._carry, values), axis=1)
-        size = self._settings.segment_samples
-        whole = max(0, (data.shape[1] - size) // self._hop + 1)
+        whole = max(0, (data.shape[1] - self._size) // self._hop + 1)
         # After a long pause between calls, only the newest segments are transformed.
-        for number in range(max(0, whole - self._settings.averages), whole):
-            self._take(data[:, number * self._hop : number * self._hop + size])
+        for number in range(max(0, whole - self._is_used.size), whole):
+            self._take(data[:, number * self._hop : number * self._hop + self._size])
         self._carry = data[:, whole * self._hop :].copy()
 
     def leave_out(self, newest_s: float) -> None:
@@ -103,7 +79,7 @@ class LiveSpectra:
         self._is_used[(self.segments - 1 - np.arange(count)) % self._is_used.size] = False
 
     def _take(self, segment: Values) -> None:
-        place = self.segments % self._settings.averages
+        place = self.segments % self._is_used.size
         self.segments += 1
         self._is_used[place] = bool(np.isfinite(segment).all())
         if self._is_used[place]:
@@ -118,10 +94,10 @@ class LiveSpectra:
         power = np.mean(self._power[used], axis=0).astype(np.float64)
         scale = np.full(power.shape[-1], 2 / (self._rate_hz * float(self._taper @ self._taper)))
         scale[0] /= 2
-        if self._settings.segment_samples % 2 == 0:
+        if self._size % 2 == 0:
             scale[-1] /= 2
         return LiveSpectrum(
-            frequency_hz=fft.rfftfreq(self._settings.segment_samples, 1 / self._rate_hz),
+            frequency_hz=fft.rfftfreq(self._size, 1 / self._rate_hz),
             amplitude_density=np.sqrt(power * scale),
             n_eff=effective_averages(self._taper, self._hop, used),
         )
@@ -156,12 +132,12 @@ class LiveSpectra:
         settings = FrequencyResponseSettings(
             estimator=estimator,
             sample_rate_hz=self._rate_hz,
-            segment_samples=self._settings.segment_samples,
+            segment_samples=self._size,
             window=Window.HANN.value,
             overlap=_OVERLAP,
             confidence=DEFAULT_CONFIDENCE,
         )
-        highest = int(high_hz * self._settings.segment_samples / self._rate_hz) + 2
+        highest = int(high_hz * self._size / self._rate_hz) + 2
         found = frequency_response_of(self._averages(used, rows, highest), settings).between(low_hz, high_hz)
         return converted_frequency_response(
             found.without_delay(delay_s),
@@ -177,7 +153,7 @@ class LiveSpectra:
             segments_used=chosen.shape[0],
             segments_excluded=min(self.segments, used.size) - chosen.shape[0],
             n_eff=effective_averages(self._taper, self._hop, used),
-            segment_samples=self._settings.segment_samples,
+            segment_samples=self._size,
             window=Window.HANN,
             overlap=_OVERLAP,
             window_sum=float(np.sum(self._taper)),
