@@ -400,8 +400,7 @@ def _base_of(request: ChainRequest) -> Sampled:
     with open_recording(path) as recording:
         require_measured_size(recording)
         require_intact(recording)
-        base = recorded_base_motion(recording, plan_of(recording))
-    return Sampled(base.displacement_m, base.sample_rate_hz)
+        return Sampled(recorded_base_motion(recording, plan_of(recording)), recording.sample_rate_hz)
 
 
 def _rate_hz(chain: Chain, highest_hz: float, duration_s: float) -> float:

@@ -26,13 +26,7 @@ from ..sine.dwell import silence_before
 from .driven_rig import Driven, DrivenRig, acceleration_per_volt, carried_mass, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
 from .shaker_fit import FittedShaker
-from .simulated_channels import (
-    HIGHEST_PART,
-    LOWEST_PART,
-    SimulatedChannels,
-    lowest_frequency_hz,
-    under_base_motion,
-)
+from .simulated_channels import SimulatedChannels, base_band_hz, under_base_motion
 
 _FEWEST_LINES = 50
 """Minimum number of spectral lines in silence, which determine the noise level to 25 %."""
@@ -380,18 +374,17 @@ def voltage_source(
     unseen, noise = known or (UnseenNoise(), noise)
     why = ["" if fitted is None else fitted.sentence, "" if known else UNKNOWN_NOISE]
     run = SimulatedRun(specimen, rig.driven, Accuracy.STANDARD, None, ". ".join(filter(None, why)))
-    drawn_channels = partial(_random_channels, channels, rig, fitted, voltage, noise, unseen)
+    drawn_channels = partial(_random_channels, recording, rig, fitted, voltage, noise, unseen)
     return DrawSource(run, draws, recording.samples, drawn_channels)
 
 
 def base_source(
-    recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
+    recording: Recording, measurement: Measurement, specimen: Specimen, why: str = ""
 ) -> DrawSource:
     """Return a source of one draw driven by the recorded base motion, for linear and coherent motion."""
-    channels = under_base_motion(recording, measurement, specimen, accuracy)
-    rate = recording.sample_rate_hz
-    band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
-    run = SimulatedRun(specimen, Driven.BASE, accuracy, band, why)
+    channels = under_base_motion(recording, measurement, specimen)
+    band_hz = base_band_hz(recording, measurement)
+    run = SimulatedRun(specimen, Driven.BASE, Accuracy.STANDARD, band_hz, why)
     return DrawSource(run, 1, channels.samples, lambda _: channels)
 
 
@@ -438,7 +431,7 @@ def all_draws(
 
 
 def _random_channels(
-    recorded: RecordedChannels,
+    recording: Recording,
     rig: DrivenRig,
     fitted: FittedShaker | None,
     voltage: PlayedVoltage,
@@ -451,15 +444,14 @@ def _random_channels(
     volts = voltage.random_voltage(rng)
     rms_v = unseen.random_rms_v(rng)
     if rms_v > 0.0:
-        volts = _with_noise(volts.copy(), rig.role, rms_v, recorded.sample_rate_hz, rng)
-    motion = _simulate_motion(replace(rig, table=table), volts, recorded.recording, noise, rng)
+        volts = _with_noise(volts.copy(), rig.role, rms_v, recording.sample_rate_hz, rng)
+    motion = _simulate_motion(replace(rig, table=table), volts, recording, noise, rng)
     return SimulatedChannels(
-        recorded,
-        motion.m0_velocity,
-        (motion.impact_times_s, motion.impacts),
-        recorded.response_delay_s,
-        motion.base_acceleration,
-        recorded.response_gain,
+        recording,
+        velocity=motion.m0_velocity,
+        impacts_at_s=(motion.impact_times_s, motion.impacts),
+        base_acceleration=motion.base_acceleration,
+        has_sensors=True,
     )
 
 

@@ -3,7 +3,6 @@
 The base displacement is computed from the recorded acceleration.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,34 +12,21 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch
-from ..signals.arrays import Complexes, Flags, Integers, Reals, Samples
+from ..recordings.channels import BASE, DRIVE, RecordedChannels
+from ..signals.arrays import Complexes, Integers, Reals, Samples
 from ..signals.quantity import Quantity, converted_signal
 
-LOWEST_PART = 0.25
+_LOWEST_PART = 0.25
 """High-pass frequency relative to the lowest drive frequency; prevents drift by double integration."""
-HIGHEST_PART = 0.33
+_HIGHEST_PART = 0.33
 """Low-pass frequency relative to the sample rate, within the converter's pass band."""
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedBaseMotion:
-    """Displacement of the base over a whole recording, on its sample grid."""
-
-    displacement_m: Reals
-    """Displacement of the base without mean and drift, shape (samples,) [m]."""
-    sample_rate_hz: float
-    low_hz: float
-    high_hz: float
-    """Ends of the frequency band that the displacement contains [Hz]."""
-    delay_s: float
-    """Corrected delay of the accelerometer channel: sample k is the motion at k / sample_rate_hz."""
-
-
-def recorded_base_motion(recording: Recording, measurement: Measurement) -> RecordedBaseMotion:
+def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reals:
     """Return the base displacement: the recorded acceleration, integrated twice in the frequency domain.
 
-    The whole recording is used, because it starts and ends in silence. Raises UnusableData when samples
+    It has no mean and no drift, and the delay of the accelerometer channel is corrected; shape (samples,)
+    [m]. The whole recording is used, because it starts and ends in silence. Raises UnusableData when samples
     were lost.
     """
     acceleration = recording.read(BASE)
@@ -51,7 +37,7 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
             "the motion cannot be simulated; the measured result remains valid"
         )
     rate = recording.sample_rate_hz
-    low_hz, high_hz = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
+    low_hz, high_hz = base_band_hz(recording, measurement)
     displacement = converted_signal(
         acceleration,
         rate,
@@ -60,8 +46,12 @@ def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reco
         low_hz=low_hz,
         high_hz=high_hz,
     )
-    delay_s = recording.channel(BASE).delay_s
-    return RecordedBaseMotion(advance(displacement.samples, delay_s * rate), rate, low_hz, high_hz, delay_s)
+    return advance(displacement.samples, recording.channel(BASE).delay_s * rate)
+
+
+def base_band_hz(recording: Recording, measurement: Measurement) -> tuple[float, float]:
+    """Return the ends of the frequency band that the base displacement contains [Hz]."""
+    return _LOWEST_PART * lowest_frequency_hz(measurement), _HIGHEST_PART * recording.sample_rate_hz
 
 
 def lowest_frequency_hz(measurement: Measurement) -> float:
@@ -90,56 +80,38 @@ _VX = 3
 _STATE = 6
 
 
-@dataclass(frozen=True, eq=False)
-class SimulatedChannels:
-    """A simulated draw with the interface of a recording, for the same estimator."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SimulatedChannels(RecordedChannels):
+    """A simulated draw with the drive, the parts and the flags of a recording, for the same estimator."""
 
-    recorded: RecordedChannels
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
     """Times since the first sample [s], and number of contacts up to each time."""
-    response_delay_s: float
-    """Lag of the response channel behind the base channel."""
     base_acceleration: Samples
     """Acceleration of the simulated or recorded table that drove the specimen, shape (samples,) [m/s2]."""
-    sensors: Callable[[Reals], Complexes]
-    """Ratio of the response sensor's gain to the base sensor's, without their delays."""
-
-    is_force = False
+    has_sensors: bool
+    """Whether the velocity includes delay and gain of the recorded channel; if not, it has no sensor."""
 
     @property
-    def sample_rate_hz(self) -> float:
-        """Sample rate of all channels."""
-        return self.recorded.sample_rate_hz
-
-    @property
-    def samples(self) -> int:
-        """Number of samples per channel."""
-        return self.recorded.samples
+    def response_delay_s(self) -> float:
+        """Lag of the response channel behind the base channel [s]."""
+        # A simulated response without a sensor has no delay, but the recorded base may have one.
+        return super().response_delay_s if self.has_sensors else -self.recording.channel(BASE).delay_s
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
         """Ratio of the response sensor's gain to the base sensor's, without their delays."""
-        return self.sensors(frequency_hz)
-
-    def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the parts of the record named ``label``."""
-        return self.recorded.stretches(label)
+        if self.has_sensors:
+            return super().response_gain(frequency_hz)
+        # The base motion includes the effect of its sensor, and the response has no sensor.
+        return np.ones(frequency_hz.size, dtype=np.complex128)
 
     def read(self, start: int, stop: int) -> Reals:
         """Return the recorded drive, base acceleration and simulated velocity, shape (3, samples)."""
-        drive_v = self.recorded.recording.read(DRIVE, start, stop)
+        drive_v = self.recording.read(DRIVE, start, stop)
         return np.stack(
             [drive_v, self.base_acceleration[start:stop], self.velocity[start:stop]], dtype=np.float64
         )
-
-    def overload_flags(self, start: int, stop: int) -> Flags:
-        """Return flags of overloaded samples in the recording; the simulation is analysed without them."""
-        return self.recorded.overload_flags(start, stop)
-
-    def bridge_flags(self, start: int, stop: int) -> Flags:
-        """Return flags of samples that were bridged (drop-outs) in the recording."""
-        return self.recorded.bridge_flags(start, stop)
 
     def played_impacts(self, label: str) -> tuple[float, float]:
         """Return the number of impacts in all segments with this label, and the segments' duration [s]."""
@@ -152,32 +124,25 @@ class SimulatedChannels:
 
 
 def under_base_motion(
-    recording: Recording,
-    measurement: Measurement,
-    specimen: Specimen,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    recording: Recording, measurement: Measurement, specimen: Specimen
 ) -> SimulatedChannels:
     """Simulate a specimen from rest, driven by the base motion of a recording, at its full sample rate.
 
     Raises UnusableData when samples were lost, or the simulation did not finish.
     """
-    base = recorded_base_motion(recording, measurement)
-    velocity, impacts = shake_specimen(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
-    counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
-    # The simulated response has no delay, but the recorded base may have one.
+    rate, base_m = recording.sample_rate_hz, recorded_base_motion(recording, measurement)
+    velocity, impacts = shake_specimen(specimen, base_m, rate)
     return SimulatedChannels(
-        RecordedChannels(recording),
-        velocity,
-        counted,
-        -base.delay_s,
-        recording.read(BASE),
-        # The base motion includes the effect of its sensor, and the response has no sensor.
-        lambda frequency_hz: np.ones(frequency_hz.size, dtype=np.complex128),
+        recording,
+        velocity=velocity,
+        impacts_at_s=(np.arange(impacts.size) / rate, impacts.astype(np.float64)),
+        base_acceleration=recording.read(BASE),
+        has_sensors=False,
     )
 
 
 def shake_specimen(
-    specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
+    specimen: Specimen, displacement_m: Reals, sample_rate_hz: float
 ) -> tuple[Reals, Integers]:
     """Return m0's velocity and the number of impacts at every sample of the base displacement."""
     count = displacement_m.size
@@ -189,7 +154,8 @@ def shake_specimen(
         last = min(first + piece, count - 1)
         before, behind = min(_OVERLAP, first), min(_OVERLAP, count - 1 - last)
         part = Sampled(displacement_m[first - before : last + 1 + behind], sample_rate_hz)
-        path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
+        ends = {"first": before, "last": before + last - first}
+        path = follow_samples(specimen, part, Accuracy.STANDARD, state, **ends)
         if not path.reached_end:
             raise UnusableData(
                 f"the simulation from the recorded base motion failed after "

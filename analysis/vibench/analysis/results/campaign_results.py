@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording, copy_sentence, first_copies
-from vibench.sim import Accuracy, Specimen
+from vibench.sim import Specimen
 from vibench.sim.background import Observer, Progress, ignore_progress
 
 from ..errors import AnalysisError, NotEnoughData, UnusableData
@@ -44,7 +44,6 @@ def overlay(
     analysis: AbstractAnalysis[Any, Any],
     *,
     specimen: Specimen | None = None,
-    accuracy: Accuracy = Accuracy.STANDARD,
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     shaker: FittedShaker | None = None,
     draws: int = DRAWS,
@@ -60,8 +59,6 @@ def overlay(
         The recording, and its result from `analyse`.
     specimen
         Specimen to simulate; by default the specimen of the recording's bench configuration.
-    accuracy
-        Accuracy of simulated contacts if the recorded base motion drives the specimen.
     simulation
         Drive of the simulation: the recorded voltage (rig and specimen) or the recorded base motion (specimen
         alone). An unknown shaker is fitted to weak noise; if that fails, the base motion is used.
@@ -75,7 +72,7 @@ def overlay(
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
     stage(f"simulating {simulation.value}")
-    source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
+    source = _source(recording, analysis, model, simulation, shaker, draws)
     row = ANALYSES[analysis.excitation.kind]
     found = all_draws(source, row.draws(analysis), row.compared(analysis))
     stage("comparing with the simulation")
@@ -87,7 +84,6 @@ def _source(
     recording: Recording,
     analysis: AbstractAnalysis[Any, Any],
     model: Specimen,
-    accuracy: Accuracy,
     simulation: Simulation,
     shaker: FittedShaker | None,
     draws: int,
@@ -102,7 +98,7 @@ def _source(
             return voltage_source(recording, model, shaker, draws)
         except UnusableData as error:
             why = str(error)
-    return base_source(recording, measurement, model, accuracy, why)
+    return base_source(recording, measurement, model, why)
 
 
 class FailedStep(StrEnum):
