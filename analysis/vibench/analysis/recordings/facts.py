@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import AwareDatetime, BaseModel, Field, JsonValue, ValidationError
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
@@ -242,8 +242,6 @@ def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
 
 
 class _Finding(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
     name: str
     value: JsonValue
     verdict: str
@@ -251,8 +249,6 @@ class _Finding(BaseModel):
 
 
 class _BenchCheck(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
     checked: AwareDatetime
     verdict: str
     findings: tuple[_Finding, ...]
@@ -260,8 +256,6 @@ class _BenchCheck(BaseModel):
 
 class _Bench(BaseModel):
     """The entries of a bench configuration that an analysis reads, for all versions."""
-
-    model_config = ConfigDict(extra="allow")
 
     name: str = ""
     calibration_valid_days: Annotated[int, Field(ge=0, le=1_000_000)] = 0
@@ -274,8 +268,6 @@ class _Bench(BaseModel):
 
 
 class _Provenance(BaseModel):
-    model_config = ConfigDict(extra="allow")
-
     packages: dict[str, str] = Field(default_factory=dict)
 
 
