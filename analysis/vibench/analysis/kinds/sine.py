@@ -36,6 +36,7 @@ from ..sine.dwell_analysis import (
     IrregularMotion,
     bound_frequencies_hz,
     dwell_motion,
+    dwell_section,
     irregular_motion,
     measured_dwell,
     settled_envelope,
@@ -117,7 +118,7 @@ def _analyse_dwell(
         displacement=settled_envelope(found),
         terminal=terminal_levels(found, towards_hz),
         motion=motion,
-        irregular=irregular_motion(channels, found),
+        irregular=irregular_motion(motion.section, found, channels.sample_rate_hz),
     )
 
 
@@ -130,7 +131,7 @@ def _endings(found: IrregularMotion | None) -> tuple[Ending, ...]:
 def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellResponse]:
     towards_hz = bound_frequencies_hz(analysis.facts)
     found = measured_dwell(channels, analysis.excitation, towards_hz, analysis.response.window_s)
-    endings = _endings(irregular_motion(channels, found))
+    endings = _endings(irregular_motion(dwell_section(channels, found), found, channels.sample_rate_hz))
     impacts = channels.played_impacts(SegmentLabel.DWELL)
     return Draw(lambda: found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
 

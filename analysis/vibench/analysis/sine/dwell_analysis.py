@@ -136,7 +136,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
 
     Raises UnusableData when samples were lost inside the dwell.
     """
-    section = _section(channels, response)
+    section = dwell_section(channels, response)
     verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     bridged = channels.bridge_flags(stretch.start, stretch.stop)
@@ -182,10 +182,9 @@ class IrregularMotion:
     """Whether a repeating motion followed the irregular motion."""
 
 
-def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
+def irregular_motion(section: Section, response: DwellResponse, rate_hz: float) -> IrregularMotion | None:
     """Return the part of a dwell in which the motion did not repeat; None if all of it repeats."""
-    section = _section(channels, response)
-    points = _points(section, response, channels.sample_rate_hz)
+    points = _points(section, response, rate_hz)
     begin = begin_of_last_motion(points)
     last = Points(points.value[begin:], points.noise)
     repeats = shortest_period(last) is not None
@@ -195,7 +194,8 @@ def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMo
     return IrregularMotion(start_s, stop_s, repeats)
 
 
-def _section(channels: Channels, response: DwellResponse) -> Section:
+def dwell_section(channels: Channels, response: DwellResponse) -> Section:
+    """Return the Poincaré points of a whole dwell."""
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, _, velocity = read_whole(channels, stretch)
     return stroboscope(
