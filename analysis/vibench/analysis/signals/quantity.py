@@ -109,7 +109,7 @@ def converted_signal(
         rest = rest - line.real
         steady += (line * complex(derivative_factor(np.array(line_hz), given, wanted))).real
     centred = np.arange(rest.size) - 0.5 * (rest.size - 1)
-    slope = centred @ rest / max(centred @ centred, 1.0)
+    slope = float(centred @ rest) / max(float(centred @ centred), 1.0)
     spectrum = fft.rfft(rest - np.mean(rest) - slope * centred, padded)
     spectrum[0] = 0.0
     spectrum[1:] *= derivative_factor(frequency_hz[1:], power)
