@@ -5,11 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, WhiteNoise
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import Simulation, analyse_files, update_model
+from vibench.analysis import Simulation, analyse, analyse_files, update_model
+from vibench.analysis.errors import UnusableData
 from vibench.analysis.fit.suspects import Assumption
+from vibench.analysis.overlay.shaker_fit import fit_shaker
+from vibench.sim import gong2025
 
 pytestmark = pytest.mark.thorough
 
@@ -18,8 +21,8 @@ TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
 
 
 @pytest.fixture(scope="module")
-def update(tmp_path_factory):
-    """Fit a weak-noise recording of the virtual rig, whose configuration is correct."""
+def weak_noise(tmp_path_factory):
+    """Record weak noise on the virtual rig."""
     plan = WhiteNoise(
         amplitude_vpp=0.05,
         band_start_hz=50,
@@ -32,7 +35,13 @@ def update(tmp_path_factory):
     path = tmp_path_factory.mktemp("table") / "weak.h5"
     with open_bench(RIG) as bench:
         run_measurement(bench, Measurement(name="weak", excitation=plan, ramp_s=0.3), path)
-    return update_model(analyse_files([path], "weak", Simulation.LEFT_OUT))
+    return path
+
+
+@pytest.fixture(scope="module")
+def update(weak_noise):
+    """Fit the recording of the virtual rig, whose configuration is correct."""
+    return update_model(analyse_files([weak_noise], "weak", Simulation.LEFT_OUT))
 
 
 def test_a_correct_description_of_a_rig_fits_its_recordings(update):
@@ -52,3 +61,13 @@ def test_a_table_10_percent_heavier_than_described_is_named_as_suspect(update):
     assert "all three masses of the specimen" in suspect.sentence
     assert [each for each in heavier.sentences if each.startswith("The table's described mass does not fit")]
     assert heavier.values == update.values
+
+
+def test_a_table_that_fits_no_shaker_is_not_blamed_on_collisions_alone(weak_noise):
+    specimen = gong2025()
+    heavier = replace(specimen, masses=tuple(3.0 * each for each in specimen.masses))
+    with (
+        open_recording(weak_noise) as recording,
+        pytest.raises(UnusableData, match="the specimen differs from its description, or masses collide"),
+    ):
+        fit_shaker(recording, analyse(recording), heavier)

@@ -101,7 +101,8 @@ def fit_shaker(
     if chi2 > LARGEST_CHI2:
         raise UnusableData(
             f"no shaker explains the base motion under the voltage in {analysis.facts.name} (chi² {chi2:.3g} "
-            f"per degree of freedom, at most {LARGEST_CHI2:g}): masses may collide; choose weaker noise"
+            f"per degree of freedom, at most {LARGEST_CHI2:g}): the amplifier, the table or the specimen "
+            "differs from its description, or masses collide; check the bench file, or choose weaker noise"
         )
     covariance = np.linalg.pinv(best.jac.T @ best.jac) * max(chi2, 1.0)
     return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)
