@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QLabel
 
-from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis, thin_ticks
+from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis, Scale, thin_ticks
 from vibench.gui.plots.line_style import LIMIT, LineStyle, curve_style
 from vibench.gui.plots.plot import Plot
 from vibench.gui.plots.plot_actions import numbers_of, write_plot
@@ -285,6 +285,13 @@ def test_a_level_line_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
     plot.wipe()
     plot.turn_scale()
     assert plot.level(LIMIT, 10.0).value() == 1.0
+
+
+def test_the_axis_below_an_image_keeps_its_scale(plot, qtbot):
+    plot.addItem(pg.ImageItem(np.ones((4, 4))))
+    plot.show()
+    qtbot.keyClick(plot, Qt.Key.Key_L)
+    assert plot.scales[1] is Scale.LINEAR
 
 
 def test_cursor_readings_include_the_bounds_of_the_curve(plot):

@@ -264,7 +264,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().enableAutoRange()
 
     def turn_scale(self) -> None:
-        """Toggle the vertical axis between linear and logarithmic."""
+        """Toggle the vertical axis between linear and logarithmic, except below an image with fixed rows."""
+        if any(isinstance(item, pg.ImageItem) for item in self.getPlotItem().items):
+            return
         is_linear = self.scales[1] is Scale.LINEAR
         self.scales[1] = Scale.LOGARITHMIC if is_linear else Scale.LINEAR
         self.getPlotItem().setLogMode(y=is_linear)
