@@ -287,10 +287,9 @@ def test_a_level_line_keeps_its_value_when_the_axis_becomes_logarithmic(plot):
     assert plot.level(LIMIT, 10.0).value() == 1.0
 
 
-def test_the_axis_below_an_image_keeps_its_scale(plot, qtbot):
+def test_the_axis_below_an_image_keeps_its_scale(plot):
     plot.addItem(pg.ImageItem(np.ones((4, 4))))
-    plot.show()
-    qtbot.keyClick(plot, Qt.Key.Key_L)
+    {action.text(): action.trigger for action in plot.actions()}["Linear or logarithmic"]()
     assert plot.scales[1] is Scale.LINEAR
 
 
