@@ -212,3 +212,35 @@ def test_docstrings_and_comments_use_plain_words(read):
     found = {place: words for place, text in texts if (words := worn_words(text))}
     assert len(texts) > 500
     assert found == {}, f"write instead: {found}"
+
+
+def test_the_readme_has_at_most_120_lines():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
+def test_the_changelog_describes_the_version_in_three_minutes_and_with_a_date():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    section = re.search(
+        rf"^## {re.escape(version)} - \d{{4}}-\d\d-\d\d\n(.*?)^## ", changes, re.DOTALL | re.MULTILINE
+    )
+    assert section is not None
+    assert len(section[1].split()) <= 3 * 200
+
+
+def test_the_readme_links_tasks_verdicts_units_and_a_glossary_with_undecided():
+    linked = LINK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert {"docs/tasks.md", "docs/verdicts.md", "docs/sensor-units.md", "docs/glossary.md"} <= {*linked}
+    assert "| undecided |" in (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+
+
+def test_the_package_states_system_and_status_and_no_bound_expires_within_a_year():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert [each for each in project["classifiers"] if each.startswith("Operating System ::")]
+    assert [each for each in project["classifiers"] if each.startswith("Development Status ::")]
+    wanted = [
+        *project["dependencies"],
+        *(each for group in project["optional-dependencies"].values() for each in group),
+    ]
+    years = [int(year) for each in wanted for year in re.findall(r"<(20\d\d)\b", each)]
+    assert min(years, default=2100) > 2027
