@@ -169,6 +169,10 @@ def test_an_empty_report_is_refused(tmp_path):
         analyse_files([], "empty")
     with pytest.raises(NotEnoughData, match="contains no recording"):
         recordings_in(tmp_path)
+    (tmp_path / "run1").mkdir()
+    (tmp_path / "run1" / "noise.h5").touch()
+    with pytest.raises(NotEnoughData, match=r"give a folder with recordings, such as .*run1$"):
+        recordings_in(tmp_path)
 
 
 def test_recordings_of_a_folder_are_reported_in_order_of_their_start(dwell_file, noise_file, tmp_path):

@@ -336,7 +336,10 @@ def recordings_in(folder: Path) -> tuple[Path, ...]:
     """
     found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
     if not found:
-        raise NotEnoughData(f"{folder} contains no recording (.h5, .h5.part); give a folder with recordings")
+        below = next((f", such as {path.parent}" for path in sorted(folder.glob("*/*.h5*"))), "")
+        raise NotEnoughData(
+            f"{folder} contains no recording (.h5, .h5.part); give a folder with recordings{below}"
+        )
     return tuple(sorted(found, key=lambda path: (_start_time(path), path.name)))
 
 
