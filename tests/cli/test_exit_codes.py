@@ -77,6 +77,11 @@ def test_text_for_a_whole_number_is_refused_with_an_example(vibench_here, tmp_pa
     assert "'abc' is not a whole number; give a number such as 5" in " ".join(said.split())
 
 
+def test_a_second_path_is_refused_with_the_advice_to_give_one(vibench_here, tmp_path):
+    said = vibench_here("analyse", "a.h5", "b.h5", cwd=tmp_path).stderr
+    assert "(b.h5); give one path, such as a folder" in " ".join(said.split())
+
+
 def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_of):
     assert "needs about" in output_of("predict", *SCENE, "--error", "1e-6", "--time", "0.2s")
 

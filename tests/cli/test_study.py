@@ -140,8 +140,9 @@ def test_a_study_with_a_failed_point_is_saved_and_returns_an_error(vibench_here,
     assert ended.value.exit_code == 1
 
 
-def test_a_study_file_with_the_suffix_of_another_format_is_refused(refusal, tmp_path):
-    assert "use the suffix .h5" in refusal("study", "paper", "--out", "a.csv")
+@pytest.mark.parametrize("out", ["a.csv", "a.txt", "a.xlsx"])
+def test_a_study_file_with_the_suffix_of_another_format_is_refused(refusal, tmp_path, out):
+    assert "use the suffix .h5" in refusal("study", "paper", "--out", out)
     assert list(tmp_path.iterdir()) == []
 
 

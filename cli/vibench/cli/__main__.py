@@ -132,6 +132,8 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
             _add_given_value(error, words)
         if type(error) is typer.BadParameter:  # usage errors of another class, such as a missing option
             error.exit_code = ExitCode.FAILED
+        if "extra argument" in error.message:
+            error.message += "; give one path, such as a folder, and put a path with spaces in quotes"
         if args:  # without arguments, the error's message is the help text
             error.message = printable(error.message)
         raise

@@ -85,8 +85,10 @@ def room_for_page(path: Path) -> None:
     room_for_folder(path.parent)
 
 
-SUFFIXES = frozenset({".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".uff", ".wav", ".zip"})
-"""Suffixes of files that vibench writes or reads."""
+SUFFIXES = frozenset(
+    {".csv", ".h5", ".json", ".mat", ".nxs", ".toml", ".txt", ".uff", ".wav", ".xlsx", ".zip"}
+)
+"""Suffixes of known formats."""
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
