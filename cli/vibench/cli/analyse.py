@@ -209,11 +209,8 @@ def _analyse(
 
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
-        motion_document = (
-            {"hidden_motion": {each.name: each.to_dict() for each in motions}}
-            if hidden is not _Output.OMITTED
-            else {}
-        )
+        known = {each.name: each.to_dict() for each in motions}
+        motion_document = {} if hidden is _Output.OMITTED else {"hidden_motion": known}
         further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
         print_json({**campaign_summary(results), **fitted, **motion_document, **(further if others else {})})
     for sentence in (

@@ -58,11 +58,10 @@ def branches(
     as_json: AsJson = False,
 ) -> None:
     """Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations."""
-    measured, drive = (
-        _drive(amplitude, frequency, like)
-        if resonance is None
-        else _resonance(amplitude, frequency, like, resonance)
-    )
+    if resonance is None:
+        measured, drive = _drive(amplitude, frequency, like)
+    else:
+        measured, drive = _resonance(amplitude, frequency, like, resonance)
     wishes = (("error", error), ("time_s", time_limit))
     wish = {name: value for name, value in wishes if value is not None}
     request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive, **wish)

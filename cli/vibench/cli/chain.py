@@ -143,11 +143,8 @@ def _run_in_words(run: ChainRun) -> str:
     if not math.isnan(run.transmission_error[0]):
         most = run.transmission_error.max()
         across += f"error {100.0 * most:.2g} % at most; " if most < math.inf else "error not known; "
-    exponent = (
-        ""
-        if math.isnan(run.exponent_per_s)
-        else f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
-    )
+    known = f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
+    exponent = "" if math.isnan(run.exponent_per_s) else known
     if not run.time_s.size:
         return f"{count_text(run.cells, 'cell')}{where}: {run.outcome}, {run.elapsed_s:.1f} s"
     rates = run.impacts / run.observed_s

@@ -78,10 +78,7 @@ def print_estimate(
 
 
 def expected_results(campaign: Campaign, rig: Rig) -> dict[str, tuple["ExpectedResult", ...]]:
-    """Return the expected results of each measurement and each noise of a sweep, by name.
-
-    Raises LimitExceeded for a plan beyond a limit. Sines of a sweep are left out: each takes half a minute.
-    """
+    """Return the expected results of measurements and of noise in sweeps; raise LimitExceeded."""
     for point in distinct_drives(campaign.points()):
         require_within_limits(point.measurement, rig)
     swept = distinct_drives(tuple(point for sweep in campaign.sweeps for point in sweep.points()))

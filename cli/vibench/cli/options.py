@@ -123,11 +123,8 @@ def _help(model: "type[BaseModel]", name: str) -> str:
     default = model.model_fields[name].default
     shown = default.value if isinstance(default, Enum) else default
     text = " ".join(field_docstring(model, name).split())
-    return (
-        text
-        if model.model_fields[name].is_required() or shown in (None, "")
-        else f"{text}  [default: {shown}]"
-    )
+    is_bare = model.model_fields[name].is_required() or shown in (None, "")
+    return text if is_bare else f"{text}  [default: {shown}]"
 
 
 def _plain(annotation: Any) -> Any:

@@ -30,8 +30,6 @@ from ._journal import (
     read_journal,
 )
 
-MOST_NAMES = 12
-"""Largest number of measurements named in one error."""
 PROGRAM_ENDED = "the program ended during the recording"
 
 
@@ -157,7 +155,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
         except LimitExceeded as error:
             complaints[point.name] = str(error)
     if complaints:
-        _, *others = leading(list(complaints), MOST_NAMES)
+        _, *others = leading(list(complaints))
         also = f" Other measurements beyond a limit: {', '.join(others)}." if others else ""
         raise LimitExceeded(next(iter(complaints.values())) + also)
 

@@ -91,11 +91,8 @@ class CampaignRunner:
     ) -> tuple[PointResult, ...]:
         """Measure the points one after another; return the result of each."""
         done = sum(point.state is JournalPointState.DONE for point in self._coming)
-        begun = (
-            CampaignEventKind.RESUMED
-            if any(point.attempts for point in self._coming) or done
-            else CampaignEventKind.BEGUN
-        )
+        is_resumed = done or any(point.attempts for point in self._coming)
+        begun = CampaignEventKind.RESUMED if is_resumed else CampaignEventKind.BEGUN
         text = f"{campaign.name}: {count_text(self._count, 'point')}, {done} already done"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         self._report_damage()

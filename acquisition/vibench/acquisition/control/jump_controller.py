@@ -75,11 +75,10 @@ class _JumpSearch:
 
     def narrow(self, point: SettledPoint) -> None:
         self.here = side(point, self.branch[-1], self.after)
-        match self.here:
-            case JumpSide.BEFORE:
-                self.branch.append(point)
-            case JumpSide.AFTER:
-                self.after = point
+        if self.here is JumpSide.BEFORE:
+            self.branch.append(point)
+        else:
+            self.after = point
 
     def shorten(self, place: int, point: SettledPoint) -> None:
         """Shorten the branch: the motion left it at index ``place``, where ``point`` was measured."""

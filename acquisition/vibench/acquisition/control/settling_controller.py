@@ -65,11 +65,10 @@ def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float)
     """
     while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
         middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
-        match side(middle, before, after):
-            case JumpSide.BEFORE:
-                before = middle
-            case JumpSide.AFTER:
-                after = middle
+        if side(middle, before, after) is JumpSide.BEFORE:
+            before = middle
+        else:
+            after = middle
     return LocatedJump(before, after)
 
 

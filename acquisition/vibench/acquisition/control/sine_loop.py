@@ -66,9 +66,7 @@ class GainEstimator:
     @property
     def level(self) -> float:
         """Mean amplitude of the base over the averaged steps of the drive, as a fraction of its target."""
-        if not self._answers:
-            return 1.0
-        return float(abs(np.mean([each.level for each in self._answers])))
+        return float(abs(np.mean([each.level for each in self._answers]))) if self._answers else 1.0
 
     def gain_at(self, time_s: float) -> float:
         """Return the predicted magnitude of the gain relative to the model; 1 without measurements."""

@@ -82,11 +82,9 @@ class GeneratorModel:
         """Raise LimitExceeded unless bench and generator allow this amplitude, without an offset."""
         allowed = self.amplitude_range_vpp(config)
         limit_vpp = config.amplitude_limit_vpp
-        reason = (
-            f"generator.amplitude_limit_vpp = {limit_vpp:g}"
-            if allowed[1] == limit_vpp
-            else f"the {self.name} with load_ohm = {config.load_ohm}"
-        )
+        reason = f"the {self.name} with load_ohm = {config.load_ohm}"
+        if allowed[1] == limit_vpp:
+            reason = f"generator.amplitude_limit_vpp = {limit_vpp:g}"
         _require(amplitude_vpp, allowed, "Vpp", reason)
 
     def check_sweep(self, sweep: Sweep) -> None:

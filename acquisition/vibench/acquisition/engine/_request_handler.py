@@ -66,7 +66,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     size_mb = campaign.size_bytes(bench.digitizer.sample_rate_hz, len(bench.channels)) / 1e6
     length = timedelta(seconds=round(campaign.duration_s))
     bound = f"{closest.limit:.4g} {closest.unit}"
-    kept = len(planned) - len(missing)
+    kept = f", {count} kept from before" if (count := len(planned) - len(missing)) else ""
     attendance = request.attendance or supervision
     granted_s = patience_s(request.longest_patience_s, closest.use)
     hung_s = hung_patience_s(granted_s)
@@ -75,8 +75,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         campaign=campaign.name,
         folder=str(folder),
         lines=(
-            f"What: {count_text(len(missing), 'recording')} ({kinds})"
-            + f", {kept} kept from before" * bool(kept),
+            f"What: {count_text(len(missing), 'recording')} ({kinds}){kept}",
             f"Level: at most {loudest:g} Vpp at the generator",
             f"Limits: the closest is {closest.what}, at {closest.use:.0%} of {bound} in {tightest}",
             f"Duration: {length} (h:min:s), ramps and checks included",

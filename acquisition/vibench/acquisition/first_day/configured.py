@@ -301,11 +301,8 @@ def _require_text(answer: str, key: str) -> None:
 def _default_answer(text: str, key: str) -> str:
     """Return the template's value as the default answer; only the number if the value states a source."""
     written = value_in(text, key)
-    match tomllib.loads(f"held = {written}")["held"] if written else None:
-        case {"value": number}:
-            return str(number)
-        case _:
-            return written.strip('"')
+    held = tomllib.loads(f"held = {written}")["held"] if written else None
+    return str(held["value"]) if isinstance(held, dict) and "value" in held else written.strip('"')
 
 
 def _require_within_bounds(text: str, key: str) -> None:

@@ -37,5 +37,4 @@ def shorten(text: str, longest: int = LONGEST_CLAUSE) -> str:
 
 def leading(texts: Sequence[str], most: int = 3) -> list[str]:
     """Return the first ``most`` texts, followed by ``and N more`` if there are more."""
-    more = [f"and {len(texts) - most} more"] if len(texts) > most else []
-    return [*texts[:most], *more]
+    return [*texts[:most], *[f"and {len(texts) - most} more"] * (len(texts) > most)]

@@ -187,11 +187,8 @@ def _complaint(detail: Any) -> str:
     reason = shorten(fault_in_words(detail))
     if not detail["loc"]:
         return reason
-    match detail["input"]:
-        case dict() | [dict(), *_]:  # the value is too long to show; the reason names the wrong entry
-            given = ""
-        case value:
-            given = f" = {_text_of(value)}"
+    # A table is too long to show; the reason names the wrong entry.
+    given = "" if _is_nested(detail["input"]) else f" = {_text_of(detail['input'])}"
     return f"{_key(detail['loc'])}{given}: {reason[0].lower()}{reason[1:]}"
 
 
@@ -247,23 +244,15 @@ def _table(content: Table, path: tuple[str, ...]) -> Iterator[str]:
             yield f"{key} = {_value(value)}"
     for key, value in nested.items():
         inner = (*path, key)
-        match value:
-            case dict():
-                yield f"\n[{'.'.join(inner)}]"
-                yield from _table(value, inner)
-            case list():
-                for element in value:
-                    assert isinstance(element, dict), "_is_nested allows only lists of tables"
-                    yield f"\n[[{'.'.join(inner)}]]"
-                    yield from _table(element, inner)
+        name = ".".join(inner)
+        for element in value if isinstance(value, list) else [value]:
+            assert isinstance(element, dict), "_is_nested allows only tables and lists of tables"
+            yield f"\n[[{name}]]" if isinstance(value, list) else f"\n[{name}]"
+            yield from _table(element, inner)
 
 
 def _is_nested(value: Value) -> bool:
-    match value:
-        case dict() | [dict(), *_]:
-            return True
-        case _:
-            return False
+    return isinstance(value[0] if isinstance(value, list | tuple) and value else value, dict)
 
 
 def _value(value: Value) -> str:

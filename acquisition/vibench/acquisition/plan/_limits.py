@@ -116,11 +116,9 @@ class LimitCheck:
     @property
     def use(self) -> float:
         """Used fraction of the limit; above 1, the limit is exceeded."""
-        match self.side:
-            case LimitSide.AT_MOST:
-                return self.value / self.limit if self.limit else math.inf
-            case LimitSide.AT_LEAST:
-                return self.limit / self.value
+        if self.side is LimitSide.AT_LEAST:
+            return self.limit / self.value
+        return self.value / self.limit if self.limit else math.inf
 
     @property
     def forbids(self) -> bool:

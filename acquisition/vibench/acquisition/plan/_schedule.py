@@ -267,11 +267,7 @@ def known_phases(measurement: Measurement) -> Iterator[Phase]:
 
 
 def _follows_without_a_jump(before: Play, after: Play) -> bool:
-    match before, after:
-        case Tone(), Tone():
-            return True
-        case _:
-            return before is after
+    return before is after or (isinstance(before, Tone) and isinstance(after, Tone))
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:

@@ -293,9 +293,7 @@ class GeneratorDrive:
 
     def _quiet_vpp(self) -> float:
         quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
-        match self._play:
-            case Waveform(values):
-                # Generators scale a waveform to their full range, so their own setting is lower by its peak.
-                return quiet_vpp / float(np.max(np.abs(values)))
-            case _:
-                return quiet_vpp
+        if isinstance(self._play, Waveform):
+            # Generators scale a waveform to their full range, so their own setting is lower by its peak.
+            return quiet_vpp / float(np.max(np.abs(self._play.values)))
+        return quiet_vpp

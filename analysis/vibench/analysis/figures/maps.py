@@ -16,7 +16,6 @@ from vibench.sim.maps import MapMotion, MapResults, Quantity, Spacing
 from ..dynamics import (
     MOTION_CLASSES,
     BranchDiagram,
-    BranchLine,
     RecordedLevel,
     map_caption,
     motion_classes,
@@ -190,7 +189,7 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
         for line in diagram.lines:
             place = factor * line.axis_values(diagram.request.along)
             draw_line(panels[0], line, place, line.response_i[:, 0])
-            draw_line(panels[1], line, place, _section(line))
+            draw_line(panels[1], line, place, MICRO * (line.states[:, 1] - line.states[:, 2]))
     style.magnitude_axis(panels[0])
     panels[0].set_ylabel("Response I of m0 over A0")
     panels[1].set_ylabel("p once per drive period [µm]")
@@ -200,10 +199,6 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     style.legend_above(figure, list(panels), columns=4)
     figure.align_ylabels()
     return figure
-
-
-def _section(line: BranchLine) -> Reals:
-    return np.asarray(MICRO * (line.states[:, 1] - line.states[:, 2]))
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:

@@ -378,11 +378,9 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
         tracked,
         {what: value_of(tracked, what) * float(np.exp(part)) for what, part in _relative(logarithms).items()},
     )
-    match specimen.contact:
-        case Hertz() | LinearGap() | HuntCrossley():
-            return replace(other.specimen, contact=replace(specimen.contact, stiffness=other.steepness))
-        case _:
-            raise InvalidRequest("the specimen is described without stops")
+    if not isinstance(specimen.contact, Hertz | LinearGap | HuntCrossley):
+        raise InvalidRequest("the specimen is described without stops")
+    return replace(other.specimen, contact=replace(specimen.contact, stiffness=other.steepness))
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:

@@ -154,8 +154,7 @@ def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyRes
     """Return base acceleration over voltage, times s, since estimators take these for velocity and base."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
-    match analysis.excitation:
-        case StreamedNoise() as plan:
-            return streamed_response(channels, plan, analysis.request).frequency_response
-        case plan:
-            return repeated_response(channels, plan, analysis.request)[0]
+    plan = analysis.excitation
+    if isinstance(plan, StreamedNoise):
+        return streamed_response(channels, plan, analysis.request).frequency_response
+    return repeated_response(channels, plan, analysis.request)[0]

@@ -68,9 +68,8 @@ class SimilarityCurve:
 
     def logarithm(self, of: LogarithmOf) -> Reals:
         """Return log10 of the response in the named unit, shape (points,)."""
-        value = self.response
-        if of is not LogarithmOf.NORMALISED:
-            value = value * self.amplitude_m * _PER_METRE[of]
+        is_normalised = of is LogarithmOf.NORMALISED
+        value = self.response if is_normalised else self.response * self.amplitude_m * _PER_METRE[of]
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.log10(value))
 

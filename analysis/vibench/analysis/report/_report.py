@@ -318,11 +318,8 @@ def _part_name(part: Mapping[str, Any]) -> str:
 
 
 def _value(value: Any) -> str:
-    match value:
-        case {"value": number, "source": source}:
-            return f"{number:g} ({source})"
-        case _:
-            return str(value)
+    is_sourced = isinstance(value, dict) and value.keys() >= {"value", "source"}
+    return f"{value['value']:g} ({value['source']})" if is_sourced else str(value)
 
 
 _HEADINGS = "channel, input, sensor, serial, sensitivity, range, coupling, calibrated, delay"

@@ -98,10 +98,8 @@ def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
         recording = open_recording(path.with_name(f"{path.name}.part"))
         labels = plan_of(recording).excitation.result_labels
         found = [each for each in recording.segments if each.label in labels]
-        if SegmentLabel.REALISATION in labels:
-            counted = [each for each in found if each.is_complete]
-        else:
-            counted = found[stretch - 1 : stretch]
+        is_noise = SegmentLabel.REALISATION in labels
+        counted = [each for each in found if each.is_complete] if is_noise else found[stretch - 1 : stretch]
         held = sum(each.stop - each.start for each in counted)
         if held / recording.sample_rate_hz > recorded_s * (1 - 1e-6):
             return recording

@@ -107,7 +107,8 @@ class ModelForm(QWidget):
                 if loc and loc[0] == name
             }
             if isinstance(row.editor, GroupEditor):
-                sentences += row.editor.complain(inner)
+                found = row.editor.complain(inner)
+                sentences += found if inner or row.editor.complaint else ()
                 continue
             text = row.editor.complaint or "; ".join(inner.values())
             text = f"{row.facts.label_with_unit}: {_sentence(text, row.facts)}" if text else ""
@@ -267,10 +268,6 @@ class OptionalGroupEditor(GroupEditor):
     def complaint(self) -> str:
         """First complaint of a field inside; empty when absent."""
         return super().complaint if self._there.isChecked() else ""
-
-    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show complaints at the fields of the inner form; return none of them when absent."""
-        return super().complain(complaints) if self._there.isChecked() else ()
 
     def content(self) -> Any:
         """Return the content as stored in a file; None when absent."""

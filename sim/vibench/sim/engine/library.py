@@ -275,10 +275,9 @@ def library_path() -> Path:
         found = _newest_of(families, current)
     if found is not None:
         return found
+    msg = f"The native engine is older than its sources: run pip install ziglang && {REBUILD}."
     if current is None:
         msg = f"{FOLDER} has no native engine for {families or 'this processor'}: install vibench again."
-    else:
-        msg = f"The native engine is older than its sources: run pip install ziglang && {REBUILD}."
     raise EngineError(msg)
 
 

@@ -117,10 +117,8 @@ def lyapunov_spectrum(
         max_impact_rate_hz,
     )
     length = interval.length_s
-    if run.outcome is not Outcome.REACHED_END:
-        parts = _RunExponents()
-    else:
-        parts = _exponents_of_run(specimen, drive, run, skipped)
+    is_whole = run.outcome is Outcome.REACHED_END
+    parts = _exponents_of_run(specimen, drive, run, skipped) if is_whole else _RunExponents()
     since = parts.since
     lasting = (len(run.growth) - since) * length
     return LyapunovSpectrum(

@@ -317,11 +317,8 @@ def _signs(
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
     """Return the distance from grazing: p to the stop over the gap, or dp/dt over the gap times 2 pi f."""
-    match specimen.contact:
-        case NoContact() | PowerLaw():
-            return math.inf
-        case _:
-            pass
+    if isinstance(specimen.contact, NoContact | PowerLaw):
+        return math.inf
     lower, upper = specimen.gaps_m
     p = run.states[:, Y] - run.states[:, Z]
     gap = min(lower, upper)

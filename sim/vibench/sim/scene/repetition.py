@@ -286,11 +286,7 @@ def pace_of(
 
 
 def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
-    match contact:
-        case PowerLaw():
-            noise = STEPPING * accuracy.tolerance
-        case _:
-            noise = ROUNDING
+    noise = STEPPING * accuracy.tolerance if isinstance(contact, PowerLaw) else ROUNDING
     return Sharpness(max(SETTLED[accuracy], 2.0 * noise), noise)
 
 

@@ -261,11 +261,8 @@ class SpecimenDescription(_DescribedModel):
     @property
     def hertz_k(self) -> float:
         """Hertz stiffness k of F = k d^(3/2) at a stop [N/m^1.5]."""
-        return (
-            self.hertz_stiffness
-            if isinstance(self.hertz_stiffness, float)
-            else self.hertz_stiffness.stiffness
-        )
+        given = self.hertz_stiffness
+        return given if isinstance(given, float) else given.stiffness
 
     def _dampings(self, damping_time_s: float | None) -> Triple:
         time_s = self.damping_time_s if damping_time_s is None else damping_time_s

@@ -293,8 +293,6 @@ def _index(axis: StudyAxis, value: Value) -> int:
 
 
 def _is_same(here: Value, requested: Value) -> bool:
-    match here, requested:
-        case float(), float():
-            return abs(here - requested) <= SAME * abs(here)
-        case _:
-            return here == requested
+    if isinstance(here, float) and isinstance(requested, float):
+        return abs(here - requested) <= SAME * abs(here)
+    return here == requested

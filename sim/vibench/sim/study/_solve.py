@@ -90,11 +90,8 @@ class Expansion(Points):
         """Return the scene of a point that continues no other point."""
         place = self.grid.place(number)
         start = self._study.starts[place[-2]]
-        match start:
-            case GivenStart():
-                return self._study.scene(place, Given(start.state, start.label))
-            case _:
-                return self._study.scene(place, Rest())
+        given = Given(start.state, start.label) if isinstance(start, GivenStart) else Rest()
+        return self._study.scene(place, given)
 
     def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
         """Return the scene of a point that continues the point ``before``."""

@@ -69,11 +69,8 @@ def expand_ranges(given: object) -> object:
 def _flatten(given: list[object] | tuple[object, ...]) -> object:
     values: list[object] = []
     for each in given:
-        match expand_ranges(each):
-            case tuple() as some:
-                values.extend(some)
-            case one:
-                values.append(one)
+        some = expand_ranges(each)
+        values.extend(some if isinstance(some, tuple) else (some,))
         if len(values) > LONGEST:
             raise ValueError(f"ranges have more than {LONGEST} values in total; give larger steps")
     if all(isinstance(value, (int, float)) for value in values):
@@ -278,20 +275,16 @@ class Study(GridPlan):
     @property
     def duration(self) -> FixedDuration | AutomaticDuration:
         """Duration setting of every point's run: fixed, or until the motion settles."""
-        match "auto" if self.target is not None else self.duration_s:
-            case "auto":
-                return AutomaticDuration(window_s=self.window_s)
-            case float(duration_s):
-                return FixedDuration(duration_s, self.window_s)
+        if self.target is None and isinstance(self.duration_s, float):
+            return FixedDuration(self.duration_s, self.window_s)
+        return AutomaticDuration(window_s=self.window_s)
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
     """Return an axis of numbers, or of the label `AS_DESCRIBED` if there are no numbers."""
-    return (
-        StudyAxis(name, (AS_DESCRIBED,), "", long_name)
-        if values is None
-        else StudyAxis(name, values, units, long_name)
-    )
+    if values is None:
+        return StudyAxis(name, (AS_DESCRIBED,), "", long_name)
+    return StudyAxis(name, values, units, long_name)
 
 
 def start_name(frequency_hz: float) -> str:

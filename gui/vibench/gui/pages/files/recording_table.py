@@ -414,13 +414,11 @@ class RecordingTable(QTableView):
         """Draw a hint while the table is empty."""
         super().paintEvent(event)
         if self._sorted.rowCount() == 0:
-            words = (
-                "No recording matches the search and the selected campaign."
-                if self.recordings.entries
-                else "The folder is being read."
-                if self.is_listing
-                else "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
-            )
+            words = "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
+            if self.recordings.entries:
+                words = "No recording matches the search and the selected campaign."
+            elif self.is_listing:
+                words = "The folder is being read."
             hint_in_list(self, words)
 
     def retheme(self, theme: Theme) -> None:

@@ -390,12 +390,10 @@ class RunPage(Page):
         """Draw the newest samples, unless the user has frozen the plots."""
         status = self.context.bridge.status
         measurement = self.context.selection.measurement
-        test = (
-            ""
-            if measurement is None
-            else f"{measurement.name} ({EXCITATION_KINDS[measurement.excitation.kind].label})"
-        )
-        reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
+        test, reason = "", "The test is not complete; see the Test page (Ctrl+2)."
+        if measurement is not None:
+            kind = EXCITATION_KINDS[measurement.excitation.kind]
+            test, reason = f"{measurement.name} ({kind.label})", ""
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
             # The button with the focus was just hidden. Otherwise Qt would move the focus to the next list.

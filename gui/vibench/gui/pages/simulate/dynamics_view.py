@@ -121,12 +121,8 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         course = self._course
         if course is None:
             return
-        for part in parts:
-            match part:
-                case Trouble():
-                    course.troubles.append(part.sentence)
-                case _:
-                    course.parts.append(part)
+        course.troubles += [part.sentence for part in parts if isinstance(part, Trouble)]
+        course.parts += [part for part in parts if not isinstance(part, Trouble)]
         elapsed_s = time.perf_counter() - course.began
         self.answer = self.kind.answer(course.request, tuple(course.parts), elapsed_s)
         self._is_stale = True
