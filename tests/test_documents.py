@@ -9,11 +9,15 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 
 from benchmarks.sample_texts import comments, docstrings, product_sources
+from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.instruments import PlugInKind
+from vibench.acquisition.plan import Measurement, WhiteNoise
+from vibench.analysis import analyse
 from vibench.cli.__main__ import COMMANDS, app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -244,3 +248,21 @@ def test_the_package_states_system_and_status_and_no_bound_expires_within_a_year
     ]
     years = [int(year) for each in wanted for year in re.findall(r"<(20\d\d)\b", each)]
     assert min(years, default=2100) > 2027
+
+
+@pytest.mark.thorough
+def test_the_transmissibility_by_hand_equals_that_of_the_analysis(tmp_path, monkeypatch):
+    path = tmp_path / "noise_recordings" / "weak.h5"
+    path.parent.mkdir()
+    band = {"band_start_hz": 50, "band_stop_hz": 600, "repetition_hz": 1}
+    noise = WhiteNoise(amplitude_vpp=0.05, realisations=2, periods=2, settle_s=3, **band)
+    with open_bench("virtual_rig") as bench:
+        run_measurement(bench, Measurement(name="weak", excitation=noise), path)
+    monkeypatch.chdir(tmp_path)
+    (code,) = CODE.findall((ROOT / "docs" / "by-hand.md").read_text(encoding="utf-8"))
+    names = {}
+    exec(code, names)
+    found = analyse(path).response.frequency_response
+    places = np.searchsorted(found.frequency_hz, names["LINES_HZ"] - 0.5)
+    by_hand = np.abs(names["transmissibility"](names["error"]))
+    np.testing.assert_allclose(by_hand, found.magnitude[places], rtol=2e-3)
