@@ -14,7 +14,7 @@ from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recor
 
 from .options import option
 from .output import console, print_json, print_warnings
-from .paths import AllowExternal, AsJson, external_data, file_at
+from .paths import AllowExternal, AsJson, file_at
 from .progress_bars import transfer_bar
 
 

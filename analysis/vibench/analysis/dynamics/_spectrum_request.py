@@ -9,7 +9,15 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.sim import Accuracy, Harmonic, LyapunovSpectrum, Parameter, PowerLaw, lyapunov_spectrum
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    LyapunovSpectrum,
+    Parameter,
+    PowerLaw,
+    count_text,
+    lyapunov_spectrum,
+)
 from vibench.sim.study import frequency_range
 
 from ..signals.arrays import Reals

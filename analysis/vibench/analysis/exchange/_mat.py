@@ -210,9 +210,15 @@ def open_mat(path: Path) -> Iterator[Source]:
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Files exported by vibench state the sample rate beside the channels.
-    about = own.get("recording")
-    numbers = _numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())
+    about = tuple(_part(own, "recording").items())
+    numbers = _numbers(own, "", about, tuple(_all_facts(own)))
     yield Source({channel: read_from(values) for channel, values in numbers})
+
+
+def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the values of a struct and of all structs in it, with their names."""
+    for name, value in struct.items():
+        yield from _all_facts(value) if isinstance(value, dict) else ((name, value),)
 
 
 def _numbers(

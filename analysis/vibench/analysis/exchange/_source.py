@@ -5,6 +5,7 @@ import struct
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -103,11 +104,13 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
         near = [time for time, rank in ranks.items() if rank == best and any(rank)]
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
-        moments = {axes[time].moments for time in near if axes[time].unit is not None}
-        if not source.are_in_order and len(moments) > 1:
-            # The order of names does not show which times belong to a channel.
-            named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
-            axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
+        if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
+            # Only columns of times, each followed by its channels, show which times belong to a channel.
+            order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
+            is_clear = order[0] and not any(one and two for one, two in pairwise(order))
+            if not (source.are_in_order and is_clear):
+                named = ", ".join(shorten(time.name, NAME_SHOWN) for time in near[:CHANNELS_SHOWN])
+                axes[chosen[0]] = replace(axes[chosen[0]], trouble=f"has different times in {named}")
         channel = replace(each, unit=each.unit or unit_in_name(each.label or each.name))
         yield axes[chosen[0]].of(channel) if chosen else channel
 

@@ -99,8 +99,8 @@ def open_wav(path: Path) -> Iterator[Source]:
 
 
 def _read_column(column: NDArray[Any], start: int, stop: int) -> Reals:
-    values = np.asarray(column[start:stop], dtype=np.float64)
-    return (values - OFFSETS.get(column.dtype.kind, 0.0)) / _full_count(column.dtype)
+    fractions = np.asarray(column[start:stop], dtype=np.float64) / _full_count(column.dtype)
+    return fractions - 1.0 if column.dtype.kind == "u" else fractions
 
 
 def _valid_bits(path: Path) -> int:
