@@ -167,8 +167,7 @@ template <class T, class Stops> class CubicRun {
     double length = is_whole ? t.length : (end - begin) / double(pieces);
     CubicForce<double> force = base_force(base, t.specimen);
     for (int64_t n = 0; n < pieces; n++) {
-      double since = begin + double(n) * length;
-      Outcome outcome = pass(since == 0.0 ? force : shifted(force, since), length, is_whole);
+      Outcome outcome = pass(n == 0 && is_whole ? force : shifted(force, begin + double(n) * length), length, is_whole);
       if (outcome != REACHED_END) return outcome;
     }
     return REACHED_END;

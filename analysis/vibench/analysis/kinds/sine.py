@@ -12,7 +12,7 @@ from ..chaos.verdict import MotionKind
 from ..comparison.recording_curves import dwell_traces, stepped_traces, sweep_traces
 from ..frequency_response.request import FrequencyResponseRequest
 from ..overlay.draws import Draw
-from ..overlay.ensemble import Ending, Quantity
+from ..overlay.ensemble import Ending
 from ..overlay.overlay import (
     SteppedSineOverlay,
     dwell_overlay,
@@ -136,16 +136,13 @@ def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellRes
     return Draw(lambda: found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
 
 
-def _compared_quantities(analysis: DwellAnalysis) -> tuple[Quantity, ...]:
-    towards_hz = bound_frequencies_hz(analysis.facts)
-    return dwell_quantities(analysis.response, towards_hz, _endings(analysis.irregular))
-
-
 DWELL = AnalysisKind(
     family="dwell",
     analyse=_analyse_dwell,
     draws=lambda analysis: partial(_draw, analysis),
-    compared=_compared_quantities,
+    compared=lambda analysis: dwell_quantities(
+        analysis.response, bound_frequencies_hz(analysis.facts), _endings(analysis.irregular)
+    ),
     lay=lambda analysis, drawn: dwell_overlay(analysis, drawn, _endings(analysis.irregular)),
     curves=dwell_traces,
     budgets=dwell_budgets,

@@ -22,7 +22,6 @@ from ..errors import UnusableData
 from ..recordings.channels import BASE, RecordedChannels
 from ..recordings.response import VELOCITY, noise_as_read
 from ..signals.arrays import Complexes, Reals, Samples
-from ..signals.quantity import hann
 from ..sine.dwell import silence_before
 from .driven_rig import Driven, DrivenRig, acceleration_per_volt, carried_mass, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
@@ -78,10 +77,10 @@ def _white(samples: Reals) -> float:
     """Return the rms of the white noise, from the band above all modes; infinite if samples were lost."""
     if np.isnan(samples).any():
         return np.inf
-    power = np.abs(np.fft.rfft(samples * hann(samples.size))) ** 2
+    power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
     low, high = (round(part * samples.size) for part in _BAND)
     # The mean power of a bin is the variance times the sum of the squared taper.
-    return float(np.sqrt(np.mean(power[low:high]) / np.sum(hann(samples.size) ** 2)))
+    return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
 
 
 _COMPARED_HZ = (100.0, 2000.0)

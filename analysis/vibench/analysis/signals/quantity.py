@@ -123,13 +123,12 @@ def steady_line(samples: Reals, cycles_per_sample: float, beyond: int = 0) -> Co
 
     The sine is continued by ``beyond`` samples at both ends: shape (samples + 2 beyond,).
     """
-    per_sample = 2j * np.pi * cycles_per_sample
-    starts = np.arange(-beyond, samples.size + beyond, _ROW_SAMPLES)
-    rows = np.outer(np.exp(per_sample * starts), np.exp(per_sample * np.arange(_ROW_SAMPLES)))
-    turn = rows.ravel()[: samples.size + 2 * beyond]
+    angle = 2j * np.pi * cycles_per_sample * np.arange(-beyond, samples.size + beyond)
+    rows = np.outer(np.exp(angle[::_ROW_SAMPLES]), np.exp(angle[:_ROW_SAMPLES] - angle[0]))
+    turn = rows.ravel()[: angle.size]
     taper = hann(samples.size)
-    part = turn[beyond : beyond + samples.size]
-    return np.asarray(turn * (2 * np.vdot(part, taper * samples) / max(np.sum(taper), 1.0)))
+    size = 2 * np.vdot(turn[beyond : beyond + samples.size], taper * samples) / max(np.sum(taper), 1.0)
+    return np.asarray(turn * size)
 
 
 def disturbed_samples(sample_rate_hz: float, low_hz: float) -> int:

@@ -186,8 +186,7 @@ def irregular_motion(section: Section, response: DwellResponse, rate_hz: float) 
     """Return the part of a dwell in which the motion did not repeat; None if all of it repeats."""
     points = _points(section, response, rate_hz)
     begin = begin_of_last_motion(points)
-    last = Points(points.value[begin:], points.noise)
-    repeats = shortest_period(last) is not None
+    repeats = shortest_period(Points(points.value[begin:], points.noise)) is not None
     if repeats and begin == 0:
         return None
     start_s, stop_s = float(section.time_s[0]), float(section.time_s[begin if repeats else -1])
@@ -196,8 +195,7 @@ def irregular_motion(section: Section, response: DwellResponse, rate_hz: float) 
 
 def dwell_section(channels: Channels, response: DwellResponse) -> Section:
     """Return the Poincaré points of a whole dwell."""
-    stretch = only_stretch(channels, SegmentLabel.DWELL)
-    drive, _, velocity = read_whole(channels, stretch)
+    drive, _, velocity = read_whole(channels, only_stretch(channels, SegmentLabel.DWELL))
     return stroboscope(
         drive,
         velocity,

@@ -50,9 +50,7 @@ class LinearMotion:
         gap_m
             Gap, the largest abs(p) that the stops allow [m]; infinite without stops.
         """
-        free = (
-            self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
-        )
+        free = self.per_volt * np.broadcast_to(volts, len(self.per_volt))[:, None]
         push = _push(free[:, _P], self.per_newton[:, _P], gap_m)
         return np.asarray(free + self.per_newton * push[:, None])
 
