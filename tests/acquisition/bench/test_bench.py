@@ -140,13 +140,13 @@ class TestLeaving:
         bench.close()
 
     @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
-    def test_every_error_while_a_bench_is_open_silences_it_and_propagates(self, laboratory, virtual, error):
+    def test_an_error_with_an_open_bench_silences_the_output_and_propagates(self, laboratory, virtual, error):
         with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
             raise error
         assert caught.value is error
         assert output_of(virtual) == b"0\n"
 
-    def test_a_dead_daq_server_silences_the_bench_and_notes_the_failed_close(self, laboratory, virtual):
+    def test_a_dead_daq_server_silences_the_bench_and_the_failed_close_is_noted(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
             read_after_faults(laboratory, virtual.faults.lose_daq_server)
         assert str(caught.value).startswith("reading samples 0 to 511")

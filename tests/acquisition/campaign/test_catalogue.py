@@ -54,7 +54,7 @@ def reads(monkeypatch):
     return opened
 
 
-def test_the_catalogue_lists_plan_time_and_size_including_subfolders(folder):
+def test_the_catalogue_lists_the_plan_time_and_size_of_recordings_in_subfolders_too(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")
@@ -112,7 +112,7 @@ def test_the_verdict_of_a_recording_names_its_end_and_overload(bench, folder):
     assert entry.reason == "seen enough"
 
 
-def test_running_recordings_are_listed_and_abandoned_ones_are_interrupted(bench, folder):
+def test_running_recordings_are_listed_and_abandoned_ones_are_marked_as_interrupted(bench, folder):
     with Run(bench, DWELL, folder / "now.h5") as run:
         next(iter(run))
         running = next(entry for entry in list_recordings(folder) if entry.path == "now.h5.part")
@@ -135,7 +135,7 @@ def test_a_foreign_file_named_like_the_catalogue_is_kept_until_a_rebuild(folder)
     assert len(list_recordings(folder, Refresh.ALL)) == 2
 
 
-def test_a_read_only_folder_can_be_listed(folder, monkeypatch):
+def test_a_write_protected_folder_can_be_listed(folder, monkeypatch):
     # For a directory in place of the database SQLite reports the same error as for a read-only folder.
     (folder / CATALOGUE_NAME).mkdir()
     assert len(list_recordings(folder)) == 2

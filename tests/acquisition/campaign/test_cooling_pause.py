@@ -50,7 +50,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     assert "pausing for 12 s before two" in told
 
 
-def test_cooling_pauses_are_part_of_plan_and_estimate(rig, tmp_path):
+def test_cooling_pauses_count_in_the_duration_of_plan_and_estimate(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three", rest_s=REST_S), campaign("one", "two", "three")
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)

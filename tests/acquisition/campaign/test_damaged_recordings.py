@@ -94,7 +94,7 @@ def outcomes(point_results):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_point_is_reported_kept_and_recorded_again(bench, folder, damage):
+def test_a_damaged_recording_is_reported_and_kept_and_its_point_is_measured_again(bench, folder, damage):
     damage(folder)
     left = (folder / "two.h5").read_bytes() if (folder / "two.h5").is_file() else None
     said = []
@@ -131,7 +131,7 @@ def test_a_link_to_a_disk_that_is_not_connected_is_kept(bench, folder, existing)
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("damage", [truncate, change_one_sample, replace_by_a_folder])
-def test_a_campaign_without_journal_does_not_accept_damaged_recordings(bench, folder, damage):
+def test_a_campaign_that_lost_its_journal_does_not_accept_damaged_recordings(bench, folder, damage):
     damage(folder)
     (folder / "c.campaign.sqlite").unlink()
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
@@ -179,7 +179,7 @@ def test_the_catalogue_lists_a_damaged_recording_as_bad(folder, damage):
     assert bad.verdict.startswith(("damaged", "cannot be read"))
 
 
-def test_the_catalogue_detects_a_change_with_restored_file_time(folder):
+def test_the_catalogue_detects_a_change_even_if_the_file_time_was_restored(folder):
     list_recordings(folder)
     path = folder / "two.h5"
     before = path.stat()
@@ -202,7 +202,7 @@ def test_the_journal_stores_the_seal_of_every_recording(folder):
     assert len({seal for (seal,) in seals}) == 3
 
 
-def test_a_campaign_with_an_older_journal_without_seals_can_be_resumed(bench, folder):
+def test_a_campaign_whose_older_journal_has_no_seals_can_be_resumed(bench, folder):
     connection = sqlite3.connect(folder / "c.campaign.sqlite")
     for table in ("points", "attempts"):
         connection.execute(f"ALTER TABLE {table} DROP COLUMN seal")
@@ -233,7 +233,7 @@ def test_unsealed_recordings_of_an_older_version_are_kept_and_reported(bench, fo
     assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}
 
 
-def test_recordings_with_removed_seals_are_recorded_again(bench, folder):
+def test_points_are_measured_again_if_the_seals_of_their_recordings_were_removed(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
@@ -271,7 +271,7 @@ def change_journal(statement):
 @pytest.mark.thorough
 @pytest.mark.parametrize("table", ["points", "attempts"])
 @pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
-def test_two_seals_of_one_recording_in_the_journal_are_reported_as_damage(folder, table, seal):
+def test_a_journal_with_two_different_seals_for_one_recording_is_reported_as_damage(folder, table, seal):
     list_recordings(folder)
     change_journal(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
     if (table, seal) == ("attempts", "''"):  # as in a journal written before seals existed
@@ -287,7 +287,7 @@ def test_two_seals_of_one_recording_in_the_journal_are_reported_as_damage(folder
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
-def test_a_forged_seal_in_one_table_of_the_journal_is_detected(folder):
+def test_a_seal_forged_in_only_one_table_of_the_journal_is_detected(folder):
     replace_by_an_older_recording(folder)
     with open_recording(folder / "two.h5") as recording:
         change_journal(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
@@ -372,7 +372,7 @@ def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(benc
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
 
 
-def test_a_campaign_without_journal_ignores_recordings_of_another_bench(new_bench, rig, folder):
+def test_a_campaign_without_journal_needs_consent_to_recordings_of_another_bench(new_bench, rig, folder):
     other = new_bench(rig.model_copy(update={"name": "another bench"}))
     with pytest.raises(CheckFailed, match=r"name was .* and is now 'another bench'"):
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
@@ -397,7 +397,7 @@ def run_until_disk_refuses(bench, folder, stop):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_path, has_journal):
+def test_a_stopped_recording_left_unfinished_on_disk_is_recovered_later(bench, tmp_path, has_journal):
     run_until_disk_refuses(bench, tmp_path, StopRequest.of(Cause.OPERATOR, "enough"))
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
@@ -415,7 +415,7 @@ def test_a_stopped_recording_not_finished_on_disk_is_recovered_later(bench, tmp_
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_complete_recording_not_finished_on_disk_is_not_measured_again(bench, tmp_path, has_journal):
+def test_the_point_of_a_complete_recording_unfinished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
     run_until_disk_refuses(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()
@@ -441,7 +441,7 @@ def test_a_complete_recording_counts_even_if_the_journal_lists_it_as_failed(benc
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
-def test_a_recording_moved_back_into_the_folder_is_not_measured_again(bench, folder):
+def test_the_point_of_a_recording_moved_back_into_the_folder_is_not_measured_again(bench, folder):
     (folder / "two.h5").rename(folder / "two.away")
     with pytest.raises(RecordingError, match="gone"):
         run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=leave)

@@ -18,7 +18,7 @@ PLAN = Campaign(
 
 @pytest.mark.timeout(60)
 @pytest.mark.skipif(sys.platform == "win32", reason="a pipe that nobody reads hangs as POSIX has it")
-def test_a_hanging_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch):
+def test_an_unresponsive_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch):
     monkeypatch.setattr(_log, "LINE_EVERY_S", 0.0)
     switch, status, fifo = StopSwitch(), tmp_path / "c.status", tmp_path / "fifo"
 

@@ -96,7 +96,7 @@ def test_a_kill_during_a_journal_transaction_keeps_the_previous_state(journal):
     ]
 
 
-def test_a_journal_read_during_writing_leaves_no_extra_files(journal, tmp_path):
+def test_reading_a_journal_while_it_is_written_leaves_no_extra_files(journal, tmp_path):
     journal.start("one", "one.h5")
     assert read_journal(journal.path)[0].state is JournalPointState.RUNNING
     journal.end("one", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "")

@@ -22,7 +22,7 @@ from .small_campaigns import campaign, dwell, fail_one_read, outcomes
 CAMPAIGN = campaign("one", "two", "three")
 
 
-def test_a_file_in_place_of_the_folder_is_refused_before_output(bench, tmp_path):
+def test_a_file_with_the_name_of_the_campaign_folder_is_refused_before_output(bench, tmp_path):
     taken = tmp_path / "taken"
     taken.write_text("mine")
     with pytest.raises(RecordingError, match=r"taken cannot be created .* Nothing was played"):
@@ -116,7 +116,7 @@ def test_a_lost_instrument_or_disk_always_ends_a_campaign(bench, tmp_path, lost)
     assert [path.name for path in tmp_path.glob("*.h5*")] == ["one.h5"]
 
 
-def test_a_campaign_with_one_plan_beyond_a_limit_does_not_start(bench, tmp_path):
+def test_a_campaign_does_not_start_if_one_plan_exceeds_a_limit(bench, tmp_path):
     measurements = (dwell("one"), dwell("hard", 20.0, 10), dwell("harder", 21.0, 10))
     with pytest.raises(LimitExceeded, match=r"hard: the stroke.*harder: the stroke"):
         run_campaign(bench, Campaign(name="c", measurements=measurements), tmp_path / "out")

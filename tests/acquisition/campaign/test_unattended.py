@@ -208,7 +208,7 @@ class TestWatching:
         last = (tmp_path / "c.status").read_text().splitlines()[-1]
         assert "c is finished (2 done, about 0:00:00 left)" in last
 
-    def test_control_characters_of_instruments_do_not_reach_the_status(self, bench, tmp_path):
+    def test_control_characters_sent_by_instruments_do_not_reach_the_status_line(self, bench, tmp_path):
         lost = fail_one_read(bench, DataLost("it replied \x1b[2J\udcff\nc is finished"))
         with pytest.raises(DataLost):
             run_campaign(bench, campaign("one", attempts=1), tmp_path, on_progress=lost)
@@ -222,7 +222,7 @@ class TestWatching:
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
-    def test_a_notification_command_receives_faults_and_the_end_and_may_fail(self, bench, tmp_path):
+    def test_a_notification_command_is_told_of_faults_and_of_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (

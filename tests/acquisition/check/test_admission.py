@@ -115,7 +115,7 @@ def test_a_failed_new_check_is_stored_and_does_not_arm_the_bench(real, tmp_path)
         require_fresh(bench, tmp_path)
 
 
-def test_a_check_with_continuing_drive_does_not_report_silence(real, tmp_path):
+def test_a_check_after_which_the_drive_continues_does_not_report_silence(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
     with pytest.raises(
@@ -201,7 +201,7 @@ class TestKeeping:
         with pytest.raises(RecordingError, match="VIBENCH_STATE_DIR"):
             store_result(rig)
 
-    def test_the_pace_of_a_virtual_rig_does_not_change_its_digest(self, rig):
+    def test_the_speed_of_simulated_time_does_not_change_the_digest_of_a_virtual_rig(self, rig):
         fast = rig.virtual.model_copy(update={"pace": "wall", "speed": 3.0})
         noisy = rig.virtual.model_copy(update={"seed": 99})
         assert rig_digest(rig) == rig_digest(rig.model_copy(update={"virtual": fast}))

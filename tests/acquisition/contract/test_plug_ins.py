@@ -126,7 +126,7 @@ def offer_generator(folder, monkeypatch, name, target):
 
 
 @pytest.mark.thorough
-def test_third_party_instruments_measure_without_changes_to_vibench(installed, tmp_path):
+def test_third_party_instruments_work_without_changes_to_vibench(installed, tmp_path):
     done = run("-c", MEASURES, BENCH, tmp_path / "dwell.h5", path=installed)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split(maxsplit=2) == ["complete", "AFG1022", "base acceleration (charge amplifier)\n"]

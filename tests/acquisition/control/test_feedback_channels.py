@@ -50,7 +50,7 @@ def test_the_response_ratio_is_zero_if_the_base_does_not_move():
 
 
 @pytest.mark.parametrize("derivatives", [-1, 0, 1])
-def test_acceleration_and_displacement_of_m0_give_the_same_ratio_as_its_velocity(derivatives):
+def test_the_response_ratio_is_equal_from_acceleration_displacement_and_velocity_of_m0(derivatives):
     """The velocity follows from a signal after `derivatives` differentiations."""
     channels = replace(CHANNELS, response_derivatives=derivatives, response_delay_s=0.0)
     orders_hz = HERTZ * np.arange(5)

@@ -44,7 +44,7 @@ def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL)
 
 
 @pytest.mark.parametrize("check", LowLevelCheck)
-def test_a_feedback_run_ends_silent_with_its_level_recorded(bench, tmp_path, check):
+def test_a_feedback_run_ends_in_silence_with_its_level_recorded(bench, tmp_path, check):
     states = {progress.state for progress in run_of(bench, tmp_path, check=check)}
     assert states >= {RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN}
     assert not bench.world.is_on
@@ -126,7 +126,7 @@ def test_a_base_level_beyond_the_planned_voltage_is_refused_before_output(bench,
         ),
     ],
 )
-def test_limits_are_checked_at_the_largest_voltage_of_feedback(bench, tmp_path, excitation):
+def test_limits_are_checked_at_the_largest_voltage_of_a_feedback_plan(bench, tmp_path, excitation):
     """One micrometre needs millivolts, but the plan allows ten volts, which at 20 Hz exceed the stroke."""
     with pytest.raises(LimitExceeded, match="the stroke"):
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))

@@ -48,7 +48,7 @@ def test_a_gain_jump_decays_within_the_memory():
     assert abs(estimator.level - 1) < 0.01
 
 
-def test_without_measurement_the_gain_is_unknown():
+def test_the_gain_is_unknown_without_a_measurement():
     estimator = GainEstimator(0.5)
     estimator.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
     assert not estimator.is_known

@@ -52,7 +52,7 @@ def test_a_narrow_enough_bracket_needs_no_measurement():
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_points_are_on_one_branch_if_their_ratio_is_below_half_the_jump_factor_in_db(response, expected):
+def test_two_points_are_on_one_branch_if_they_differ_by_under_half_the_jump_factor_in_db(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 

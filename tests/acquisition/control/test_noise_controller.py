@@ -89,7 +89,7 @@ def test_an_unknown_shaker_is_equalised(record_noise, rig):
 
 
 @pytest.mark.thorough
-def test_the_base_is_lowered_only_where_m0_would_exceed_its_limit(record_noise):
+def test_the_base_spectrum_is_lowered_only_where_m0_would_exceed_its_limit(record_noise):
     limit = 5e-8
     with record_noise(noise(response_limits=corners((40, limit)), realisations=6)) as recording:
         _, velocity = densities(recording, "m0_velocity")

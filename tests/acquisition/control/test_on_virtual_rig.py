@@ -293,7 +293,7 @@ def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(record_ru
         pytest.param((30e-6, 60e-6), 90, 193.175, 2.075e-6, marks=pytest.mark.slow),
     ],
 )
-def test_a_subharmonic_resonance_is_found_by_twice_the_phase_of_m0(
+def test_a_subharmonic_resonance_is_found_from_twice_the_phase_of_m0(
     record_run, gap_m, phase_deg, model_hz, model_m
 ):
     """Compare `benchmarks/backbones.py --subharmonic 2 --spring bumpers` at a base of 23.64 m/s2."""
@@ -316,7 +316,7 @@ def test_a_subharmonic_resonance_is_found_by_twice_the_phase_of_m0(
 @pytest.mark.parametrize(
     ("subharmonic", "start_hz"), [(2, 192), pytest.param(3, 290, marks=pytest.mark.slow)]
 )
-def test_no_subharmonic_is_found_in_a_period_one_motion(record_run, subharmonic, start_hz):
+def test_no_subharmonic_is_found_in_a_motion_of_period_one(record_run, subharmonic, start_hz):
     """Noise at half the drive has a random phase, which can lie within a tolerance of 30 degrees."""
     plan = track_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)
     found = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
@@ -325,7 +325,7 @@ def test_no_subharmonic_is_found_in_a_period_one_motion(record_run, subharmonic,
 
 
 @pytest.mark.thorough
-def test_a_search_ends_at_a_phase_jump_between_motions(record_run):
+def test_a_phase_search_ends_where_the_motion_and_its_phase_jump(record_run):
     """From 197 Hz down m0's half-drive motion is small until it jumps; the search must not bisect on."""
     plan = track_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
     (found,) = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")

@@ -42,7 +42,7 @@ def test_the_search_locks_onto_sharp_and_broad_modes_from_both_sides(damping, st
     assert abs(found.frequency_hz - 266.0) <= 2 * found.uncertainty_hz + 1e-6
 
 
-def test_the_stated_frequency_uncertainty_covers_noise():
+def test_the_stated_frequency_uncertainty_covers_the_error_from_noise():
     found = [run_search(266.0, 0.0167, 262.0, noise_deg=0.3, seed=seed).resonance(0.0) for seed in range(200)]
     away = np.array([each.frequency_hz - 266.0 for each in found])
     stated = np.array([each.uncertainty_hz for each in found])

@@ -40,7 +40,7 @@ def test_no_period_is_lost_or_repeated_between_blocks():
     assert periods.count == int(12 * 0.2 * NEAR_HZ)
 
 
-def test_harmonics_and_mean_are_measured_in_their_orders():
+def test_the_mean_and_each_harmonic_are_measured_at_their_own_order():
     periods = observe(lambda a: 0.7 + np.sin(a) + 0.3 * np.sin(2 * a) + 0.1 * np.cos(4 * a)).periods()
     np.testing.assert_allclose(np.abs(periods.response.mean(axis=0)), [0.7, 1, 0.3, 0, 0.1], atol=1e-4)
 
@@ -66,7 +66,7 @@ def test_a_motion_with_several_drive_periods_gives_one_row_per_repetition(drives
     np.testing.assert_allclose(turned, 1.0, atol=0.01)
 
 
-def test_the_noise_per_period_is_measured_with_the_drive_off():
+def test_the_noise_of_one_period_is_measured_with_the_drive_off():
     noise = 1e-3 * np.random.default_rng(1).standard_normal(20_000)
     per_period = RATE_HZ / NEAR_HZ
     # Variance of a complex amplitude: 4 s^2 / n for each order above the mean, s^2 / n for the mean.

@@ -42,7 +42,7 @@ class TestOpening:
         AFG1022X.open(plugged.config).close()
         assert plugged.log.messages[0] == "OUTP1:STAT OFF"
 
-    def test_the_identity_is_found_behind_an_empty_first_answer(self, plugged):
+    def test_the_identity_is_found_after_an_empty_first_answer(self, plugged):
         generator = AFG1022X.open(plugged.config)
         assert plugged.log.messages.count("*IDN?") == 2
         assert generator.identity.model == "AFG1022"
@@ -261,7 +261,7 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_setting_replaced_by_the_instrument_is_refused_and_silences_the_output(self, plugged, playing):
+    def test_a_setting_that_the_instrument_replaces_silences_the_output_with_an_error(self, plugged, playing):
         # At a load of 10 ohm, set at the panel, 10 Vpp is out of range and silently becomes 1 Vpp.
         plugged.instrument.execute(b"OUTP1:IMP 10")
         with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
@@ -298,7 +298,7 @@ class TestFaults:
             (lambda instrument: instrument.delay_next_reply(10.0), "did not answer"),
         ],
     )
-    def test_a_corrupted_or_late_answer_raises_and_silences_the_output(self, plugged, playing, spoil, said):
+    def test_a_corrupt_or_late_answer_silences_the_output_with_an_error(self, plugged, playing, spoil, said):
         spoil(plugged.instrument)
         with pytest.raises(InstrumentError, match=said):
             playing.set_frequency(261.0)

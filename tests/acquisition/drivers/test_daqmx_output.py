@@ -204,7 +204,7 @@ def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output,
         digitizer.close()
 
 
-def test_the_daqmx_output_reports_its_rate_lead_and_identity(output):
+def test_the_daqmx_output_reports_its_rate_its_lead_and_its_identity(output):
     promised: AnalogOutput = output
     assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
     assert promised.identity.model == "USB-4431"

@@ -75,7 +75,7 @@ def test_the_end_of_the_played_recording_is_reported(playing, original):
         ({"sample_rate_hz": 25600.0}, "samples a second; the configuration"),
     ],
 )
-def test_a_bench_that_does_not_fit_the_recording_is_refused(playing, daq, said):
+def test_playback_on_a_bench_that_does_not_match_the_recording_is_refused(playing, daq, said):
     with pytest.raises(ConfigurationError, match=said):
         open_bench(playing(**daq), calibration=CalibrationRule.WAIVED)
 

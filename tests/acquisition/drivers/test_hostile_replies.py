@@ -50,7 +50,7 @@ class HostileGenerator(MessageLog):
 
 @pytest.mark.parametrize("query", QUERIES)
 @pytest.mark.parametrize("name", REPLIES)
-def test_a_generator_with_hostile_replies_ends_switched_off(bus, name, query):
+def test_a_generator_with_hostile_replies_is_switched_off_in_the_end(bus, name, query):
     plugged = bus.plug_in(listener=HostileGenerator)
     generator = AFG1022X.open(plugged.config)
     generator.load_sine(100.0, 1.0)
@@ -157,7 +157,7 @@ class Converter:
         return Block(0, np.zeros((1, samples)), (Overload("\x1b[2J" * 1000, 0, 1),))
 
 
-def test_an_overload_of_an_unknown_channel_raises_an_error():
+def test_an_overload_reported_for_an_unknown_channel_raises_an_error():
     with pytest.raises(InstrumentError, match="reports overloads of") as refused:
         read_block(Converter(), 8)
     assert str(refused.value).isprintable()

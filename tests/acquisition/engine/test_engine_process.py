@@ -200,7 +200,7 @@ class TestRefusals:
             client.arm(plan, tmp_path)
         assert client.status().state is EngineState.READY
 
-    def test_arming_refuses_to_overwrite_an_existing_file(self, client, shipped_rig, tmp_path):
+    def test_arming_a_plan_that_would_overwrite_a_file_is_refused(self, client, shipped_rig, tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
         open_rig(client, shipped_rig)
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
@@ -272,7 +272,7 @@ def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, cli
 
 
 class TestMissingViewers:
-    def test_an_attended_run_is_aborted_when_its_viewer_sends_no_requests(
+    def test_an_attended_run_is_aborted_when_its_viewer_stops_sending_requests(
         self, client, shipped_rig, tmp_path
     ):
         start_run(client, shipped_rig, tmp_path)
@@ -352,7 +352,7 @@ class TestMissingViewers:
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
-    def test_an_armed_engine_disarms_when_its_viewer_sends_no_requests(
+    def test_an_armed_engine_disarms_when_its_viewer_stops_sending_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         open_rig(client, shipped_rig)

@@ -154,7 +154,7 @@ class InterruptedEngine(Engine):
         self._switch = switch
 
 
-def test_a_stop_concurrent_with_the_start_of_a_check_reaches_the_check(tmp_path):
+def test_a_stop_that_arrives_while_a_check_starts_reaches_the_check(tmp_path):
     engine = InterruptedEngine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     engine.published.enter(EngineState.READY)
@@ -164,7 +164,7 @@ def test_a_stop_concurrent_with_the_start_of_a_check_reaches_the_check(tmp_path)
     assert engine.switch.request.reason == "smoke"
 
 
-def test_a_stop_concurrent_with_arming_refuses_to_arm(shipped_rig, tmp_path):
+def test_a_stop_that_arrives_during_arming_prevents_arming(shipped_rig, tmp_path):
     """A campaign must not start if a stop was requested while it was being armed."""
     engine = InterruptedEngine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
@@ -210,7 +210,7 @@ def test_requests_and_answers_round_trip(handler):
     assert json.loads(looked.text).keys() == {"run_id", "first_sample", "sample_rate_hz", "shape"}
 
 
-def test_a_hold_that_the_drive_cannot_keep_is_refused(shipped_rig, tmp_path):
+def test_a_hold_of_a_drive_that_cannot_be_held_is_refused(shipped_rig, tmp_path):
     """A run with a dead man cannot be held; a confirmed hold would end it as complete."""
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
     engine, refusals = Engine(Supervision.UNATTENDED), []

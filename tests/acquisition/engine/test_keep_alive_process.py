@@ -75,7 +75,7 @@ def test_the_keep_alive_process_reports_a_blocked_window_and_ends_its_run(engine
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")
-def test_the_keep_alive_process_sends_nothing_for_a_suspended_window(engine, shipped_rig, tmp_path):
+def test_the_keep_alive_process_sends_no_request_while_its_window_is_suspended(engine, shipped_rig, tmp_path):
     process = engine()
     with watched_program(process) as (program, _), start_run(process, shipped_rig, tmp_path) as visitor:
         os.kill(program.pid, signal.SIGSTOP)

@@ -81,7 +81,7 @@ def test_elapsed_time_includes_points_kept_from_an_earlier_run(published, tmp_pa
     assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)
 
 
-def test_a_hanging_folder_does_not_block_a_run(published, tmp_path, monkeypatch):
+def test_an_unresponsive_folder_does_not_block_a_run(published, tmp_path, monkeypatch):
     is_back = Event()
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: is_back.wait() and SimpleNamespace(free=7))
     published.note_progress(progress(tmp_path / "point.h5", 0, 1.0), BENCH)

@@ -119,7 +119,7 @@ def require_ending(tmp_path, reason):
 
 class TestStalls:
     @pytest.mark.thorough
-    def test_a_stop_during_a_stall_is_carried_out_afterwards(self, running, tmp_path):
+    def test_a_stop_during_a_stall_of_the_engine_is_carried_out_after_the_stall(self, running, tmp_path):
         with frozen(running.pid):
             told = the_engine(None)
             assert told.pid == running.pid
@@ -172,7 +172,7 @@ class TestConnectionsWithoutToken:
                     break
             assert GREETING_S * 0.9 < time.monotonic() - began_s < GREETING_S * 1.5
 
-    def test_the_least_active_viewer_is_disconnected_when_there_are_too_many(self, process):
+    def test_the_least_active_viewer_is_disconnected_when_too_many_are_connected(self, process):
         with ExitStack() as viewers:
             attached = [
                 viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)
@@ -210,7 +210,7 @@ def resident_bytes(pid):
 
 
 class TestAnnouncements:
-    def test_an_announcement_with_a_reused_process_number_is_not_found(self, process):
+    def test_an_announcement_whose_process_number_was_reused_is_ignored(self, process):
         told = the_engine(process.pid)
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
             taken = told.model_copy(update={"pid": other.pid, "process_start": "1"})

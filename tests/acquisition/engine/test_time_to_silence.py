@@ -46,6 +46,6 @@ def test_a_quarter_of_the_safety_table_meets_the_times_to_silence():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_running_engine_is_found_in_600_tries():
+def test_a_running_engine_is_found_in_each_of_600_tries():
     told = run_benchmark("--tries", "600", "--commands", "12")
     assert told.returncode == 0, told.stdout + told.stderr

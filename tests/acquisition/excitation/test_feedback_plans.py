@@ -66,7 +66,7 @@ def test_a_held_sweep_has_the_frequencies_of_an_open_loop_sweep():
     assert len({id(step.segment) for step in held.steps()}) == 1, "one segment is recorded, not one a step"
 
 
-def test_acceleration_of_a_displacement_grows_with_frequency_squared():
+def test_the_acceleration_of_a_held_displacement_grows_with_frequency_squared():
     level = BaseLevel(displacement_m=2e-6)
     assert level.acceleration_at(260) == pytest.approx(2e-6 * (2 * np.pi * 260) ** 2)
     assert level.acceleration_at(520) == pytest.approx(4 * level.acceleration_at(260))

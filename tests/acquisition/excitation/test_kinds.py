@@ -69,7 +69,7 @@ def test_the_excitation_union_and_the_registry_list_the_same_plans():
 
 
 @pytest.mark.parametrize("word", ["white_noise", "multisine_noise"])
-def test_white_noise_is_also_read_under_its_name_of_version_0_1(word):
+def test_white_noise_is_also_accepted_under_its_name_from_version_0_1(word):
     read = TypeAdapter(Excitation).validate_python({"kind": word, "amplitude_vpp": 1, **BAND})
     assert read == WhiteNoise(amplitude_vpp=1, **BAND)
     assert (read.kind, present_word(word)) == ("white_noise", "white_noise")
@@ -149,7 +149,7 @@ def test_sweeps_reach_frequencies_from_the_requested_side(kind):
 
 
 @pytest.mark.parametrize("kind", ["dwell", "held_dwell", "white_noise", "resonance_tracking"])
-def test_kinds_without_direction_cannot_be_reversed(kind):
+def test_kinds_of_excitation_without_a_direction_cannot_be_reversed(kind):
     assert by_kind[kind].turned(Direction.UP) is None
     assert by_kind[kind].approach is Approach.REST
 

@@ -74,7 +74,7 @@ def test_the_preview_spectrum_has_the_rms_of_the_signal(plan):
     assert np.sqrt(mean_square) == pytest.approx(shown.rms_v, rel=1e-3)
 
 
-def test_a_preview_at_too_low_a_rate_names_the_required_rate(plan):
+def test_a_preview_at_a_rate_that_is_too_low_names_the_required_rate(plan):
     with pytest.raises(ValueError, match=f"use more than {2 * plan.highest_frequency_hz:g}"):
         plan.preview(1.9 * plan.highest_frequency_hz)
 
@@ -142,7 +142,7 @@ def test_noise_excites_exactly_the_lines_of_its_band():
     np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))
 
 
-def test_noise_of_one_volt_peak_to_peak_has_rms_0_5_over_crest_factor():
+def test_noise_of_1_v_peak_to_peak_has_an_rms_of_half_a_volt_over_the_crest_factor():
     shown = WhiteNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(16384)
     assert shown.rms_v == pytest.approx(0.5 / shown.crest_factor, rel=1e-3)
     assert 0.11 < shown.rms_v < 0.17
@@ -209,7 +209,7 @@ def test_a_logarithmic_sweep_passes_the_geometric_mean_at_half_time():
 
 
 @pytest.mark.parametrize(("hold", "power"), [("acceleration", 0), ("velocity", 1), ("displacement", 2)])
-def test_the_amplitude_of_a_sweep_at_constant_motion_is_a_power_of_frequency(hold, power):
+def test_a_sweep_of_constant_motion_has_an_amplitude_that_is_a_power_of_frequency(hold, power):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, hold=hold)
     tones = [step.play for step in sweep.steps()]
     for tone in tones:
@@ -228,7 +228,7 @@ def test_a_sweep_down_mirrors_the_sweep_up():
     np.testing.assert_allclose(rising, falling[::-1], rtol=1e-12)
 
 
-def test_only_the_first_step_of_a_sweep_settles_and_all_steps_form_one_segment():
+def test_a_sweep_settles_only_at_its_first_step_and_all_its_steps_form_one_segment():
     steps = list(SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10, settle_s=2).steps())
     assert steps[0].settle_s == 2
     assert {step.settle_s for step in steps[1:]} == {0.0}
@@ -276,7 +276,7 @@ class TestStreamedNoise:
         ]
         np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-13)
 
-    def test_streamed_noise_has_the_range_over_the_crest_factor_as_rms(self):
+    def test_the_rms_of_streamed_noise_is_the_range_over_the_crest_factor(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
         # 2 B T independent values: the relative standard deviation of the rms is 1 / sqrt(4 B T).
         spread = 1 / np.sqrt(4 * 750 * 400_000 / self.RATE)

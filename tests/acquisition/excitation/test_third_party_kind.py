@@ -72,7 +72,7 @@ def run_vibench(folder, *arguments):
 
 
 @pytest.mark.thorough
-def test_a_third_party_kind_is_planned_measured_and_reported(tmp_path):
+def test_a_third_party_kind_of_excitation_is_planned_measured_and_reported(tmp_path):
     install_kind(tmp_path, "two_tones:TwoTones")
     measured = run_vibench(tmp_path, "measure", "two.toml", "--out", "two")
     assert measured.returncode == 0, measured.stderr

@@ -83,7 +83,7 @@ def test_errors_name_the_key_of_the_variant_that_the_file_uses(tmp_path, text, t
         (("rest_s", "2026-01-01"), "rest_s = 2026-01-01: "),
     ],
 )
-def test_common_first_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_path, change, told):
+def test_common_beginner_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_path, change, told):
     given = {"name": '"mine"', change[0]: change[1]}
     text = "\n".join(f"{key} = {value}" for key, value in given.items())
     said = refusal(load_campaign, tmp_path / "campaign.toml", text)
@@ -149,7 +149,7 @@ DWELL = 'excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260,
         (('"m"', '"m"\ncolour = 1'), "colour is not a known key: check its spelling"),
     ],
 )
-def test_an_unknown_key_is_refused_with_the_similar_known_key_only(tmp_path, change, told):
+def test_an_unknown_key_is_refused_with_only_the_similar_known_key_as_a_hint(tmp_path, change, told):
     text = f'name = "c"\n[[measurements]]\nname = "m"\n{DWELL}\n'
     said = refusal(load_campaign, tmp_path / "campaign.toml", text.replace(*change))
     assert re.search(told, said)

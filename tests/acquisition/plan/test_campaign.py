@@ -165,7 +165,7 @@ class TestRefusals:
         with pytest.raises(ConfigurationError, match="measurements"):
             load(tmp_path, 'name = "c"\nmeasurements = []\n')
 
-    def test_an_empty_list_of_failures_to_retry_after_is_refused(self, tmp_path):
+    def test_an_empty_list_of_failures_that_allow_a_retry_is_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match=r"retry\.on = \[\]: give 1 or more"):
             load(tmp_path, 'name = "c"\n' + DWELL_TABLE + "\n[retry]\nattempts = 3\non = []\n")
 
@@ -229,7 +229,7 @@ def test_the_paper_campaign_has_the_levels_and_times_of_the_paper():
     assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)
 
 
-def test_the_campaigns_page_lists_valid_required_keys_of_every_kind(tmp_path):
+def test_the_campaigns_page_shows_a_valid_value_for_each_required_key_of_every_kind(tmp_path):
     page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.*=.*) \|$", page, re.MULTILINE)
     assert {kind for kind, _ in rows} == set(EXCITATION_KINDS)

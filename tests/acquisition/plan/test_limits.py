@@ -107,7 +107,7 @@ def test_a_wrong_load_setting_doubles_every_load(linear_rig):
     )
 
 
-def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):
+def test_a_violation_names_its_quantity_value_limit_source_and_remedy(rig):
     with pytest.raises(LimitExceeded) as refused:
         require_within_limits(plan(Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)), rig)
     text = str(refused.value)

@@ -69,7 +69,7 @@ def test_the_shortest_holdable_growth_time_follows_from_the_loop_delay(rig):
     assert preview_measurement(dwell, slow).least_growth_time_s == pytest.approx(2.0 + 10 * 2 * 0.1)
 
 
-def test_a_fast_loop_branch_has_no_growth_time():
+def test_a_preview_of_a_fast_loop_branch_states_no_growth_time():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     fast = load_rig("virtual_rig_controller")
     (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements

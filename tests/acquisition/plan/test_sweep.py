@@ -81,7 +81,7 @@ excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s
 
 
 class TestChains:
-    def test_each_point_passes_through_all_earlier_points_of_its_chain(self):
+    def test_the_lead_in_of_a_point_passes_all_earlier_points_of_its_chain(self):
         plan = campaign(
             amplitude_vpp=[0.5],
             direction=["up", "down"],

@@ -22,7 +22,7 @@ def trouble():
         yield trouble
 
 
-def test_a_simulated_full_disk_refuses_at_once_and_notifies_the_rig():
+def test_a_simulated_full_disk_refuses_writes_at_once_and_notifies_the_rig():
     told = []
     trouble = DiskTrouble(lambda: told.append(len(told)))
     for _ in range(2):
@@ -77,7 +77,7 @@ def test_a_part_file_of_a_full_disk_can_be_recovered_later(tmp_path, make_header
         assert recording.samples == 500
 
 
-def test_a_commit_succeeds_after_two_refusals(trouble):
+def test_a_commit_succeeds_after_the_disk_has_refused_two(trouble):
     trouble.fill(2)
     for _ in range(2):
         with pytest.raises(OSError, match="No space") as refusal:
@@ -86,7 +86,7 @@ def test_a_commit_succeeds_after_two_refusals(trouble):
     trouble.apply()
 
 
-def test_a_slow_disk_delays_the_writer_and_not_the_reader(tmp_path, make_header, make_block, trouble):
+def test_a_slow_disk_delays_the_writing_and_not_the_sampling(tmp_path, make_header, make_block, trouble):
     heal = trouble.slow_down(0.2)
     writer = create_recording(tmp_path / "a.h5", make_header())
     began_s = time.monotonic()
@@ -110,7 +110,7 @@ def test_a_simulated_slow_disk_is_slow(trouble):
     assert time.monotonic() - began_s < 0.1
 
 
-def test_simulated_disk_faults_end_with_the_rig(tmp_path, make_header):
+def test_simulated_disk_faults_end_when_the_rig_is_closed(tmp_path, make_header):
     with trouble_disks(DiskTrouble()) as _:
         pass
     trouble = DiskTrouble()

@@ -25,7 +25,7 @@ def file(tmp_path, make_header, make_block):
         yield opened
 
 
-def test_a_channel_has_units_scale_and_time_axis(file, make_block):
+def test_a_channel_has_a_unit_a_scale_and_a_time_axis(file, make_block):
     _, block = make_block(0, SAMPLES)
     velocity = file["m0_velocity"]
     assert velocity.attrs["units"] == b"m s-1"
@@ -72,7 +72,7 @@ def test_events_overloads_and_segments_are_stored_as_columns(file):
 
 
 @pytest.mark.parametrize("samples", [1, 5, 99, 100, 101, 1000])
-def test_chunks_made_in_threads_equal_those_of_hdf5(tmp_path, samples):
+def test_chunks_made_in_threads_equal_the_chunks_that_hdf5_makes(tmp_path, samples):
     counts = np.random.default_rng(samples).integers(-(2**31), 2**31, samples, dtype=np.int32)
     with h5py.File(tmp_path / "chunks.h5", "w") as file:
         ours = create_counts(file, "ours", samples, 100)

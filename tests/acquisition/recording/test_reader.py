@@ -33,7 +33,7 @@ def test_a_recording_contains_all_metadata_of_its_start(path, make_channel):
         assert recording.origin == "simulated"
 
 
-def test_missing_converter_step_and_sensitivity_are_read_as_missing(tmp_path, make_header, make_channel):
+def test_a_missing_converter_step_or_sensitivity_is_read_as_missing(tmp_path, make_header, make_channel):
     bare = make_channel("m0_velocity", volts_per_count=None, sensitivity=None, long_name="velocity of m0")
     with create_recording(tmp_path / "b.h5", make_header(channels=(bare,))):
         pass
@@ -49,7 +49,7 @@ def test_a_plan_too_long_for_an_hdf5_attribute_is_stored(tmp_path, make_header):
         assert len(recording.plan["steps"]) == 50_000
 
 
-def test_concatenated_blocks_equal_the_whole(path):
+def test_blocks_read_one_by_one_equal_the_whole_recording(path):
     with open_recording(path) as recording:
         blocks = list(recording.blocks(["m0_velocity", "drive_voltage"], 700))
         assert [block.first_sample for block in blocks] == [0, 700, 1400, 2100]

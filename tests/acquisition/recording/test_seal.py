@@ -239,7 +239,7 @@ def test_a_renamed_finished_recording_is_checked_against_its_seal(make_file):
     assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
-def test_a_recording_without_a_seal_fails_a_check_with_a_key(make_file, key_file):
+def test_a_check_with_a_key_fails_if_the_recording_has_no_seal(make_file, key_file):
     path = make_file()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -427,7 +427,7 @@ class TestChangedAfterTheCheck:
         code = f"import h5py\nwith h5py.File({str(path)!r}, 'r+', locking=False) as file:\n    {change}"
         subprocess.run([sys.executable, "-c", code], check=True)
 
-    def test_changed_samples_are_refused_after_the_check(self, long):
+    def test_samples_changed_after_the_check_are_refused(self, long):
         with open_recording(long) as recording:
             role, at = recording.roles[-1], _seal.PIECE_ITEMS + 5
             before = recording.read_counts(role)
@@ -452,7 +452,7 @@ class TestChangedAfterTheCheck:
         with pytest.raises(RecordingError, match="was changed after its seal had been checked"):
             open_recording(long)
 
-    def test_metadata_read_before_the_seal_check_are_checked(self, long):
+    def test_the_seal_check_covers_metadata_that_were_read_before_it(self, long):
         sound = long.read_bytes()
         self.overwrite(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:

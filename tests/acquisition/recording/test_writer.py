@@ -84,13 +84,13 @@ def test_a_missing_folder_is_named_in_the_error(tmp_path, make_header):
         create_recording(tmp_path / "nowhere" / "a.h5", make_header())
 
 
-def test_a_plan_larger_than_the_disk_is_refused_before_the_start(tmp_path, make_header):
+def test_a_recording_larger_than_the_free_disk_space_is_refused_before_the_start(tmp_path, make_header):
     with pytest.raises(RecordingError, match=r"needs \d+ MB .* the disk has \d+ MB"):
         create_recording(tmp_path / "a.h5", make_header(expected_samples=10**15))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_lost_samples_are_a_gap_and_read_as_nan(tmp_path, make_header, make_block):
+def test_lost_samples_leave_a_gap_and_are_read_as_nan(tmp_path, make_header, make_block):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.append(make_block(0, 100)[1])
         counts, block = make_block(150, 100)

@@ -94,6 +94,6 @@ def test_the_vibrometer_range_scales_its_channel():
     assert velocity.delay_s == rig.vibrometer.delay_s
 
 
-def test_a_voltage_divider_is_corrected_in_its_channel():
+def test_the_ratio_of_a_voltage_divider_is_corrected_in_its_channel():
     drive = {channel.role: channel for channel in channels_of(load_rig(VIRTUAL))}[Role.DRIVE_VOLTAGE]
     assert drive.units_per_volt == 2.0

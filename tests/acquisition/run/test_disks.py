@@ -107,7 +107,7 @@ def test_every_disk_fault_ends_in_silence_with_an_error_and_a_recording(laborato
 
 
 @pytest.mark.parametrize("by_s", [3600.0, -3600.0])
-def test_a_clock_jump_changes_time_labels_only(laboratory, tmp_path, monkeypatch, by_s):
+def test_a_jump_of_the_computer_clock_changes_only_time_labels(laboratory, tmp_path, monkeypatch, by_s):
     """Deadlines use a monotonic clock, which cannot be set."""
     virtual, connected = laboratory()
     now = time.time

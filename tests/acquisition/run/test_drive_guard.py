@@ -95,7 +95,7 @@ def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
     assert terminal_v(virtual) > 0.5
 
 
-def test_silence_of_another_generator_confirms_no_stop(recording, rig, tmp_path):
+def test_a_stop_is_not_confirmed_by_the_silence_of_another_generator(recording, rig, tmp_path):
     """One script may drive two benches, each in its own thread."""
     north, _ = recording
     other = changed(rig, generator={"resource": "USB0::0x0699::0x0353::C010001::INSTR"})
@@ -176,7 +176,7 @@ def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, mo
     DRIVES_ON.confirm_silence(guard)
 
 
-def test_an_emptied_state_folder_confirms_no_stop(announced, monkeypatch):
+def test_a_stop_is_not_confirmed_by_an_emptied_state_folder(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     with DriveGuard(Output(), StopSwitch()) as guard:
         guard.begin()
@@ -189,7 +189,7 @@ def test_an_emptied_state_folder_confirms_no_stop(announced, monkeypatch):
         assert fate_of(stop) is Fate.SILENT
 
 
-def test_an_earlier_confirmation_does_not_confirm_a_later_stop(own_state, monkeypatch):
+def test_the_confirmation_of_an_earlier_stop_does_not_confirm_a_later_stop(own_state, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     stop = stop_path(str(engines_folder()), *own_process(), "abort")
     Path(answer_path(stop, "silent")).touch()
@@ -220,7 +220,7 @@ def test_a_stop_is_confirmed_after_a_ramp_longer_than_the_timeout(announced, mon
         ramp.join()
 
 
-def test_running_out_of_memory_frees_the_reserve_and_switches_the_output_off():
+def test_a_memory_error_frees_the_memory_reserve_and_switches_the_output_off():
     output = Output(MemoryError())
     with DriveGuard(output, StopSwitch()) as guard:
         guard.begin()

@@ -170,7 +170,7 @@ def test_an_output_that_stays_on_is_set_to_the_minimum_and_reported(laboratory):
         virtual.generator.execute = execute
 
 
-def test_a_hanging_generator_gets_one_attempt_after_a_failed_stop(laboratory, monkeypatch):
+def test_reconnecting_a_generator_that_hangs_is_tried_once_after_a_failed_stop(laboratory, monkeypatch):
     """A run with hanging instruments must not take minutes to end."""
     virtual, connected = laboratory()
     attempts = []

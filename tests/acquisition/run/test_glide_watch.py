@@ -50,7 +50,7 @@ def test_three_whole_cycles_lost_by_a_late_drive_are_detected():
 
 
 @pytest.mark.parametrize("spacing", list(Spacing))
-def test_a_late_start_of_a_sweep_is_counted_at_its_end(spacing):
+def test_the_cycles_lost_by_a_late_start_of_a_sweep_are_counted_at_its_end(spacing):
     sweep, late_s = Sweep(90.0, 530.0, 3.0, spacing), 0.02
     time_s = np.arange(round(3.0 * RATE)) / RATE
     watch = GlideWatch(CHANNELS, RATE)
@@ -62,7 +62,7 @@ def test_a_late_start_of_a_sweep_is_counted_at_its_end(spacing):
     assert watch.more_cycles == pytest.approx(-(lost - 40 / RATE * 440), abs=0.4)
 
 
-def test_unobserved_samples_restart_the_count():
+def test_unobserved_samples_restart_the_count_of_cycles():
     watch = GlideWatch(CHANNELS, RATE)
     blocks = drive_blocks(100.0 * np.arange(5120) / RATE)
     watch.take(blocks[:3], 100.0, 0.3)

@@ -86,7 +86,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
-def test_each_exceeded_limit_ends_the_run_and_is_named_in_the_error(
+def test_exceeding_any_limit_ends_the_run_and_the_error_names_the_limit(
     rig, kept, frequency_hz, peaks, quantity, limit
 ):
     five_per_cent_above = {role: 1.05 * peak for role, peak in peaks.items()}
@@ -107,7 +107,7 @@ def test_a_run_within_every_limit_continues(rig, kept, frequency_hz, peaks, quan
     watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
 
 
-def test_a_lasting_current_below_the_peak_limit_trips_the_rms_limit(rig):
+def test_a_lasting_current_below_the_peak_limit_can_exceed_the_rms_limit(rig):
     weak = with_limiter(rig, 1.8)
     trip, _ = trip_of(monitor_of(weak), sine_blocks(weak, 300.0, 6.0, amplifier_voltage=7.0))
     assert trip.quantity == "coil current (rms)"
@@ -152,7 +152,7 @@ def test_a_changed_specimen_ends_a_run_only_if_the_plan_says_so(rig, ending):
             assert "vibench twin --new-baseline" in text
 
 
-def test_a_flagged_over_range_does_not_trip_an_amplitude_limit(rig):
+def test_a_flagged_over_range_does_not_count_as_an_exceeded_amplitude_limit(rig):
     monitor = monitor_of(rig)
     for first in range(0, 20 * BLOCK, BLOCK):
         volts = np.zeros((4, BLOCK))
@@ -212,7 +212,7 @@ def test_an_exceeded_limit_is_recorded_with_its_values(bench, tmp_path):
     assert bench.recorder.ending[1] == str(failure.value)
 
 
-def test_settling_of_an_ac_coupled_input_does_not_trip_the_stroke_limit(rig):
+def test_the_settling_of_an_ac_coupled_input_does_not_count_as_an_exceeded_stroke(rig):
     """The AC-coupled input has a time constant of 0.1 s and starts at half a volt."""
     monitor = monitor_of(rig)
     time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ

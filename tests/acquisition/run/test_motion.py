@@ -17,7 +17,7 @@ def amplitude(values):
 
 
 @pytest.mark.parametrize("frequency_hz", [10.0, 44.0, 160.0, 1000.0])
-def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
+def test_velocity_and_stroke_are_the_integrals_of_a_sine_acceleration(frequency_hz):
     turn = 2 * np.pi * frequency_hz
     motion = BaseTracker(RATE_HZ).follow(7.0 * np.sin(turn * TIME_S))
     # The high-pass filter acts once on a velocity and twice on a displacement.
@@ -62,7 +62,7 @@ def test_a_constant_acceleration_offset_gives_no_displacement():
 
 @pytest.mark.parametrize("role", [Role.M0_ACCELERATION, Role.M0_DISPLACEMENT])
 @pytest.mark.parametrize("frequency_hz", [10.0, 95.0, 500.0])
-def test_any_sensor_on_m0_gives_the_same_spring_stretch(role, frequency_hz):
+def test_the_spring_stretch_is_equal_for_every_sensor_on_m0(role, frequency_hz):
     turn, seen = 2 * np.pi * frequency_hz, np.zeros(TIME_S.size, dtype=np.bool_)
     base = BaseTracker(RATE_HZ).follow(-1e-3 * turn**2 * np.sin(turn * TIME_S))
     by_velocity = SpecimenTracker(RATE_HZ).follow(3e-3 * turn * np.cos(turn * TIME_S), base, seen)

@@ -104,7 +104,7 @@ def test_a_signal_appended_after_the_end_begins_at_the_next_sample():
 
 
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
-def test_a_fade_starts_at_the_current_level_and_ends_silent(taken):
+def test_a_fade_starts_at_the_current_level_and_ends_in_silence(taken):
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(with_ramps(NOISE))
     synthesizer.take(taken)

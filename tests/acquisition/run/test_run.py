@@ -284,7 +284,7 @@ class TestEndsOfARun:
         assert run.outcome.state is RunState.FINISHED
 
     @every_state
-    def test_an_exceeded_limit_ramps_down_and_is_named_in_the_error(self, bench, tmp_path, state):
+    def test_a_run_over_a_limit_ramps_down_and_the_limit_is_named(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
@@ -363,7 +363,7 @@ class TestEndsOfARun:
             watch()
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
-    def test_a_failure_to_finish_the_recording_ends_in_silence(self, bench, tmp_path):
+    def test_a_failure_to_finish_the_recording_ends_the_run_in_silence(self, bench, tmp_path):
         bench.world.permanent["recorder.finish"] = lambda: RecordingError("disk full")
         run = run_of(bench, tmp_path)
         with pytest.raises(RecordingError, match="disk full"):
@@ -604,7 +604,7 @@ class TestTheBenchCheck:
         assert loudest == pytest.approx(0.02 * AMPLITUDE_VPP)
 
     @pytest.mark.parametrize("fault", [{"drive_factor": 1.1}, {"base_factor": 1.35}, {"base_factor": 0.75}])
-    def test_the_check_passes_small_differences_from_the_configuration(self, bench, tmp_path, fault):
+    def test_the_check_tolerates_small_differences_from_the_configuration(self, bench, tmp_path, fault):
         for name, value in fault.items():
             setattr(bench.world, name, value)
         run = run_of(bench, tmp_path)

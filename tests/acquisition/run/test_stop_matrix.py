@@ -242,7 +242,7 @@ def test_every_stop_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("state", "fault"), third_of_pairs([name for name in FAULTS if name != "none"]))
-def test_every_fault_in_every_state_ends_in_silence_with_a_reason(laboratory, tmp_path, state, fault):
+def test_every_fault_in_every_state_ends_in_silence_and_states_a_reason(laboratory, tmp_path, state, fault):
     carry_out(laboratory, tmp_path, state, STOPS["nothing"], fault)
 
 
@@ -255,7 +255,7 @@ def test_every_stop_with_and_without_a_fault_ends_in_silence(laboratory, tmp_pat
     carry_out(laboratory, tmp_path, state, STOPS[stop], fault)
 
 
-def test_the_stated_time_of_an_abort_matches_the_shipped_rig(rig):
+def test_the_stated_time_to_silence_of_an_abort_matches_the_shipped_rig(rig):
     assert shortest_ramp_s(rig) + BLOCK_S < ABORT_S
 
 
@@ -306,7 +306,7 @@ def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tm
 
 
 @pytest.mark.thorough
-def test_an_abort_of_a_slow_generator_meets_its_time(rig, tmp_path):
+def test_an_abort_with_a_slow_generator_is_silent_within_its_stated_time(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     plan = PLAN.model_copy(update={"ramp_step_s": 0.015})

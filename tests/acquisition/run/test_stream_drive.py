@@ -117,7 +117,7 @@ class TestCompleteRuns:
         ramps = {"ramp_up": (begin, begin + RAMP), "ramp_down": (end, end + RAMP)}
         assert found == {**ramps, "noise": (noise, end)}
 
-    def test_a_stream_passes_the_same_states_as_a_run_of_the_generator(self, streaming_bench, tmp_path):
+    def test_a_streamed_run_goes_through_the_same_states_as_a_generator_run(self, streaming_bench, tmp_path):
         run = run_of(streaming_bench, tmp_path)
         settings = {progress.state: progress.amplitude_vpp for progress in run}
         seen = list(settings)
@@ -170,7 +170,7 @@ class TestEndsOfARun:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @every_state
-    def test_an_exceeded_limit_fades_the_stream_out_and_is_named(self, streaming_bench, tmp_path, state):
+    def test_a_stream_over_a_limit_fades_out_and_the_limit_is_named(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
@@ -179,7 +179,7 @@ class TestEndsOfARun:
         if state is not RunState.CHECKING:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
-    def test_a_hold_ramps_a_stream_down_with_a_reason(self, streaming_bench, tmp_path):
+    def test_a_hold_request_ramps_a_stream_down_and_the_reason_is_stated(self, streaming_bench, tmp_path):
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path)
         assert "cannot be held" in run.switch.refusal_to_hold()
         run.switch.hold()
@@ -215,7 +215,7 @@ class TestEndsOfARun:
             ("digitizer.read", KeyboardInterrupt),
         ],
     )
-    def test_a_failing_input_ends_the_output_with_a_short_fade(
+    def test_a_failing_input_fades_the_output_out_quickly(
         self, streaming_bench, tmp_path, state, call, fault
     ):
         world = streaming_bench.world

@@ -75,7 +75,7 @@ def one_sentence(failure):
     return text
 
 
-def test_an_exceeded_limit_fades_the_output_out_and_is_named(laboratory, tmp_path):
+def test_an_output_over_a_limit_fades_out_and_the_limit_is_named(laboratory, tmp_path):
     virtual, connected = laboratory()
     # The noise reaches some 100 m/s2; 736 m/s2 are allowed.
     tight = PLAN.model_copy(update={"limits": InRunLimits(base_acceleration=0.05)})
@@ -112,7 +112,7 @@ def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_silent(
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
-def test_a_dead_server_plays_at_most_the_written_samples(laboratory, tmp_path):
+def test_after_a_server_dies_at_most_the_written_samples_are_played(laboratory, tmp_path):
     virtual, connected = laboratory()
     die = when_recording(virtual.faults.lose_daq_server)
     with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING") as failure, bench_on(connected) as bench:
@@ -141,7 +141,7 @@ def test_a_failing_input_fades_the_output_out(laboratory, tmp_path, code, kind):
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
 
 
-def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path):
+def test_ctrl_c_plays_the_written_samples_and_a_ramp_before_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     elapsed_s = []
 
@@ -159,7 +159,7 @@ def test_ctrl_c_fades_out_after_written_samples_and_a_ramp(laboratory, tmp_path)
     assert np.max(np.abs(drive[-200:])) < 0.01
 
 
-def test_a_second_ctrl_c_does_not_wait_for_the_ramp_and_ends_silent(laboratory, tmp_path):
+def test_a_second_ctrl_c_skips_the_ramp_and_ends_in_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     insist = when_recording(lambda: [signal.raise_signal(signal.SIGINT) for _ in range(2)])
     with bench_on(connected) as bench:

@@ -142,7 +142,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     assert np.max(np.abs(left)) < 1e-3
 
 
-def test_an_amplifier_turned_up_is_found_by_the_check_through_the_output(tmp_path):
+def test_the_check_through_the_output_finds_a_raised_amplifier_gain(tmp_path):
     turned = changed(RIG, amplifier={"gain_db": 20.0})
     with open_bench(turned) as bench:
         bench.rig = RIG

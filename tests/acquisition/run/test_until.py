@@ -67,7 +67,7 @@ def test_a_dwell_ends_when_the_error_of_its_response_is_small_enough(rig, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_dwell_with_an_unmet_bound_ends_at_its_longest_time(rig, tmp_path):
+def test_a_dwell_that_does_not_reach_its_bound_ends_after_its_longest_time(rig, tmp_path):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
     outcome, recording, _ = record(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
     with recording:
@@ -90,7 +90,7 @@ def test_each_frequency_step_ends_when_its_bound_is_met(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_noise_with_until_ends_after_a_whole_realisation_and_a_ramp_down(rig, tmp_path):
+def test_noise_with_an_until_bound_ends_with_a_whole_realisation_and_a_ramp_down(rig, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800, repetition_hz=2, settle_s=0.5, realisations=40
     )
@@ -124,7 +124,7 @@ def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_stop_ends_a_recording_with_until(rig, tmp_path):
+def test_a_stop_ends_a_recording_that_has_an_until_bound(rig, tmp_path):
     switch = StopSwitch()
     plan = Measurement(
         name="run",

@@ -112,7 +112,7 @@ def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_stat
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
-def test_a_killed_program_is_reported_until_a_bench_of_its_rig_is_silent(capsys):
+def test_a_killed_program_is_reported_until_its_rig_is_opened_again_and_silent(capsys):
     script = (
         "from vibench.acquisition import *; from vibench.acquisition.stopping.program import note_open_bench;"
         "note_open_bench('lab'); a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
@@ -259,7 +259,7 @@ def test_a_full_state_folder_refuses_the_program_without_leftovers(own_state):
     assert [each.name for each in own_state.rglob("*") if each.is_file()] == []
 
 
-def test_a_program_that_opened_a_bench_while_announced_leaves_the_folder_empty():
+def test_an_announced_program_that_opened_a_bench_leaves_the_folder_empty():
     with stop_on_signal(StopSwitch(), "dwell"):
         note_open_bench("lab")
         assert [each.rigs for each in announced_programs(Program) if "lab" in each.rigs]
