@@ -134,7 +134,7 @@ def test_arrays_are_recognised_by_type_names_of_old_and_new_numpy(name):
     ("name", "unit"),
     [("x_m_per_s", "m s-1"), ("rate_per_s", "s-1"), ("time_s", "s"), ("n_eff", ""), ("relative_i", "")],
 )
-def test_a_unit_is_read_from_the_longest_suffix_of_a_name(name, unit):
+def test_the_unit_of_a_field_is_read_from_the_longest_matching_suffix_of_its_name(name, unit):
     assert unit_of(name) == unit
 
 
@@ -244,7 +244,7 @@ def reachable_kinds():
     return found
 
 
-def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
+def test_every_number_in_a_result_either_states_a_unit_or_is_dimensionless():
     lacking = set()
     for kind, hints in reachable_kinds().items():
         numbers = {name for name, each in hints.items() if is_number(each) and not list(parts_of(each))}
@@ -273,7 +273,7 @@ def test_every_stored_quantity_names_its_unit():
     assert silent == []
 
 
-def test_units_refer_to_existing_fields_only():
+def test_units_are_stated_only_for_fields_that_exist():
     wrong = [
         f"{kind.__name__}.{name}"
         for kind, hints in reachable_kinds().items()

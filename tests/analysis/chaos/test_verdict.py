@@ -28,7 +28,7 @@ def test_a_repeating_motion_is_periodic_with_its_period(period):
     assert (found.kind, found.period) == (MotionKind.PERIODIC, period)
 
 
-def test_a_periodic_motion_with_sixty_decibels_of_noise_is_not_chaotic():
+def test_a_periodic_motion_with_noise_sixty_decibels_below_it_is_not_called_chaotic():
     rng = np.random.default_rng(1)
     points = section(rng, 1, 1e-3)
     stated = motion_verdict(Points(points, np.full(2, 1e-3)), DRIVE_HZ)
@@ -77,7 +77,7 @@ def chaos():
     return points
 
 
-def test_the_verdict_is_that_of_the_motion_after_transient_chaos(chaos):
+def test_the_verdict_after_transient_chaos_describes_the_final_motion(chaos):
     points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
@@ -260,7 +260,7 @@ def test_the_shortest_period_is_found_if_it_repeats_several_times():
     assert shortest_period(Points(points[:18], QUIET)) is None
 
 
-def test_noise_without_motion_is_not_periodic():
+def test_noise_without_motion_is_not_called_periodic():
     rng = np.random.default_rng(11)
     # Points are scaled by sqrt(2) times their rms: noise alone has a standard deviation of 1 / sqrt(2).
     noise = np.full(2, np.sqrt(0.5))
@@ -288,13 +288,13 @@ def test_a_motion_that_noise_could_hide_is_not_called_periodic():
         (np.zeros((500, 2)), QUIET, -260.0, "a drive frequency of -260.0 Hz is not allowed"),
     ],
 )
-def test_invalid_poincare_points_noise_or_frequency_are_refused(value, noise, drive_hz, said):
+def test_invalid_poincare_points_or_noise_or_frequency_are_refused(value, noise, drive_hz, said):
     """A chaotic section of 500 points with one lost point was once reported as quasi-periodic."""
     with pytest.raises(AnalysisError, match=said):
         motion_verdict(Points(value, noise), drive_hz)
 
 
-def test_a_period_that_leaves_most_of_the_scatter_is_not_reported():
+def test_a_period_that_explains_little_of_the_scatter_is_not_reported():
     """A slow transient of 0.3 % of the orbit was once reported as period 10."""
     place, rng = np.arange(700), np.random.default_rng(1)
     moved = 0.0032 * np.exp((0.201j * np.pi - 2e-4) * place)

@@ -70,14 +70,14 @@ def test_the_zero_one_test_is_invariant_to_shift_and_scale():
     [(logistic(4.0, 3000), 1, np.log(2)), (henon(5000), 2, 0.41922)],
     ids=["logistic", "henon"],
 )
-def test_neighbours_of_a_map_diverge_at_the_lyapunov_exponent(series, delays, exponent):
+def test_neighbours_of_a_map_diverge_at_the_rate_of_the_lyapunov_exponent(series, delays, exponent):
     found = divergence(delay_vectors(series, delays), steps=25)
     assert found.is_resolved
     assert found.exponent == pytest.approx(exponent, rel=0.03)
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
 
 
-def test_neighbours_of_a_flow_diverge_at_the_lyapunov_exponent(lorenz):
+def test_neighbours_of_a_flow_diverge_at_the_rate_of_the_lyapunov_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
     # The exponent over 400 s differs from the limit value by some per cent.
@@ -111,7 +111,7 @@ def test_the_surrogate_test_rejects_linear_noise_at_its_stated_rate():
 
 
 @pytest.mark.thorough
-def test_a_series_with_wrong_surrogate_spectra_is_undecided():
+def test_a_series_whose_surrogates_have_wrong_spectra_is_undecided():
     found = surrogate_test(autoregression(np.random.default_rng(3), 2000) ** 3)
     assert not found.is_valid
     assert not found.rejects_linear_noise
@@ -125,7 +125,7 @@ def test_a_surrogate_keeps_values_and_spectrum_and_changes_the_order():
     assert abs(np.corrcoef(made, series)[0, 1]) < 0.2
 
 
-def test_neighbours_close_in_time_are_excluded_from_the_search():
+def test_points_close_in_time_are_not_accepted_as_neighbours():
     rng = np.random.default_rng(5)
     points = rng.standard_normal((300, 2))
     found = nearest_neighbours(points, apart=10, last=280, floor=0.05)
@@ -135,7 +135,7 @@ def test_neighbours_close_in_time_are_excluded_from_the_search():
         assert reach[neighbour] == pytest.approx(reach[allowed].min())
 
 
-def test_too_short_series_are_refused():
+def test_a_series_that_is_too_short_is_refused():
     with pytest.raises(NotEnoughData, match="200 values"):
         zero_one(np.ones(100))
     with pytest.raises(NotEnoughData, match="neighbour"):

@@ -20,7 +20,7 @@ def comparison(streamed_file):
     return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
-def test_a_transmission_curve_keeps_its_bounds_between_processes(comparison):
+def test_a_transmission_curve_sent_to_another_process_keeps_its_bounds(comparison):
     (curve,) = pickle.loads(pickle.dumps(comparison)).curves
     assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)
     assert np.median(curve.magnitude) == pytest.approx(2.0, rel=0.01)
@@ -42,6 +42,6 @@ def test_a_comparison_uses_the_requested_estimator(streamed_file):
     assert found.curves[0].note.startswith("h1, ")
 
 
-def test_a_too_short_recording_is_reported(streamed_file):
+def test_a_recording_that_is_too_short_is_reported(streamed_file):
     with pytest.raises(NotEnoughData, match="streamed"):
         compare_recording(streamed_file(samples=10), FrequencyResponseRequest(), Simulation.LEFT_OUT)

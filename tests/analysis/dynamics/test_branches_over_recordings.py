@@ -68,7 +68,7 @@ def test_a_report_overlays_branches_and_states_level_differences(diagram, steppe
 
 
 @pytest.mark.thorough
-def test_the_like_option_uses_frequency_range_and_level_of_the_recording(stepped_file, level, tmp_path):
+def test_the_like_option_takes_frequency_range_and_level_from_a_recording(stepped_file, level, tmp_path):
     options = ("--places", "2", "--starts", "0", "--json", "--out", str(tmp_path / "like"))
     result = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), *options])
     assert result.exit_code == 0, result.output

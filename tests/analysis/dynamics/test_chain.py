@@ -97,7 +97,7 @@ def test_a_steady_chain_reaches_a_requested_error():
     assert np.all(np.isnan(truth.transmission_error))
 
 
-def test_stated_errors_of_spectral_lines_hold_in_95_percent():
+def test_the_stated_errors_of_spectral_lines_hold_in_95_percent_of_cases():
     random = np.random.default_rng(5)
     drawn = random.standard_normal((400, 16, 2)) @ np.array([1.0, 1j])
     held = [abs(abs(lines.mean()) / 5.0 - 1.0) <= error_of_lines(lines[:, None])[0] for lines in 5.0 + drawn]

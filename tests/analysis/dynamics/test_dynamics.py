@@ -191,7 +191,7 @@ def test_a_figure_dashes_unstable_parts_and_marks_events(along):
     assert [each.name for each in drawn.tables] == ["branches", "branches_special_points"]
 
 
-def test_holdable_motions_are_reported_in_figure_text_table_and_json():
+def test_motions_that_can_be_held_are_reported_in_figure_text_table_and_json():
     growth_s = FOLDED.growth_time_s
     assert np.isinf(growth_s[:3]).all()
     assert growth_s[3:] == pytest.approx([1 / (115.0 * math.log(1.2)), 1 / (105.0 * math.log(1.5))])
@@ -262,7 +262,7 @@ def test_the_sum_of_an_exponent_spectrum_matches_the_damping(tmp_path):
     assert lower.get_ylabel() == "dimension"
 
 
-def test_a_lossy_contact_reports_the_missing_damping_check():
+def test_the_damping_check_of_exponents_is_not_made_for_a_lossy_contact():
     request = SpectrumRequest(model="rigid:0.8", start=260.0, stop=260.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)
     assert math.isnan(found.largest_sum_difference)
@@ -271,7 +271,7 @@ def test_a_lossy_contact_reports_the_missing_damping_check():
 
 
 @pytest.mark.thorough
-def test_a_harmonic_balance_reports_the_convergence_of_its_harmonics():
+def test_a_harmonic_balance_reports_whether_its_harmonics_converged():
     options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
     first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))
     many = diagram_of(BranchRequest(method=BranchMethod.BALANCE, **options))

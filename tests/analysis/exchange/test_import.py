@@ -84,7 +84,7 @@ def test_rows_of_a_matlab_matrix_become_channels(tmp_path):
     assert_same(values, signals()[:1])
 
 
-def test_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
+def test_the_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
     counts = np.random.default_rng(1).integers(-(2**23), 2**23, SAMPLES, dtype=np.int32)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["acc"] = counts
@@ -148,7 +148,7 @@ def test_non_finite_values_are_imported_as_lost_samples(tmp_path):
         ("knots", "", "as a number of 'm s-1' per 'knots'"),
     ],
 )
-def test_a_unit_in_the_file_sets_the_scale_or_is_refused_if_unsuitable(tmp_path, said, more, factor):
+def test_a_unit_in_the_file_sets_the_scale_and_an_unsuitable_unit_is_refused(tmp_path, said, more, factor):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["u"], file["v"] = signals()
         file["v"].attrs["units"] = said
@@ -206,7 +206,7 @@ def test_wav_of_24_bits_keeps_every_bit(tmp_path):
     np.testing.assert_array_equal(values[0], counts / 2.0**23)
 
 
-def test_more_bits_than_a_wav_file_states_are_refused(tmp_path):
+def test_wav_samples_with_more_bits_than_the_file_states_are_refused(tmp_path):
     counts = np.random.default_rng(2).integers(-(2**22), 2**22, SAMPLES, dtype=np.int32)
     meaning = mapping(tmp_path, ("1", "m0_velocity", "scale = 1.0"))
     for name, stored in (("left", counts << 8), ("right", counts), ("plain", counts)):
@@ -332,7 +332,7 @@ def test_binary_samples_that_look_like_a_delimiter_are_read(known, tmp_path):
     )
 
 
-def test_an_imported_dwell_gives_the_results_of_the_exported_recording(dwell_file, tmp_path):
+def test_a_dwell_that_was_exported_and_imported_gives_the_same_results(dwell_file, tmp_path):
     with open_recording(dwell_file()) as recording:
         original = analyse(recording)
         path, _ = export_samples(excerpt(recording), Format.UFF, tmp_path / "dwell.uff")
@@ -358,7 +358,7 @@ def test_an_imported_dwell_gives_the_results_of_the_exported_recording(dwell_fil
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
 
 
-def test_imported_noise_gives_the_transmission_of_the_exported_recording(noise_file, tmp_path):
+def test_noise_that_was_exported_and_imported_gives_the_same_transmission(noise_file, tmp_path):
     with open_recording(noise_file()) as recording:
         original = analyse(recording)
         path, *_ = export_samples(excerpt(recording), Format.MAT, tmp_path / "noise.mat")
@@ -674,7 +674,7 @@ def test_non_numeric_objects_in_hdf5_are_not_offered_as_channels(tmp_path):
         assert [each.name for each in source.channels] == ["/v"]
 
 
-def test_external_links_are_read_only_if_allowed(tmp_path):
+def test_external_links_are_followed_only_if_allowed(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["v"] = signals()[0]
         file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
@@ -820,14 +820,14 @@ def test_a_corrupted_file_never_crashes_the_import(known, tmp_path, suffix):
 
 
 @pytest.mark.parametrize(("said", "found"), [("", "simulated"), ('origin = "simulated"\n', "simulated")])
-def test_a_universal_file_keeps_the_mark_of_simulated_samples(known, tmp_path, said, found):
+def test_a_universal_file_keeps_the_mark_that_its_samples_are_simulated(known, tmp_path, said, found):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = said + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("settle_s = 1,", "settle_s = 0,")
     recording, _ = read_import(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head))
     assert recording.origin.value == found
 
 
-def test_a_mapping_cannot_declare_simulated_samples_real(known, tmp_path):
+def test_a_mapping_cannot_declare_simulated_samples_to_be_real(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     head = 'origin = "real"\n' + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("= 1,", "= 0,")
     with pytest.raises(InvalidRequest, match=r"has origin = 'real', but a\.uff states simulated"):

@@ -159,7 +159,7 @@ def test_a_refusal_names_the_channel_by_its_heading(tmp_path):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.1])
-def test_replaced_times_that_show_lost_samples_are_reported(tmp_path, share):
+def test_times_that_show_lost_samples_are_reported_even_if_a_mapping_replaces_them(tmp_path, share):
     places = kept_rows("single", share, np.random.default_rng(8), DWELL_SAMPLES)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     made = import_recording(path, meaning(10_000.0, time="even"), tmp_path / "a.h5")
@@ -169,7 +169,7 @@ def test_replaced_times_that_show_lost_samples_are_reported(tmp_path, share):
     assert ("frequencies and amplitudes are wrong" in check.text) == (share > 0)
 
 
-def test_a_dwell_with_missing_rows_is_refused_and_a_complete_part_is_analysed(tmp_path):
+def test_a_dwell_with_missing_rows_is_refused_but_a_part_without_gaps_is_analysed(tmp_path):
     places = np.delete(np.arange(DWELL_SAMPLES), 16_500)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     with (
@@ -182,7 +182,7 @@ def test_a_dwell_with_missing_rows_is_refused_and_a_complete_part_is_analysed(tm
         assert analyse(recording).response.drive.frequency_hz == pytest.approx(150.0, abs=0.01)
 
 
-def test_more_gaps_than_a_recording_stores_are_refused_without_leftovers(tmp_path):
+def test_a_file_with_more_gaps_than_a_recording_can_store_is_refused_without_leftovers(tmp_path):
     places = np.flatnonzero(np.arange(200_000) % 23 != np.arange(200_000) // 23 % 20)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     with pytest.raises(InvalidRequest, match="missing in more than 4096 places of the file"):

@@ -41,7 +41,7 @@ def ranges(parts):
     return [(each.start, each.stop) for each in parts]
 
 
-def test_placed_realisations_alternate_with_settling_times():
+def test_realisations_placed_in_an_import_alternate_with_settling_times():
     parts = place_parts(mapping_of(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
@@ -75,7 +75,7 @@ def test_parts_after_the_end_of_the_file_are_left_out():
         ([(1e307, 1e308)], "no part of the plan begins within the 10 s"),
     ],
 )
-def test_impossible_parts_of_an_imported_plan_are_refused(told, said):
+def test_parts_that_an_imported_plan_cannot_have_are_refused(told, said):
     parts = [{"start_s": start_s, "stop_s": stop_s} for start_s, stop_s in told]
     with pytest.raises(InvalidRequest, match=said):
         place_parts(mapping_of(NOISE, parts=parts), 1000.0, 10_000)

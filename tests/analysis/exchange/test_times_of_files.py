@@ -429,7 +429,7 @@ def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more
         import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
 
 
-def test_a_wav_or_mat_file_with_repeated_channel_data_is_refused(tmp_path):
+def test_a_wav_or_mat_file_that_stores_a_channel_more_than_once_is_refused(tmp_path):
     path = write("wav", tmp_path, "sound", np.random.default_rng(0))
     content = path.read_bytes()
     path.write_bytes(content + b"data" + (64).to_bytes(4, "little") + bytes(64))

@@ -133,7 +133,7 @@ def write_parts(path, parts):
         ([("", 2.5, VOLTS)], 1.0, "over 2.5 s of the recording"),
     ],
 )
-def test_exported_densities_cover_and_name_the_played_segments(tmp_path, parts, lines_hz, told):
+def test_exported_densities_cover_only_the_played_segments_and_name_them(tmp_path, parts, lines_hz, told):
     run = CliRunner().invoke(
         app, ["export", str(write_parts(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
     )
@@ -211,7 +211,7 @@ def test_modal_software_finds_the_modes_for_any_band_and_clock_ratio(known, tmp_
         np.testing.assert_allclose(coherence["x"], hz, atol=0.02 * spacing_hz)
 
 
-def test_a_response_with_omitted_lines_keeps_their_frequencies(known, tmp_path):
+def test_a_response_with_omitted_lines_keeps_the_frequency_of_every_line(known, tmp_path):
     hz = 1.0000175 * np.array([31, 33, 37, 39, 41])
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     read = pyuff.UFF(str(path)).read_sets(1)

@@ -164,7 +164,7 @@ def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_f
         assert f"Response I {each.analysis.response.response_i:.3g}" in drawn.caption
 
 
-def test_the_largest_column_of_a_dwell_spectrum_is_response_ii(dwell_file):
+def test_the_highest_bar_of_a_dwell_spectrum_is_response_ii(dwell_file):
     found = result(dwell_file("weak"), Simulation.LEFT_OUT).analysis.response
     frequency_hz, size = spectrum_columns(found)
     # A sine between two lines reads up to 15 % low with a Hann window.
@@ -180,7 +180,7 @@ def test_a_stepped_sine_figure_has_one_marker_per_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_more_parts_than_planned_are_explained_by_feedback(dwell_file):
+def test_the_check_of_parts_names_feedback_as_the_reason_for_more_parts_than_planned(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]

@@ -24,7 +24,7 @@ def collision_analysis(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_unequal_gaps_are_found_although_described_as_equal(collision_analysis):
+def test_unequal_gaps_are_found_although_the_specimen_file_states_equal_gaps(collision_analysis):
     updated = update_model(collision_analysis)
     lower, upper = updated.collisions.gaps
     assert lower.low <= 35e-6 <= lower.high

@@ -34,7 +34,7 @@ def cases():
     return found
 
 
-def test_posterior_95_percent_bounds_have_their_coverage_and_useful_width(cases):
+def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful_width(cases):
     bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
     held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905
     count = held[:, :2].size
@@ -45,12 +45,12 @@ def test_posterior_95_percent_bounds_have_their_coverage_and_useful_width(cases)
     assert np.all(width[:2] < 1.4 * best)
 
 
-def test_uninformative_statistics_keep_the_prior_width(cases):
+def test_uninformative_statistics_leave_the_bounds_as_wide_as_the_prior(cases):
     wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
     assert np.median(wide) > 0.85 * 2.0
 
 
-def test_statistics_from_a_wrong_model_do_not_fit(cases):
+def test_statistics_that_no_parameter_can_produce_are_not_called_a_fit(cases):
     assert sum(not each.fits for _, each in cases) <= 3
     runs = Linear(5)
     off = np.linalg.svd(runs.gain[:2])[2][-1]  # a direction that no parameter produces
@@ -58,7 +58,7 @@ def test_statistics_from_a_wrong_model_do_not_fit(cases):
     assert not posterior(runs, strange, BOX, 5, ROUNDS).fits
 
 
-def test_a_run_of_the_true_model_is_rarely_rejected_with_few_references():
+def test_the_true_model_is_rarely_rejected_when_few_reference_runs_exist():
     """With the distances of the 80 regression runs as reference, two in five true runs were once rejected."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):
@@ -85,7 +85,7 @@ def test_an_unchanged_parameter_box_is_not_sampled_again():
     assert np.all(np.diff(bounds, axis=0) > 0.8 * 2.0 * 0.95)
 
 
-def test_parameters_outside_their_range_do_not_fit():
+def test_statistics_of_parameters_outside_their_range_are_not_called_a_fit():
     """The bounds of c1 had zero width, at the end of the range."""
     for seed in range(8):
         runs = Linear(seed)

@@ -133,7 +133,7 @@ def test_fit_intervals_hold_with_scatter_from_three_realisations(true):
     assert sum(held) > 0.95 * len(held) - 3 * math.sqrt(0.95 * 0.05 * len(held))
 
 
-def test_noisy_lines_neither_reject_a_true_model_nor_diverge(true):
+def test_noise_of_any_level_neither_rejects_a_true_model_nor_makes_the_fit_diverge(true):
     rng, said = np.random.default_rng(3), []
     for sd in np.geomspace(0.03, 0.5, 30):
         try:
@@ -188,7 +188,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("assumption", WRONG)
-def test_one_wrong_assumption_is_rejected_and_named_as_suspect(true, assumption):
+def test_a_fit_with_one_wrong_assumption_is_rejected_and_the_assumption_named_as_suspect(true, assumption):
     factors = WRONG[assumption]
     other = with_values(true, {each: f * parameter_value(true, each) for each, f in factors.items()})
     gain = 1.01 if assumption is Assumption.SENSITIVITY else 1.0
@@ -217,7 +217,7 @@ def test_indistinguishable_causes_are_named_together(true):
     }
 
 
-def test_sensor_uncertainty_widens_dependent_intervals(true):
+def test_the_uncertainty_of_a_sensor_widens_the_intervals_that_depend_on_it(true):
     """A sensitivity error of 1 % is no contradiction if the calibration uncertainty is 1 %."""
     off = transmission(true, np.random.default_rng(8), sd=2e-3, gain=1.01)
     allowed = fit_specimen(off, NOMINAL, scale_sd=0.01)

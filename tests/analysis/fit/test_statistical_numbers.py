@@ -71,7 +71,7 @@ def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dw
     assert np.abs(z).max() < student.isf(0.005 / z.size, runs - 1)
 
 
-def test_a_rig_with_a_wrong_base_response_is_refused_early(noisy_dwell, tmp_path):
+def test_a_rig_with_a_wrong_base_response_is_refused_before_the_fit(noisy_dwell, tmp_path):
     other = shutil.copy(noisy_dwell.path, tmp_path / "other.h5")
     with h5py.File(other, "r+") as file:
         bench = json.loads(file["configuration/bench_json"][()])

@@ -111,7 +111,7 @@ def test_fitted_intervals_are_narrow_enough_to_be_useful(fitted_model):
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_frequency_is_that_of_the_first_impact(recordings, campaign):
+def test_the_onset_frequency_is_the_frequency_of_the_first_impact(recordings, campaign):
     (onset,) = onsets(campaign.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recordings[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
@@ -173,7 +173,7 @@ def lowered_dwells(folder, levels_m):
         yield synthetic.write_recording(folder, plan, motion, velocity, [part], name=f"dwell{number}")
 
 
-def test_collisions_that_persist_at_lower_levels_are_no_upper_bound_of_the_gap(tmp_path):
+def test_collisions_that_persist_at_lower_levels_give_no_upper_bound_of_the_gap(tmp_path):
     """The gap was given as (5.1 to 15.4) um instead of 45."""
     paths = list(lowered_dwells(tmp_path, [8e-6, 4e-6, 2e-6, 1.5e-6, 0.5e-6]))
     (found,) = update_model(analyse_files(paths, "lowered", Simulation.LEFT_OUT)).values
@@ -228,7 +228,7 @@ def test_missing_data_for_a_fit_give_a_one_sentence_error(campaign):
         fit_gap([], gong2025())
 
 
-def test_a_fit_whose_simulation_disagrees_with_its_noise_gives_no_values(campaign, fitted_model):
+def test_a_fit_whose_simulation_disagrees_with_the_recording_gives_no_values(campaign, fitted_model):
     def overlaid(*, agrees):
         overlay = SimpleNamespace(ensemble=(SimpleNamespace(agrees=agrees),))
         return replace(campaign, results=tuple(replace(each, overlay=overlay) for each in campaign.results))

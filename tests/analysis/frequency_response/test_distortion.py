@@ -85,7 +85,7 @@ def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analyse_wit
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_the_remainder_of_an_undistorted_response_is_the_added_noise(analyse_with):
+def test_an_undistorted_response_leaves_only_the_added_noise_as_remainder(analyse_with):
     found = distortion(analyse_with(np.zeros_like).response.periodic)
     # White noise of variance s^2 adds 4 s^2 / (averaged samples) to a squared amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))

@@ -164,7 +164,7 @@ def test_bounds_of_one_realisation_are_marked_as_noise_only():
     assert result.distortion_variance is None
 
 
-def test_a_drive_that_is_short_silent_or_aperiodic_is_refused():
+def test_a_drive_that_is_too_short_or_silent_or_aperiodic_is_refused():
     rng = np.random.default_rng(8)
     short = rng.standard_normal(700)
     with pytest.raises(NotEnoughData, match="at least 2"):

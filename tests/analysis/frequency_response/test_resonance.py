@@ -115,7 +115,7 @@ def test_the_stated_uncertainties_of_a_resonance_match_the_scatter():
     assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
 
 
-def test_a_resonance_in_noise_is_found_and_checked_for_resolution():
+def test_a_resonance_in_noise_is_found_and_its_resolution_is_checked():
     rate, natural = 5120.0, 2 * np.pi * 260
     section = signal.bilinear([natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
     x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
@@ -202,7 +202,7 @@ def test_bounds_of_close_modes_hold(shares, seed, draw):
 
 
 @pytest.mark.thorough
-def test_a_resonance_fit_that_misses_the_lines_reports_its_chi_square():
+def test_a_poor_resonance_fit_reports_its_chi_square():
     lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
     # An alternating error of 15 % on pairs of lines cannot be fitted by three modes.
     pairs = 1 + 0.15 * (-1.0) ** (np.arange(lines.value.size) // 2)
@@ -325,7 +325,7 @@ def test_a_resonance_in_one_realisation_only_is_rejected():
     assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
-def test_leave_one_out_fits_in_another_band_do_not_count_as_scatter():
+def test_leave_one_out_fits_with_other_modes_do_not_count_as_scatter():
     """Seven of twelve leave-one-out fits use all modes, as the full fit does; five use this mode alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)

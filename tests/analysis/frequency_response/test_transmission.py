@@ -75,7 +75,7 @@ def test_the_stated_uncertainty_is_the_scatter_of_repeated_estimates(overlap, n_
     assert np.std(coherences, axis=0).mean() == pytest.approx(np.sqrt(1 / n_eff) * 0.5, rel=0.06)
 
 
-def test_independent_noises_exceed_the_coherence_limit_in_5_percent():
+def test_independent_noise_exceeds_the_coherence_limit_at_5_percent_of_lines():
     x, y = noise(5, 2, 32 * 20_002)
     segment = 64
     passed, lines, mean = 0, 0, 0.0
@@ -94,7 +94,7 @@ def test_independent_noises_exceed_the_coherence_limit_in_5_percent():
     assert mean / lines == pytest.approx(1 / 32, rel=0.03)
 
 
-def test_noise_on_the_drive_biases_h1_and_noise_on_the_response_biases_h2_by_the_formula():
+def test_noise_on_drive_or_response_biases_h1_or_h2_as_the_formula_states():
     clean = noise(6, 400_000)
     x, y = clean + 0.3 * noise(7, 400_000), clean + 0.31 * noise(8, 400_000)
     how = {"segment_samples": 256}

@@ -29,7 +29,7 @@ def alarms_after(levels, usual=USUAL):
     return next((number for number, each in enumerate(levels, 1) if watch.take(each)), None)
 
 
-def test_a_deviation_of_half_a_second_triggers_the_change_alarm():
+def test_a_deviation_that_lasts_half_a_second_triggers_the_change_alarm():
     assert alarms_after([OUT] * 20) == 5
     assert alarms_after([math.inf] * 20) == 5
     assert alarms_after(([OUT] * 4 + [WITHIN] * 25) * 10) is None
@@ -53,7 +53,7 @@ def test_the_false_alarm_rate_is_within_its_bound():
     assert all(often)
 
 
-def test_the_usual_residual_is_learnt_from_two_seconds():
+def test_the_usual_residual_is_learnt_in_two_seconds():
     rng = np.random.default_rng(9)
     watch = ChangeWatch()
     levels = 0.9 + 0.02 * rng.standard_normal(20)

@@ -41,7 +41,7 @@ def test_identical_impacts_determine_no_gap(error_m):
 
 
 @pytest.mark.parametrize("loss_s_per_m", [0.0, 0.2, 0.8])
-def test_the_impact_loss_is_reported_over_impact_speed(loss_s_per_m):
+def test_the_impact_loss_is_reported_as_a_function_of_impact_speed(loss_s_per_m):
     assert free_loss(impacts(0.5, loss_s_per_m=loss_s_per_m)) == pytest.approx(loss_s_per_m, abs=0.02)
 
 

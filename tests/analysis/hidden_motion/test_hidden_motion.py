@@ -150,7 +150,7 @@ def test_motion_is_tracked_at_ten_times_the_sensor_noise(world_recording):
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "largest_rms_m"), [(260.0, 1.5, 1e-6), ("noise", 10.0, 1.5e-6)]
 )
-def test_motion_impacts_and_gaps_are_reported_without_a_contact_model(
+def test_motion_and_impacts_and_gaps_are_reported_without_a_contact_model(
     world_recording, kind, level_vpp, largest_rms_m
 ):
     recorded = world_recording(kind, level_vpp, seed=41)
@@ -170,7 +170,7 @@ def test_motion_impacts_and_gaps_are_reported_without_a_contact_model(
 
 
 @pytest.mark.thorough
-def test_wrong_gaps_and_m1_are_corrected_from_the_motion(world_recording, described_otherwise):
+def test_wrong_values_of_the_gaps_and_m1_are_corrected_from_the_motion(world_recording, described_otherwise):
     recorded = world_recording(260.0, 1.5, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.03, gaps=(0.98, 1.04))
     motion = estimate(recorded, specimen=wrong)
@@ -189,7 +189,7 @@ def test_wrong_gaps_and_m1_are_corrected_from_the_motion(world_recording, descri
 
 
 @pytest.mark.thorough
-def test_wrong_springs_and_dampers_are_corrected_from_the_motion(world_recording):
+def test_wrong_values_of_springs_and_dampers_are_corrected_from_the_motion(world_recording):
     recorded = world_recording("noise", 10.0, seed=41)
     (k0, k1, k2), dampings = recorded.specimen.stiffnesses, recorded.specimen.dampings
     wrong = replace(
@@ -225,7 +225,7 @@ def test_contact_loss_is_identified_and_not_attributed_to_a_damper(world_recordi
 
 
 @pytest.mark.thorough
-def test_parameters_are_identified_from_a_motion_that_settles_within_the_record(world_recording):
+def test_parameters_are_identified_even_if_the_motion_settles_during_the_record(world_recording):
     """The later impacts are identical; a search from the middle of the record started 1.3 um off."""
     recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
     m0, m1, m2 = recorded.specimen.masses
@@ -303,7 +303,7 @@ def test_a_motion_without_contact_determines_no_gap(world_recording):
     assert motion.free_gaps == (None, None)
 
 
-def test_requests_without_a_result_are_refused_in_a_sentence(world_recording):
+def test_requests_that_can_give_no_result_are_refused_in_one_sentence(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):

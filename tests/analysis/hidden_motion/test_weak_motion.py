@@ -87,7 +87,7 @@ def test_one_weak_sine_does_not_determine_the_dampers():
 
 
 @pytest.mark.thorough
-def test_weak_noise_corrects_wrong_dampers():
+def test_wrong_values_of_the_dampers_are_corrected_from_weak_noise():
     rng = np.random.default_rng(4)
     inside, dampers = [], []
     for factors in ((1, 1.5, 1), (1, 0.7, 1), (1, 1, 0.8), (1.05, 1.3, 0.9)):

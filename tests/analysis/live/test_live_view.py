@@ -61,7 +61,7 @@ def test_the_transmission_at_the_drive_is_the_ratio_of_displacements(view):
 
 
 @pytest.mark.parametrize(("role", "power"), [("m0_acceleration", 1), ("m0_displacement", -1)])
-def test_any_sensor_on_m0_gives_the_same_live_responses(role, power):
+def test_the_live_responses_are_equal_for_every_sensor_on_m0(role, power):
     channels = (*CHANNELS[:3], LiveChannel(role, "m/s²", 0.25, 5.0))
     found = LiveView(channels, RATE, band_hz=(150.0, 350.0))
     for first in range(0, 102_400, 2560):

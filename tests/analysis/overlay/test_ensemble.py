@@ -112,7 +112,7 @@ def test_a_shifted_measurement_is_outside_the_limit():
     assert "outside" in found.sentence
 
 
-def test_only_motions_of_one_kind_are_compared():
+def test_a_measured_motion_is_compared_only_with_draws_of_the_same_kind_of_motion():
     rng = np.random.default_rng(5)
     kinds = np.array([[1, 0]] * 4 + [[0, 0]] * 12)
     draws = [(Quantity("q", FREQUENCY_HZ[:2], np.exp(0.1 * rng.standard_normal(2)), kind),) for kind in kinds]
@@ -168,7 +168,7 @@ def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
 @pytest.mark.parametrize(
     ("requested", "shift", "made"), [(16, 0.0, 8), (16, 2.0, 16), (24, 0.0, 24), (5, 0.0, 5)]
 )
-def test_draws_stop_at_clear_agreement_unless_more_are_requested(requested, shift, made):
+def test_drawing_stops_at_clear_agreement_unless_more_draws_are_requested(requested, shift, made):
     def estimate(number):
         value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
         return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value),), (), 100.0, 1.0)

@@ -31,7 +31,7 @@ def test_a_weak_dwell_and_its_simulation_differ_by_less_than_0_01_db(dwell_file)
     assert overlay.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
 
 
-def test_a_colliding_dwell_counts_impacts_and_agrees_in_its_statistics(dwell_file, dwell_motions):
+def test_the_simulation_of_a_colliding_dwell_agrees_in_impacts_and_statistics(dwell_file, dwell_motions):
     analysis, overlay = overlay_of(dwell_file("strong"))
     true = dwell_motions["strong"][2]
     assert overlay.run.impacts == pytest.approx(np.count_nonzero(true > 2.0), rel=0.15)
@@ -95,7 +95,7 @@ def test_a_prediction_below_the_gap_equals_the_linear_response():
     np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 
 
-def test_only_the_three_drive_levels_of_the_paper_have_a_paper_amplitude():
+def test_only_the_three_drive_levels_of_the_paper_map_to_an_amplitude_of_the_paper():
     assert [paper_amplitude_m(each) for each in (0.05, 1.5, 10.0)] == [1e-6, 5e-6, 50e-6]
     assert paper_amplitude_m(2.0) is None
 

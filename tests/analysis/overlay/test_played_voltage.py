@@ -57,7 +57,7 @@ def test_short_or_noise_free_voltages_drive_the_twin_unchanged(samples):
     assert PlayedVoltage(volts, 1e-9).random_voltage(rng).shape == volts.shape
 
 
-def test_the_noise_of_a_channel_matches_all_its_quiet_blocks():
+def test_the_noise_of_a_channel_is_estimated_from_all_its_quiet_blocks():
     """The quietest of 240 blocks alone would be 9 to 12 % too low."""
 
     class Recorded:

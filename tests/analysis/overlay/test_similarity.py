@@ -14,7 +14,7 @@ def curve(response, amplitude_m=5e-6):
     return SimilarityCurve(FREQUENCY_HZ[: len(response)], np.asarray(response, dtype=float), amplitude_m)
 
 
-def test_a_curve_has_similarity_1_to_itself_even_at_zero_logarithm():
+def test_a_curve_has_similarity_1_to_itself_even_where_its_logarithm_is_zero():
     itself = curve(np.geomspace(0.1, 10, 101)[:100])
     one = curve(np.ones(100))
     assert similarity(itself, itself).rate == 1
@@ -53,7 +53,7 @@ def test_a_wider_threshold_never_finds_fewer_similar_points(first, second, seed)
     )
 
 
-def test_similarity_leaves_out_and_counts_points_without_a_value():
+def test_similarity_leaves_out_points_without_a_value_and_counts_them():
     found = similarity(curve([2.0, np.nan, 2.0, 2.0]), curve([2.0, 2.0, np.nan, 0.2]))
     assert (found.left_out, found.rate) == (2, 0.5)
     with pytest.raises(NotEnoughData, match="no frequency"):

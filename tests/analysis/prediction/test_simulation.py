@@ -37,12 +37,12 @@ def test_invalid_simulations_are_refused_with_a_reason(given, said):
         SimulationRequest(**given)
 
 
-def test_one_model_named_twice_is_simulated_once():
+def test_a_model_that_is_named_twice_is_simulated_once():
     assert SimulationRequest(compared_with="hertz").models == ("hertz",)
     assert SimulationRequest(step_hz=50.0).points == 24
 
 
-def test_the_incremental_result_ends_at_the_linear_transmission():
+def test_the_result_that_grows_point_by_point_ends_as_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)

@@ -55,7 +55,7 @@ def test_a_drop_out_is_found_and_bridged(seed):
 
 @pytest.mark.parametrize("noise", [3e-6, 2e-3, 1e-2])
 @pytest.mark.parametrize("level", ["zero", "last"])
-def test_drop_outs_at_a_constant_value_are_found_in_any_noise(noise, level):
+def test_drop_outs_to_a_constant_value_are_found_at_any_noise_level(noise, level):
     """Zeros in a noisy sweep were once read as motion: Response II was 0.923 +- 0.012; 0.968 is true."""
     dark = motion(11, noise=noise)
     begins = np.arange(2_000, 48_000, 4_000)
@@ -149,7 +149,7 @@ def rig():
 
 
 @pytest.mark.thorough
-def test_bridged_drop_outs_do_not_change_a_dwell(rig, tmp_path):
+def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(rig, tmp_path):
     """Response I was once 91, called a lower bound; 1.63 is true."""
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
     results = []
@@ -207,7 +207,7 @@ def test_drop_outs_and_collisions_are_distinguished(rig, tmp_path, plan):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [7, 9])
-def test_drop_outs_within_milliseconds_are_bridged_within_2_percent(rig, tmp_path, seed):
+def test_drop_outs_a_few_milliseconds_apart_are_bridged_with_errors_below_2_percent(rig, tmp_path, seed):
     """Ringing joined such drop-outs beyond the longest bridge: Response I was 617; 22.6 is true."""
     plan = Dwell(amplitude_vpp=0.02, frequency_hz=266, settle_s=1, duration_s=4)
     read = []

@@ -83,7 +83,7 @@ def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp
 
 
 @SENSORS
-def test_samples_do_not_depend_on_the_start_of_reading(dwell_motions, tmp_path, response, made):
+def test_converted_samples_do_not_depend_on_where_reading_starts(dwell_motions, tmp_path, response, made):
     motion, velocity, _ = dwell_motions["strong"]
     path = synthetic.write_recording(
         tmp_path, dwell_plan(A0_STRONG), motion, made(velocity), [DWELL_PART], response=response
@@ -146,7 +146,7 @@ def test_samples_near_a_gap_are_excluded(dwell_motions, tmp_path):
     assert np.flatnonzero(lost)[[0, -1]].tolist() == [16_000 - RATE, 16_009 + RATE]
 
 
-def test_channel_levels_are_those_of_the_samples_that_were_not_lost(dwell_motions, tmp_path):
+def test_the_level_of_a_channel_is_computed_only_from_samples_that_were_not_lost(dwell_motions, tmp_path):
     motion, velocity, _ = dwell_motions["weak"]
     hole = (16_000, 32_000)
     path = synthetic.write_recording(tmp_path, dwell_plan(0.5e-6), motion, velocity, [DWELL_PART], hole=hole)

@@ -39,7 +39,7 @@ def report(**parts):
     return summary(campaign(**parts), ())
 
 
-def test_the_papers_campaign_is_reported_in_three_findings():
+def test_the_campaign_of_the_paper_is_reported_in_three_findings():
     results = campaign(
         (noise(0.05, 94.61, 266.2, 499.6), noise(1.0, 201.0), noise(10.0, 199.1, 428.5)),
         (dwell(0.05, MotionKind.PERIODIC), dwell(1.5, MotionKind.CHAOTIC), dwell(10.0, MotionKind.CHAOTIC)),
@@ -104,7 +104,7 @@ def test_agreement_is_stated_for_every_mix_of_verdicts(verdicts, words):
     assert summary(campaign((noise(0.05, 94.6),)), verdicts).endswith(words)
 
 
-def test_a_recording_without_a_result_comes_first_and_many_findings_stay_short():
+def test_recordings_without_a_result_come_first_and_long_findings_are_shortened():
     failed = AnalysisFailure("x.h5", FailedStep.ANALYSIS, "broken")
     assert report(failures=(failed,)) == "One recording of one gave no result."
     many = tuple(noise(0.05, 94.6, 266.2, 499.6) for _ in range(40))

@@ -51,7 +51,7 @@ def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file)
     assert found.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
 
 
-def test_a_colliding_dwell_has_a_lower_response_ii_and_fills_the_terminal_bands(dwell_file):
+def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal_bands(dwell_file):
     weak, strong = analysis_of(dwell_file("weak")), analysis_of(dwell_file("strong"))
     assert strong.response.response_ii < 0.3 * weak.response.response_ii
     assert strong.response.response_i > 2 * strong.response.response_ii
@@ -181,7 +181,7 @@ def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, genera
     assert found.verdict is Verdict.PASSED
 
 
-def test_a_calibration_dated_after_the_measurement_gives_a_warning_without_an_age(dwell_file):
+def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_no_age(dwell_file):
     facts = analysis_of(dwell_file("weak")).facts
     channels = tuple(
         replace(each, header=replace(each.header, calibration_date="2098-02-10")) for each in facts.channels

@@ -61,7 +61,7 @@ def test_integration_of_a_260_hz_line_has_no_gain_error_and_no_drift():
 
 
 @given(frequency_hz=st.floats(40, 1000), steps=st.sampled_from(list(Quantity)))
-def test_a_converted_sine_has_the_amplitude_and_phase_of_the_factor(frequency_hz, steps):
+def test_a_converted_sine_changes_in_amplitude_and_phase_by_the_stated_factor(frequency_hz, steps):
     time = np.arange(8192) / RATE
     result = converted_signal(
         np.cos(2 * np.pi * frequency_hz * time),

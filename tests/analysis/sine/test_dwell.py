@@ -98,7 +98,7 @@ def test_peaks_of_a_dwell_spectrum_are_displacement_amplitudes():
     assert high.decibel == pytest.approx(20 * np.log10(0.02), abs=0.05)
 
 
-def test_stated_noise_bias_and_spread_match_repeated_dwells():
+def test_the_stated_bias_and_scatter_by_noise_match_repeated_dwells():
     found = [
         dwell_response(*dwell(1.6, {1: 1e-7}, noise=1e-6, seed=seed), RATE, near_hz=260, window_s=1)
         for seed in range(40)
@@ -111,7 +111,7 @@ def test_stated_noise_bias_and_spread_match_repeated_dwells():
 
 
 @pytest.mark.thorough
-def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent():
+def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent_of_cases():
     """Ten sections of a window determine their scatter within 25 % only; uncorrected coverage was 92 %."""
     rng, draws, held = np.random.default_rng(4), 1000, 0
     for _ in range(draws):
@@ -123,13 +123,13 @@ def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent():
 
 
 @pytest.mark.parametrize("count", [3, 10])
-def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent(count):
+def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent_of_cases(count):
     values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
     held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
     assert held == pytest.approx(0.954, abs=0.012)
 
 
-def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_two():
+def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_gives_two():
     for parts, points in (({1: 10e-6j, 2: 3e-6}, 1), ({0.5: 4e-6, 1: 10e-6}, 2)):
         drive, _, velocity = dwell(4, parts)
         section = stroboscope(drive, velocity, RATE, near_hz=260, phase_rad=1.0)

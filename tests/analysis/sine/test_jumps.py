@@ -95,7 +95,7 @@ def test_the_ringing_of_a_linear_specimen_is_not_a_jump(start_hz, stop_hz, durat
     assert smooth_jumps(found, collisions(found)) == ()
 
 
-def test_a_step_between_two_non_smooth_ranges_is_not_a_jump():
+def test_a_step_between_two_irregular_ranges_is_not_a_jump():
     rough = np.zeros(TIME_S.size, dtype=bool)
     assert jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), rough) == ()
     half = FREQUENCY_HZ < 250

@@ -97,7 +97,7 @@ def test_the_report_summarises_levels_and_jumps(analysis):
     ("share", "factor"),
     [(0.2, 3.5), (0.2, 0.4), (0.4, 1 / 3.5), (0.6, 2.2), (0.75, 3.5), (0.75, 1 / 3.5)],
 )
-def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, factor, share):
+def test_a_jump_during_the_record_of_one_step_counts_as_one_jump(tmp_path, factor, share):
     levels, settle_s, record_s = (0.2, 0.3, 0.4, 0.5), 0.5, 1.0
     plan = SteppedLevel(
         frequency_hz=195,
@@ -132,7 +132,7 @@ def test_a_jump_within_the_record_of_a_step_is_one_jump(tmp_path, factor, share)
     assert (jump.before_vpp, jump.after_vpp) == (0.2, 0.4)
 
 
-def test_a_constant_response_has_no_jump_even_at_the_turning_point():
+def test_a_constant_response_has_no_jump_even_where_the_level_turns_back():
     steps = 6
     response = SteppedResponse(
         frequency_hz=np.full(steps, 195.0),

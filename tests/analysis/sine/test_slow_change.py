@@ -44,7 +44,7 @@ def stated_value(result, name):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_slow_beat_is_not_periodic_and_its_bound_covers_later_records(dwell, seed):
+def test_a_slow_beat_is_not_called_periodic_and_its_bound_covers_later_records(dwell, seed):
     """A beat of 30 % at 260.2 Hz was once periodic, with Response I 6.373591 +- 0.000023."""
     rng = np.random.default_rng(seed)
     beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))
@@ -66,7 +66,7 @@ def test_a_slow_beat_is_not_periodic_and_its_bound_covers_later_records(dwell, s
 
 
 @pytest.mark.parametrize("rate_hz", [0.1, 0.35, 1.1])
-def test_slow_modulation_of_amplitude_or_phase_is_not_periodic(dwell, rate_hz):
+def test_a_slow_modulation_of_amplitude_or_phase_is_not_called_periodic(dwell, rate_hz):
     for number, envelope in enumerate(
         (
             lambda time_s: 1 + 0.05 * np.cos(2 * np.pi * rate_hz * time_s + 1),
@@ -77,7 +77,7 @@ def test_slow_modulation_of_amplitude_or_phase_is_not_periodic(dwell, rate_hz):
         assert kind in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}
 
 
-def test_mains_hum_is_named(dwell):
+def test_mains_hum_in_a_dwell_is_named_as_such(dwell):
     """260 Hz and 50 Hz hum once gave period 26, the common period of both."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp(2j * np.pi * (50 - HZ) * time_s)).analysis.motion.verdict
     assert (verdict.kind, verdict.period) == (MotionKind.PERIODIC, 1)

@@ -112,7 +112,7 @@ def test_a_sweep_with_drop_outs_everywhere_is_refused():
         measured_sweep(recorded, plan)
 
 
-def test_the_first_and_last_intervals_use_samples_outside_the_sweep():
+def test_the_first_and_last_intervals_of_a_sweep_also_use_neighbouring_samples():
     """A displacement of constant amplitude is recorded for longer than the analysed sweep."""
     time, phase = sweep(6.0)
     rows = np.stack((np.cos(phase), -np.cos(phase) * np.gradient(phase, time) ** 2, np.zeros(time.size)))
@@ -166,7 +166,7 @@ def test_recorded_sweep_phase_is_unaffected_by_a_clock_difference():
     assert phase.frequency_hz[at] == pytest.approx(349 + 10e-6 * (150 + 2 * 199), abs=0.01)
 
 
-def test_all_orders_are_separated_without_whole_periods_per_interval():
+def test_all_orders_are_separated_even_if_an_interval_holds_no_whole_number_of_periods():
     _, phase = sweep(20)
     parts = {0.5: 0.2 - 0.1j, 1.0: 2.0 + 1j, 1.5: 0.05j, 2.0: -0.3 + 0j, 3.0: 0.1 + 0.2j}
     x = 0.7 + sum(np.real(a * np.exp(1j * k * phase)) for k, a in parts.items())

@@ -30,7 +30,7 @@ def test_a_sine_on_a_line_has_half_its_squared_amplitude_as_power():
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
-def test_density_bounds_contain_the_true_density_in_95_percent(overlap):
+def test_density_bounds_contain_the_true_density_in_95_percent_of_cases(overlap):
     rng = np.random.default_rng(2)
     inside = trials = 0
     for _ in range(300):

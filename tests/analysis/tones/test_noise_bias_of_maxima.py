@@ -17,7 +17,7 @@ def test_the_maximum_of_one_second_of_noise_is_4_4_standard_deviations():
 
 
 @pytest.mark.parametrize("noise_sd", [0.02, 0.2])
-def test_noise_raises_the_maximum_of_a_sine_as_in_repeated_draws(noise_sd):
+def test_the_increase_of_the_maximum_of_a_sine_by_noise_matches_repeated_draws(noise_sd):
     rng = np.random.default_rng(1)
     motion = np.cos(2 * np.pi * 0.037 * np.arange(2000))
     drawn = [np.max(np.abs(motion + noise_sd * rng.standard_normal(2000))) - 1 for _ in range(400)]
@@ -43,7 +43,7 @@ def test_fewer_independent_values_raise_a_maximum_less():
     noise_sd=st.floats(1e-6, 1e3),
     independent=st.floats(0.1, 100.0),
 )
-def test_noise_never_lowers_a_maximum_or_narrows_its_bound_below_the_increase(motion, noise_sd, independent):
+def test_noise_never_lowers_a_maximum_and_its_bound_includes_the_increase(motion, noise_sd, independent):
     lift = noise_lift(motion, noise_sd, independent)
     assert 0.0 <= lift.bias <= lift.error < np.inf
 

@@ -113,7 +113,7 @@ def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, wea
         assert budget.share(Cause.CHANCE) == 0.0
 
 
-def test_unstated_uncertainties_are_listed_and_not_zero(weak):
+def test_unstated_uncertainties_are_listed_and_not_taken_as_zero(weak):
     amplitude, _, second = budgets_of(weak)
     assert second.not_stated == (
         Cause.VIBROMETER,
@@ -137,7 +137,7 @@ def test_a_value_without_a_stated_uncertainty_has_no_coverage_factor():
     assert budget.sentence == "A0 32.68 µm (not stated: chance)"
 
 
-def test_calibration_source_and_date_reach_the_document(weak):
+def test_an_uncertainty_document_states_source_and_date_of_each_calibration(weak):
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
     stated = stated_uncertainties(facts.bench, facts.response)
     assert stated.response[0].source == "vibrometer: certificate 17 (calibrated 2026-02-10)"
@@ -149,7 +149,7 @@ def test_calibration_source_and_date_reach_the_document(weak):
     assert parts["vibrometer calibration"] == pytest.approx(0.006 * document["value"])
 
 
-def test_the_response_i_budget_of_an_aperiodic_motion_includes_chance(dwell_file):
+def test_the_response_i_budget_of_an_aperiodic_motion_includes_the_random_error(dwell_file):
     results = analyse_files([dwell_file("strong")], "strong", Simulation.LEFT_OUT)
     (strong,) = results.results
     _, first, second = budgets_of(strong)
@@ -161,7 +161,7 @@ def test_the_response_i_budget_of_an_aperiodic_motion_includes_chance(dwell_file
     assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]
 
 
-def test_each_resonance_has_a_budget_with_no_calibration_in_its_damping(noise_file):
+def test_each_resonance_has_a_budget_and_the_budget_of_damping_has_no_calibration(noise_file):
     (noise,) = analyse_files([noise_file()], "noise", Simulation.LEFT_OUT).results
     budgets = budgets_of(noise)
     assert len(budgets) == 3 * len(noise.analysis.response.resonances) > 0

@@ -43,7 +43,7 @@ def test_the_uncertainty_of_noise_matches_its_prediction(tmp_path):
 
 
 @pytest.mark.parametrize("damping_time_s", [1.2e-5, 2.05e-5, 2.9e-5])
-def test_a_prediction_without_noise_on_its_lines_can_be_fitted(damping_time_s):
+def test_a_transmission_predicted_without_noise_can_still_be_fitted(damping_time_s):
     """A mode with an amplitude of exactly zero once made the fit raise LinAlgError."""
     specimen = RIG.specimen.model_copy(update={"damping_time_s": damping_time_s})
     rig = RIG.model_copy(update={"specimen": specimen})
@@ -89,7 +89,7 @@ def dwell(at_hz, level_vpp):
     return Measurement(name="dwell", excitation=excitation)
 
 
-def test_chance_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_dwell():
+def test_random_error_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_dwell():
     first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
@@ -176,7 +176,7 @@ def test_expected_uncertainty_handles_every_shipped_specimen(name):
 
 
 @pytest.mark.parametrize(("duration_s", "window_s"), [(2.0, 2.0), (30.0, 5.0)])
-def test_a_dwell_is_analysed_over_its_window_or_completely(duration_s, window_s):
+def test_a_dwell_is_analysed_over_its_window_or_over_its_whole_length(duration_s, window_s):
     """A dwell of 4 s was once described as "after 5 s as planned"."""
     dwell = Dwell(amplitude_vpp=0.05, frequency_hz=130.0, settle_s=1.0, duration_s=duration_s)
     found = expected_uncertainty(Measurement(name="dwell", excitation=dwell), RIG)

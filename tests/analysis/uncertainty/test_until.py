@@ -30,14 +30,14 @@ def reachable_uncertainty(time_s):
 
 
 @pytest.mark.thorough
-def test_the_time_to_a_target_inverts_the_expected_uncertainty():
+def test_the_time_to_reach_a_target_is_the_inverse_of_the_expected_uncertainty():
     for time_s in (20.0, 80.0, 320.0):
         found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         assert found_s == pytest.approx(time_s, rel=1e-6)
 
 
 @pytest.mark.thorough
-def test_a_recording_is_predicted_to_end_at_an_analysis_or_at_its_longest_time():
+def test_the_predicted_end_of_a_recording_is_at_an_analysis_or_at_its_longest_time():
     times_s = [
         expected_recorded_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         for time_s in (1.0, 12.0, 1000.0)
@@ -81,7 +81,7 @@ def test_an_impossible_distribution_of_time_is_refused_in_one_sentence(until, ti
         fit_to(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
 
 
-def test_stopping_early_widens_noise_and_chance_but_not_calibrations():
+def test_early_stopping_widens_noise_and_random_error_but_not_calibration_uncertainty():
     parts = [Contribution(cause, 0.01, "x") for cause in (Cause.NOISE, Cause.CHANCE, Cause.VIBROMETER)]
     budget = Budget("Response I", 2.0, "", (*parts, Contribution(Cause.NOISE, None, "y"))).widen()
     assert [each.relative for each in budget.contributions] == [0.01 * WIDENING, 0.01 * WIDENING, 0.01, None]
