@@ -189,7 +189,7 @@ def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("when", WHEN)
-def test_recordings_are_listed_despite_an_unremovable_catalogue(library, tmp_path, when):
+def test_recordings_are_listed_even_if_the_catalogue_cannot_be_removed(library, tmp_path, when):
     (tmp_path / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
     listed = run_with_fault(library, CATALOGUE, tmp_path, "unlink", when)
     assert (listed.stdout, listed.stderr) == ("1 1\n", "")
@@ -247,7 +247,7 @@ def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_rename_that_reports_an_error_after_success_does_not_end_the_campaign(library, tmp_path, number):
+def test_a_rename_that_succeeds_but_reports_an_error_does_not_end_the_campaign(library, tmp_path, number):
     recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     with KilledCampaigns(library) as runs:
         run = runs.run(tmp_path, kind="rename after ENOSPC", number=number)

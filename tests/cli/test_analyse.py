@@ -95,7 +95,7 @@ def test_a_bad_recording_does_not_prevent_the_analysis_of_other_recordings(viben
     assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 
 
-def test_a_single_bad_recording_leaves_no_report(vibench_here, tmp_path):
+def test_a_bad_recording_analysed_alone_leaves_no_report(vibench_here, tmp_path):
     (tmp_path / "nothing.h5").touch()
     done = vibench_here("analyse", "nothing.h5", cwd=tmp_path)
     assert done.returncode == 1
@@ -154,7 +154,7 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
     assert said in sentence(changed_copy(good, tmp_path, change))
 
 
-def test_dead_clipped_and_lost_channels_are_named_in_a_sentence(noise, tmp_path):
+def test_channels_that_are_dead_or_clipped_or_lost_are_named_in_a_sentence(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
     assert "all samples of m0_velocity have the same value" in sentence(dead)

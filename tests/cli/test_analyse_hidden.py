@@ -79,7 +79,7 @@ def test_a_stored_hidden_motion_is_exported_with_the_recording(vibench_here, sha
     assert kept["impact_impulse"]["values"].size == kept["impact_time"]["values"].size
 
 
-def test_the_keep_option_without_hidden_is_refused(vibench_here, shaken, tmp_path):
+def test_the_option_keep_is_refused_without_the_option_hidden(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--keep", cwd=tmp_path)
     assert done.returncode != 0
     assert "--keep was given without --hidden" in done.stderr

@@ -24,7 +24,7 @@ def test_an_estimate_is_one_json_document_and_writes_no_file(output_of, tmp_path
     assert not (tmp_path / "out").exists()
 
 
-def test_an_estimate_states_the_uncertainty_of_noise_in_a_sweep(output_of, tmp_path):
+def test_the_estimate_of_a_sweep_of_noise_levels_states_their_expected_uncertainty(output_of, tmp_path):
     plan, bench = short_points(tmp_path, 1), slow_rig(tmp_path)
     noise = '{ kind = "white_noise", band_start_hz = 50, band_stop_hz = 600, realisations = 2 }'
     text = f'name = "c"\n[[sweeps]]\nname = "noise"\nmeasurement = {{ excitation = {noise} }}\n'
@@ -42,7 +42,7 @@ def test_an_estimate_refuses_a_level_beyond_the_limits(refusal, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_campaign_is_logged_catalogued_and_its_end_notified(vibench, tmp_path):
+def test_a_campaign_is_logged_and_catalogued_and_its_end_is_notified(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
     measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)
@@ -84,7 +84,7 @@ def test_a_knob_sheet_does_not_overwrite_another_kind_of_file(vibench_here, tmp_
     assert plan.read_text() == before
 
 
-def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
+def test_an_estimate_in_words_states_the_lead_in_times_and_that_the_disk_is_too_small():
     times = {"duration_s": 3723.4, "rest_s": 120.0, "lead_in_s": 60.0}
     sizes = {"largest_bytes": 10**6, "total_bytes": 2 * 10**6, "free_bytes": 10**6}
     expected = CampaignEstimate(recordings=3, kept=2, **times, **sizes)
@@ -99,7 +99,7 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
 
 
 @pytest.mark.thorough
-def test_an_estimate_refuses_a_branch_beyond_the_fast_loop(refusal, tmp_path):
+def test_an_estimate_refuses_a_branch_that_the_fast_loop_cannot_hold(refusal, tmp_path):
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")
     bench = tmp_path / "late.toml"

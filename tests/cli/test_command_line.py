@@ -50,7 +50,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
 
 
 @pytest.mark.thorough
-def test_measure_export_and_pack_report_their_files_as_json(vibench_here, tmp_path):
+def test_the_commands_measure_export_and_pack_report_their_files_as_json(vibench_here, tmp_path):
     measured = vibench_here("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
     (row,) = json.loads(measured.stdout)["recordings"]
     assert (row["name"], row["outcome"]) == ("dwell", "recorded")
@@ -104,7 +104,7 @@ def test_a_wrong_campaign_is_refused_in_one_sentence_before_output(refusal, tmp_
     assert not list(tmp_path.glob("recordings/*"))
 
 
-def test_missing_instruments_are_reported_in_one_sentence(refusal, tmp_path):
+def test_a_missing_instrument_is_reported_in_one_sentence(refusal, tmp_path):
     text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     bench = tmp_path / "bench.toml"
     real = text.split("\n[virtual]\n")[0]
@@ -180,7 +180,7 @@ def test_an_impossible_folder_is_refused_before_computation(refusal, tmp_path, w
 
 
 @pytest.mark.parametrize("words", [("--amplitude", "5um"), ("--amplitude", "5e-6", "--gap=45um")])
-def test_a_number_with_unit_is_refused_with_the_allowed_form(vibench_here, tmp_path, words):
+def test_a_number_with_a_unit_is_refused_and_the_allowed_form_stated(vibench_here, tmp_path, words):
     result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
     assert result.returncode == 1
     said = " ".join(result.stderr.replace("│", " ").split())
@@ -277,7 +277,7 @@ def test_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_pat
         ("chain", "--cells", "2", "--frequency", "100"),
     ],
 )
-def test_every_command_warns_if_micrometres_were_typed_as_metres(vibench_here, tmp_path, words):
+def test_every_command_warns_if_a_value_in_micrometres_was_typed_as_metres(vibench_here, tmp_path, words):
     """The invalid output path stops the command after the warning, before a long computation."""
     (tmp_path / "file").write_text("no folder", encoding="utf-8")
     given = ("--amplitude", "5", "--gap", "45", "--out", "file")
@@ -288,7 +288,7 @@ def test_every_command_warns_if_micrometres_were_typed_as_metres(vibench_here, t
     assert "if 5 micrometres were meant, give 5e-06" in said
 
 
-def test_a_map_warns_if_micrometres_were_typed_as_metres(vibench_here, tmp_path):
+def test_a_map_warns_if_a_value_in_micrometres_was_typed_as_metres(vibench_here, tmp_path):
     (tmp_path / "map.toml").write_text("gap_m = 45\namplitude_m = { start = 1, stop = 50, points = 5 }\n")
     said = vibench_here("map", "map.toml", "--out", "map", "--estimate", cwd=tmp_path).stderr
     assert "warning: a gap of 45 m" in said

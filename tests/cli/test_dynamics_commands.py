@@ -72,7 +72,7 @@ def test_a_real_time_controller_extends_the_holdable_motions():
 
 
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
-def test_rounding_causes_no_instability_or_bifurcation_without_damping(options):
+def test_an_undamped_branch_gets_no_instability_or_bifurcation_from_rounding(options):
     line = ("--amplitude", 5e-6, "--frequency", "200:201", "--places", 2, "--starts", 1)
     found = answer("branches", "--damping-time", 0, *line, *options)
     smooth = max(found["branches"], key=lambda each: len(each["points"]))
@@ -115,7 +115,7 @@ def test_an_invalid_number_is_quoted_as_typed(command, value):
 
 
 @pytest.mark.parametrize("command", [("spectrum", *POINT, "--duration"), ("branches", *LINE, "--places")])
-def test_an_invalid_zero_is_quoted_as_typed(command):
+def test_a_zero_that_is_not_allowed_is_quoted_as_typed(command):
     assert f"{command[-1]} was given as 0" in refusal_of(*command, "0")
 
 

@@ -23,7 +23,7 @@ print(order.index("vibench.cli.environment") < order.index("numpy"))
         ({"OPENBLAS_NUM_THREADS": "2", "MALLOC_MMAP_THRESHOLD_": "131072"}, ["2", "131072"]),
     ],
 )
-def test_thread_and_memory_settings_keep_the_values_chosen_by_the_user(chosen, expected):
+def test_the_thread_and_memory_settings_chosen_by_the_user_are_kept(chosen, expected):
     numbers = ("OPENBLAS_NUM_THREADS", "MALLOC_MMAP_THRESHOLD_")
     environment = {name: value for name, value in os.environ.items() if name not in numbers}
     result = subprocess.run(

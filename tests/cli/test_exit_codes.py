@@ -60,7 +60,7 @@ def example_value(words):
 
 
 @pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=example_value)
-def test_a_value_that_is_not_allowed_exits_1_in_every_command(vibench_here, tmp_path, words):
+def test_every_command_exits_1_at_a_value_that_is_not_allowed(vibench_here, tmp_path, words):
     ran = vibench_here(*words, cwd=tmp_path)
     assert ran.returncode == 1, ran.stderr
     assert "rror: " in ran.stderr
@@ -72,7 +72,7 @@ def test_an_incomplete_or_unknown_command_line_exits_2(vibench_here, tmp_path, w
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 
 
-def test_text_for_a_whole_number_is_refused_with_an_example(vibench_here, tmp_path):
+def test_text_in_place_of_a_whole_number_is_refused_with_an_example(vibench_here, tmp_path):
     said = vibench_here("analyse", "a.h5", "--draws", "abc", cwd=tmp_path).stderr
     assert "'abc' is not a whole number; give a number such as 5" in " ".join(said.split())
 

@@ -40,7 +40,7 @@ def vibench_stop(*words, **variables):
     )
 
 
-def test_stop_loads_only_the_standard_library():
+def test_the_fast_stop_loads_no_library_beyond_the_standard_library():
     with driving_program("north"):
         told = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
     said, others, ours = told.stdout.splitlines()
@@ -79,7 +79,7 @@ def test_the_fast_stop_stops_the_named_program():
 @pytest.mark.parametrize(
     ("words", "code"), [(("--level", "loud"), 1), (("--level",), 2), (("--pid", "x"), 1), (("--reason=",), 1)]
 )
-def test_arguments_that_the_fast_stop_does_not_handle_run_the_full_command(words, code):
+def test_arguments_that_the_fast_stop_does_not_handle_are_passed_to_the_full_command(words, code):
     with driving_program("north") as north:
         told = vibench_stop(*words)
         assert told.returncode == code, told.stderr

@@ -158,7 +158,7 @@ def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(bench_with, k
 
 
 @pytest.mark.parametrize(("does", "words"), [(return_nan, "not numbers"), (drop_a_row, "of shape")])
-def test_invalid_samples_end_check_and_run_with_a_sentence(bench_with, does, words, tmp_path):
+def test_invalid_samples_end_a_check_or_a_run_with_a_sentence(bench_with, does, words, tmp_path):
     path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", does))
     with open_bench(path) as bench:
         with pytest.raises(AcquisitionError, match=words):
@@ -215,7 +215,7 @@ def test_a_driver_that_raises_system_exit_is_reported(bench_with, outcome):
     assert "failed in open: SystemExit: 0" in said
 
 
-def test_a_failure_during_output_ends_silent_with_a_recorded_reason(bench_with, tmp_path):
+def test_a_failure_during_output_ends_in_silence_with_a_recorded_reason(bench_with, tmp_path):
     left = [15]
 
     def fail_later(found, *given):
@@ -233,7 +233,7 @@ def test_a_failure_during_output_ends_silent_with_a_recorded_reason(bench_with, 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
-def test_a_failed_close_after_a_complete_recording_states_that_the_recording_is_complete(
+def test_an_error_on_closing_after_a_complete_recording_calls_the_recording_complete(
     bench_with, kind, inside, outcome
 ):
     path = bench_with(kind, FaultyDriver(inside, "close", run_then_raise))

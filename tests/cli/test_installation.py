@@ -124,7 +124,7 @@ def test_the_doctor_reports_an_unwritable_state_folder_and_predictions_work(vibe
     assert predicted.returncode == 0, predicted.stderr
 
 
-def test_the_doctor_names_the_smallest_extra_with_a_library(monkeypatch):
+def test_the_doctor_names_the_smallest_extra_that_contains_a_missing_library(monkeypatch):
     def missing(name):
         raise PackageNotFoundError(name)
 
@@ -190,7 +190,7 @@ CORE_ALONE = [
 
 
 @pytest.mark.thorough
-def test_the_base_installation_supports_commands_without_figures_and_all_help(tmp_path):
+def test_the_base_installation_runs_all_help_and_all_commands_without_figures(tmp_path):
     helps = [(*words, "--help") for words in (*((name,) for name in COMMANDS), ("bench", "list"))]
     program = ONE_AFTER_ANOTHER.format(
         libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]

@@ -28,7 +28,7 @@ def test_numbers_are_not_cut_in_narrow_tables(page):
     assert "\u2026" not in text
 
 
-def test_a_prediction_fits_80_columns_with_all_its_columns(vibench_here, tmp_path):
+def test_the_full_table_of_a_prediction_fits_a_terminal_of_80_characters(vibench_here, tmp_path):
     asked = ("--model", "linear", "--observe", "response,lyapunov", "--frequency", "90:100:5")
     told = vibench_here("predict", "--amplitude", "3e-7", *asked, cwd=tmp_path, environment={"COLUMNS": "80"})
     assert told.returncode == 0, told.stderr

@@ -35,7 +35,7 @@ def test_a_prediction_equals_the_engine_result_at_every_frequency(vibench, tmp_p
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_prediction_until_settled_has_kind_and_error(output_of):
+def test_a_prediction_run_until_settled_has_kind_and_error(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "94:260:166", "--duration", "auto")
     periodic, chaotic = output_of("predict", *asked, "--json")["points"]
     assert (periodic["motion"], periodic["period"]) == ("periodic", 1)
@@ -69,7 +69,7 @@ def test_points_with_equal_explanations_share_one_line(output_of):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_metres_instead_of_micrometres_give_a_warning_beside_the_answer(vibench_here, tmp_path):
+def test_metres_typed_instead_of_micrometres_give_a_warning_beside_the_answer(vibench_here, tmp_path):
     asked = ("--amplitude", 5, "--frequency", 30, "--duration", 0.05, "--window", 0.04, "--model", "linear")
     ran = vibench_here("predict", *asked, "--json", cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr

@@ -24,7 +24,7 @@ class Log(io.StringIO):
         return count
 
 
-def test_without_a_terminal_progress_is_printed_as_lines():
+def test_progress_is_printed_as_lines_if_the_output_is_not_a_terminal():
     log = Log()
     with show_bars(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
         assert not log.written.wait(0.1), "a line without a bar"

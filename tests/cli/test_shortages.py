@@ -60,7 +60,7 @@ def test_too_few_file_descriptors_end_a_measurement_without_traceback(tmp_path, 
         (1100, ("demo",)),
     ],
 )
-def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, most_mb, arguments):
+def test_a_lack_of_address_space_is_reported_before_libraries_are_loaded(tmp_path, most_mb, arguments):
     ended = run_limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert re.fullmatch(
@@ -70,14 +70,14 @@ def test_too_little_address_space_is_refused_before_loading_libraries(tmp_path, 
     )
 
 
-def test_a_stop_without_memory_advises_to_switch_off(tmp_path):
+def test_a_stop_that_lacks_memory_advises_to_switch_the_amplifier_off(tmp_path):
     ended = run_limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
     assert ended.returncode == 1
     assert ended.stderr.endswith(f"{SWITCH_OFF}.\n")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, monkeypatch, name):
+def test_every_command_is_refused_if_address_space_is_lacking(vibench_here, tmp_path, monkeypatch, name):
     monkeypatch.setattr(resource, "getrlimit", lambda _: (100_000_000, resource.RLIM_INFINITY))
     ended = vibench_here(name, cwd=tmp_path)
     assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)

@@ -93,7 +93,7 @@ def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_h
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="containers as Linux has them")
-def test_programs_in_containers_with_a_shared_state_folder_are_all_found(vibench_here, tmp_path):
+def test_all_programs_are_found_in_containers_that_share_a_state_folder(vibench_here, tmp_path):
     """Both have process number 1 in their containers; neither may overwrite the other's announcement."""
     with ExitStack() as running:
         programs = [running.enter_context(driving_program(what, *CONTAINER)) for what in ("north", "south")]

@@ -118,7 +118,7 @@ def test_a_stop_during_a_cooling_pause_ends_the_campaign(vibench_here, tmp_path,
 @pytest.mark.parametrize(
     "level", ["off", *(pytest.param(each, marks=pytest.mark.thorough) for each in ("ramp", "abort"))]
 )
-def test_a_stop_of_a_held_run_keeps_its_recording_and_ends_silent(vibench_here, tmp_path, level):
+def test_a_stop_of_a_held_run_keeps_its_recording_and_ends_in_silence(vibench_here, tmp_path, level):
     with measuring_program(tmp_path, first_s=LONG_S, rest_s=0.0) as program:
         until(program, is_dwelling)
         assert vibench_here("stop", "--level", "hold", cwd=tmp_path).returncode == 0

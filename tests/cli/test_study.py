@@ -73,7 +73,7 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(ou
 @pytest.mark.thorough
 @pytest.mark.timeout(COMPILING_S)
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
-def test_ctrl_c_keeps_what_is_computed_and_resume_continues(vibench, tmp_path):
+def test_ctrl_c_keeps_the_computed_points_and_a_resume_continues(vibench, tmp_path):
     asked = plan(tmp_path, LONG)
     running = subprocess.Popen(
         [sys.executable, "-m", "vibench.cli", "study", str(asked), "--out", "a.h5"],

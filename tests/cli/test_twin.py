@@ -75,7 +75,7 @@ def events_and_gaps(tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_live_twin_reports_hidden_motion_and_a_change_ends_the_run_if_planned(running, tmp_path):
+def test_the_live_twin_reports_hidden_motion_and_a_change_ends_the_run_if_the_plan_says_so(running, tmp_path):
     client = running(campaign(STOPPING))
     told = until(client, is_tracked).twin
     assert told.stops_m == pytest.approx((-45e-6, 45e-6), rel=1e-2)
@@ -128,7 +128,7 @@ def test_a_killed_twin_is_reported_and_the_run_continues(running, tmp_path):
     assert gaps == ()
 
 
-def test_a_twin_continues_with_one_sentence_if_its_baseline_cannot_be_stored(tmp_path, monkeypatch, capsys):
+def test_a_twin_reports_a_baseline_that_cannot_be_stored_and_continues(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     rig = load_rig("virtual_rig")
     known = {Hidden.M1: KnownNumber(value=2.1e-3, low=2.0e-3, high=2.2e-3)}

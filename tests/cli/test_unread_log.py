@@ -20,7 +20,7 @@ excitation = {kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s 
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="pipes whose room is told, as Linux has them")
-def test_a_run_whose_log_is_not_read_can_be_stopped(tmp_path):
+def test_a_run_can_be_stopped_even_if_nothing_reads_its_log(tmp_path):
     fcntl = pytest.importorskip("fcntl")
     (tmp_path / "night.toml").write_text(CAMPAIGN)
     kept, written = os.pipe()

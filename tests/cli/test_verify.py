@@ -187,14 +187,14 @@ def test_a_recording_with_external_links_is_refused(vibench_here, folder, argume
     assert not list(folder.glob("*.csv"))
 
 
-def test_external_links_are_read_on_request(vibench_here, folder):
+def test_external_links_are_followed_on_request(vibench_here, folder):
     point_outside(folder / "two.h5")
     found = vibench_here("export", "two.h5", "--to", "csv", "--allow-external", cwd=folder)
     assert found.returncode == 0, found.stderr
     assert (folder / "two.csv").exists()
 
 
-def test_recover_follows_external_links_on_request(vibench_here, folder):
+def test_the_command_recover_follows_external_links_on_request(vibench_here, folder):
     with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     with h5py.File(folder / "five.h5.part", "r+") as file:
