@@ -247,7 +247,7 @@ def test_motions_near_grazing_are_refused_with_the_loop_multiplier(rig):
         require_held(fast, plan)
 
 
-def test_a_branch_without_start_or_force_in_the_model_is_refused():
+def test_a_branch_is_refused_if_the_model_has_no_periodic_motion_or_no_finite_force():
     stops, plan = rig_and_plan_with_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
     with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):
         require_held(fast_loop(stops), plan)

@@ -98,7 +98,7 @@ def test_multipliers_match_the_branch_with_contacts_shorter_than_a_sample():
 
 
 @pytest.mark.thorough
-def test_the_law_stabilises_all_motions_of_a_branch_even_with_a_wrong_model():
+def test_the_feedback_law_stabilises_all_motions_of_a_branch_even_with_a_wrong_model():
     found = branch()
     unstable = np.flatnonzero(~found.is_stable)
     assert unstable.size > 100
@@ -121,7 +121,7 @@ def test_pd_gains_on_m0_hold_the_branch_but_pd_gains_on_the_base_do_not():
 
 
 @pytest.mark.thorough
-def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
+def test_the_designed_gains_have_a_lower_cost_than_gains_of_zero_or_twice_their_size():
     """The cost is simulated with the noises that the design assumes."""
     model, rng = plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
@@ -149,7 +149,7 @@ def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
 
 
 @pytest.mark.thorough
-def test_a_delayed_law_that_destabilises_motions_is_reported():
+def test_a_feedback_law_whose_delay_destabilises_motions_is_reported():
     late = plant(2e-3)
     hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))
     found = branch()
@@ -170,7 +170,7 @@ def test_no_law_holds_the_branch_with_a_latency_above_a_millisecond():
     assert largest[2] > 1.1
 
 
-def test_the_played_signal_moves_the_base_by_the_transfer_function():
+def test_the_played_signal_moves_the_base_as_the_transfer_function_states():
     model = plant(specimen=LINEAR)
     law = design_law(model)
     step, volt = model.step

@@ -162,7 +162,7 @@ def test_a_lost_connection_is_reported_and_closes_the_safety_gate(playing_board)
 
 
 @pytest.mark.thorough
-def test_a_stream_that_ends_is_reported_and_silenced(playing_board):
+def test_a_sample_stream_that_ends_is_reported_and_the_board_silenced(playing_board):
     board, bench = playing_board
     board.is_mute = True
     bench.digitizer.read(6400)
