@@ -59,7 +59,7 @@ def test_a_window_busy_for_one_second_does_not_stop_a_campaign(window, qtbot):
 
 
 @pytest.mark.thorough
-def test_a_new_engine_does_not_show_data_of_a_killed_engine(window, qtbot):
+def test_the_plots_of_a_new_engine_do_not_show_data_of_a_killed_engine(window, qtbot):
     """Commands to the dead engine were awaited, and the next engine's run continued the old plots."""
     bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))
     page = window.pages[RUN]

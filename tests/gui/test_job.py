@@ -163,7 +163,7 @@ def read_and_start(qtbot, window):
 
 
 @pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
-def test_measuring_to_export_works_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
+def test_a_test_can_be_measured_and_exported_by_keyboard(bench, qtbot, tmp_path, qapp, width, height, points):
     """Make a measurement, open it, compare it with earlier ones and export it."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
@@ -205,7 +205,7 @@ def test_measuring_to_export_works_by_keyboard(bench, qtbot, tmp_path, qapp, wid
     qapp.setFont(font)
 
 
-def test_measuring_to_export_works_by_mouse(bench, qtbot, tmp_path):
+def test_a_test_can_be_measured_and_exported_by_mouse(bench, qtbot, tmp_path):
     """Only the file name is typed."""
 
     def point_at(widget, place=None):
@@ -375,7 +375,7 @@ def test_the_current_noise_average_can_be_rejected(bench, qtbot):
     assert analyse(Path(newest_row(bench).file)).response.periodic.realisations == 11
 
 
-def test_an_error_message_disappears_when_its_request_is_fulfilled(bench, qtbot):
+def test_an_error_message_disappears_once_its_request_succeeds(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.start()
     assert "nothing is armed" in bench.strip.notices[-1].what

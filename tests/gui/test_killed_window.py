@@ -71,7 +71,7 @@ def test_the_drive_is_silenced_when_the_window_dies_or_freezes(tmp_path, number)
     ],
 )
 @pytest.mark.timeout(900)
-def test_a_drive_stops_when_the_window_dies_but_not_on_a_busy_computer(tmp_path, number, attended_s):
+def test_the_drive_stops_if_the_window_dies_but_not_if_the_computer_is_busy(tmp_path, number, attended_s):
     """The window's heartbeat thread waited up to 1.6 s for Python's global lock."""
     with (
         measuring_window(tmp_path, Supervision.ATTENDED, tmp_path / "state", VIEWER_PATIENCE_S) as window,

@@ -121,7 +121,7 @@ def test_a_request_after_a_dropped_request_is_answered(background, qtbot, qapp):
 
 
 @pytest.mark.thorough
-def test_a_process_with_a_dropped_request_is_ended_and_the_next_request_runs(
+def test_a_process_busy_with_a_dropped_request_is_ended_and_the_next_request_runs(
     background, qtbot, qapp, tmp_path
 ):
     answers, errors = [], []

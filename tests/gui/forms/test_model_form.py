@@ -83,7 +83,7 @@ def test_non_numeric_text_shows_an_error_at_its_field_and_keeps_the_plan(form, q
     assert form.content()["ramp_s"] == MEASUREMENTS["quick-dwell"].ramp_s
 
 
-def test_text_in_a_group_that_is_switched_off_does_not_block_the_plan(qtbot):
+def test_invalid_text_in_a_group_that_is_switched_off_does_not_block_the_plan(qtbot):
     form = ValidatedForm(Measurement, "test")
     qtbot.addWidget(form)
     form.show_value(next(iter(MEASUREMENTS.values())))

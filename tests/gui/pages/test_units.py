@@ -216,7 +216,7 @@ def test_a_field_accepts_its_displayed_text_and_any_stated_unit(unit, shown, tex
     assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
 
 
-def test_a_value_keeps_its_digits_in_coarser_units(qtbot):
+def test_a_value_keeps_its_digits_when_shown_in_a_coarser_unit(qtbot):
     form = ValidatedForm(HeldDwell, "dwell")
     qtbot.addWidget(form)
     form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})

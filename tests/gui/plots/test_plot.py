@@ -146,7 +146,7 @@ def test_axis_ranges_follow_curves_and_ignore_error_bands(plot, qapp):
     assert 0.5 < low < high < 1.5
 
 
-def test_the_cursor_reads_values_and_differences_from_a_mark(plot, qapp, qtbot):
+def test_the_cursor_shows_values_and_their_differences_from_a_mark(plot, qapp, qtbot):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.0, 0.004, 0.002])
     plot.show()
     qapp.processEvents()

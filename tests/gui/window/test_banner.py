@@ -9,7 +9,7 @@ from vibench.gui.window.banner import Banner, StateIndicator
 READABLE = 4.5
 
 
-def test_the_banner_shows_the_state_by_symbol_word_and_colour(qtbot):
+def test_the_banner_shows_the_state_by_a_symbol_a_word_and_a_colour(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
@@ -55,6 +55,6 @@ def test_the_stop_button_states_its_action_and_does_not_move(qtbot):
     assert button.geometry() == before
 
 
-def test_the_window_does_not_open_with_the_focus_on_stop(window, qtbot):
+def test_the_stop_button_does_not_have_the_focus_when_the_window_opens(window, qtbot):
     qtbot.waitUntil(lambda: window.focusWidget() is not None)
     assert window.focusWidget().objectName() != "stop"

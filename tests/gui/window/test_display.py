@@ -39,7 +39,7 @@ def test_missing_libraries_are_reported_with_the_packages_to_install(monkeypatch
     assert "libxkbcommon-x11-0" in said
 
 
-def test_qt_that_cannot_be_loaded_is_reported_in_one_sentence(tmp_path):
+def test_a_qt_library_that_cannot_be_loaded_is_reported_in_one_sentence(tmp_path):
     """As on a machine without the libraries that Qt links to."""
     package = tmp_path / "PySide6"
     package.mkdir()

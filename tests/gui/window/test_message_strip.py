@@ -18,7 +18,7 @@ def button(strip, text):
     return next(each for each in strip.findChildren(QPushButton) if each.text() == text)
 
 
-def test_the_message_strip_shows_event_reaction_and_advice(qtbot):
+def test_the_message_strip_shows_the_event_the_reaction_and_advice(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.WARNING, "The disk is nearly full.", "Recording goes on.", "Make room."))
@@ -29,7 +29,7 @@ def test_the_message_strip_shows_event_reaction_and_advice(qtbot):
     assert text.startswith("⚠")
 
 
-def test_copy_puts_the_whole_message_on_the_clipboard(qtbot):
+def test_the_copy_button_puts_the_whole_message_on_the_clipboard(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
     strip.say(notice_of(LimitExceeded("noise: the stroke would be 5 mm")))

@@ -146,7 +146,7 @@ def test_help_works_offline_and_lists_installed_versions(window, qtbot):
     about.close()
 
 
-def test_a_bench_that_is_missing_is_refused_before_a_window_opens(tmp_path, capsys):
+def test_a_missing_bench_file_is_refused_before_a_window_opens(tmp_path, capsys):
     assert main(["--bench", str(tmp_path / "missing.toml")]) == NO_WINDOW
     said = capsys.readouterr().err
     assert "missing.toml" in said
@@ -160,7 +160,7 @@ def test_control_characters_in_a_bench_name_have_no_effect(tmp_path, capsys):
     assert r"a\x1b[2J\u202e.toml: name = 1" in capsys.readouterr().err
 
 
-def test_the_window_of_the_start_message_is_titled_vibench(qapp):
+def test_the_start_message_appears_in_a_window_titled_vibench(qapp):
     """The title was the name of the program file."""
     label = _sign_of_life()
     assert label.windowTitle() == "vibench"

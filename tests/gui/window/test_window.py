@@ -28,7 +28,7 @@ def parts_of(window, page):
 
 
 @pytest.mark.thorough
-def test_a_restart_restores_theme_page_and_test_without_arming(window, qapp, own_state, tmp_path):
+def test_a_restart_restores_the_theme_the_page_and_the_test_without_arming(window, qapp, own_state, tmp_path):
     window.context.choose_theme(DARK)
     window.show_page(TEST)
     form = window.pages[TEST].form.form
@@ -58,7 +58,7 @@ def test_banner_and_stop_are_visible_on_every_page(lasting_window, qapp):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
-def test_a_command_without_a_bench_shows_the_next_step(window, order):
+def test_a_command_that_needs_a_bench_shows_the_next_step(window, order):
     getattr(window.user_actions, order)()
     newest = window.strip.notices[-1]
     assert newest.next_step

@@ -196,7 +196,7 @@ def test_a_broken_file_shows_the_reason_and_a_remedy(page, show_file, folder, qt
     assert len(show_file("whole.h5").time_histories.plots) == 3
 
 
-def test_keys_zoom_pan_and_reset_the_view(show_file, qtbot):
+def test_the_view_can_be_zoomed_panned_and_reset_by_keys(show_file, qtbot):
     page = show_file("whole.h5")
     qtbot.keyClick(page.time_histories, Qt.Key.Key_Plus)
     low_s, high_s = page.time_histories.view_s
@@ -388,14 +388,14 @@ def test_the_text_of_a_forged_note_is_not_shown(record, tmp_path):
     assert "results changed since they were saved: note" in said
 
 
-def test_the_summary_shows_the_state_once(begin_recording, tmp_path):
+def test_the_summary_of_a_recording_shows_its_state_once(begin_recording, tmp_path):
     writer, _ = begin_recording(tmp_path, "ended")
     path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
     with open_recording(path) as recording:
         assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_its_data_size_not_the_reserved_size(begin_recording, tmp_path, wait_for):
+def test_a_growing_file_shows_the_size_of_its_data_and_not_of_its_space(begin_recording, tmp_path, wait_for):
     """A long run was shown as 512 MB one second after its start."""
     writer, part = begin_recording(tmp_path, "grows")
     wait_for(lambda: writer.committed_samples == 6400)

@@ -69,7 +69,7 @@ def test_the_visible_part_can_be_refined(page, wait_for):
 
 
 @pytest.mark.thorough
-def test_clicking_a_point_shows_its_motion_and_opens_it_in_simulate(page, wait_for):
+def test_clicking_a_point_of_a_map_shows_its_motion_and_opens_it_on_the_simulate_page(page, wait_for):
     compute_map(page, wait_for)
     wanted, pages = [], []
     page.context.scene_requested.connect(lambda *point: wanted.append(point))
@@ -95,7 +95,7 @@ def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
     assert up.tolist() == [6e-6, 7e-6]
 
 
-def test_too_large_a_map_is_refused_with_an_explanation(page):
+def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
     page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
     assert not page._begin.isEnabled()
     assert "810000 points are too many for the window" in page.form.complaint

@@ -32,7 +32,7 @@ def test_a_level_sweep_makes_one_recording_per_level():
     assert levels == [1.5, 0.5, 1.0, 1.5, 2.0, 2.5]
 
 
-def test_a_sweep_beyond_the_generator_is_refused():
+def test_a_sweep_beyond_the_range_of_the_generator_is_refused():
     with pytest.raises(ConfigurationError, match=r"amplitude_vpp"):
         with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2), RIG)
 

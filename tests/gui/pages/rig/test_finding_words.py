@@ -40,7 +40,7 @@ def test_value_and_uncertainty_of_a_finding_share_one_unit_prefix():
     assert measured_text(finding(1.2e-3, "V", uncertainty=4e-5)) == "1.2 ± 0.04 mV"
 
 
-def test_advice_follows_the_expected_value_of_a_finding():
+def test_the_advice_of_a_finding_is_shown_after_its_expected_value():
     assert (
         expected_text(finding(1.0, "V", advice="look at the cable")) == "0.005 V or less. Look at the cable"
     )

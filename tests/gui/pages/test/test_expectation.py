@@ -27,14 +27,14 @@ def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     assert page.expectation.text() == ""
 
 
-def test_a_test_with_until_shows_its_predicted_time(page):
+def test_a_test_with_an_until_bound_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
     page._on_result(preview.predict_test(preview.TestPreview(test, RIG)))
     assert page.expectation.text().startswith("Records until the results are known, about 2 s. Expected")
 
 
-def test_a_branch_beyond_the_fast_loop_is_refused_with_the_reason(page):
+def test_a_branch_that_the_fast_loop_cannot_hold_is_refused_with_the_reason(page):
     fast_loop = pytest.importorskip(
         "vibench_fast_loop.branch_continuation", reason="pip install -e extensions/fast_loop"
     )
