@@ -32,7 +32,7 @@ def judge(values_by_damping, *wanted, tried=(DAMPED, VERY_DAMPED)):
     return judgement(make(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
 
 
-def test_a_claim_takes_its_key_and_text_from_its_function():
+def test_the_key_and_text_of_a_claim_come_from_its_function():
     @claim("section 3", "Read off.", at_least("peak", "Hz", 95.0), draws=3)
     def first_peak(_reading):
         """The first peak
@@ -108,7 +108,7 @@ def test_expectation_bounds_include_their_ends(low, width, value):
     assert wanted.is_met_by((value,)) == (low <= value <= low + width)
 
 
-def test_empty_bounds_of_a_claim_are_refused():
+def test_expectation_bounds_in_the_wrong_order_are_refused():
     with pytest.raises(InvalidRequest, match="lower bound first"):
         Expectation("peak", "Hz", 2.0, 1.0)
 

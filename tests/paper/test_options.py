@@ -94,7 +94,7 @@ def test_the_exponents_option_uses_ode45_only_for_colliding_points():
     assert Reading(NOTHING, CASE).exponents_of(curve, 5e-6)[1] == 110.0
 
 
-def test_options_for_sum_logarithm_and_gap_are_applied():
+def test_the_options_for_sum_and_logarithm_and_gap_are_applied():
     case = case_for("sum=3@0.1+7@0.9", "log=m", "gap=30e-6")
     assert (case.sum_model, case.logarithm_of, case.gap_m) == (
         "power:3@0.1+7@0.9",

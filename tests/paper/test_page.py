@@ -67,7 +67,7 @@ def test_the_claims_page_counts_verdicts_and_shows_values(found):
     assert rows(page)["third"].endswith("| **does not hold** |")
 
 
-def test_the_page_lists_only_options_that_uphold_a_claim(found):
+def test_the_claims_page_lists_only_options_under_which_a_claim_holds(found):
     page = reproduction_document(found)
     assert "It holds under c = 3e-05 s · k: exponent: 130 1/s." in page
     assert "exponent: 60 1/s" not in page

@@ -54,7 +54,7 @@ def test_a_paper_figure_is_saved_in_every_format_with_its_table(solver, number, 
 
 
 @pytest.mark.thorough
-def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solver):
+def test_figure_3_has_three_resonances_at_the_weak_level_and_two_others_at_the_strong_level(solver):
     weak, *_, strong = draw(solver, 3).tables
     f = numbers(weak, "frequency_hz")
 
@@ -92,7 +92,7 @@ def test_collision_shading_extends_halfway_to_neighbouring_points():
 
 
 @pytest.mark.thorough
-def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solver):
+def test_figure_5_shows_more_collisions_without_damping_and_at_a_larger_amplitude(solver):
     (table,) = draw(solver, 5).tables
     share = {name: numbers(table, f"collides_{name}").mean() for name in ("damped", "undamped", "damped_7um")}
     assert share["damped"] < share["undamped"]
@@ -100,7 +100,7 @@ def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solver
 
 
 @pytest.mark.thorough
-def test_figure_7_has_the_papers_rates_at_the_weakest_level(solver):
+def test_figure_7_has_the_rates_of_the_paper_at_the_weakest_level(solver):
     caption = draw(solver, 7).caption
     assert "log10 of the response [mm]" in caption
     titles = [axes.get_title() for axes in draw(solver, 7).figure.axes]
