@@ -83,7 +83,7 @@ def test_exchanging_unequal_stops_mirrors_the_motion(frequency_hz, amplitude_m, 
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7, 29, 47])
-def test_a_free_power_oscillator_has_the_period_of_its_closed_form(exponent):
+def test_a_free_oscillator_with_a_power_law_has_its_closed_form_period(exponent):
     # For the highest exponents the force at 40 um is weak: 5e-3 N for p^47, a period of 50 ms.
     specimen = colliding_pair(PowerLaw(46e-6, ((exponent, 5.0),)), faint=(1e-9, 2e-9, 3e-9))
     amplitude, force = 40e-6, 5.0
@@ -159,7 +159,7 @@ def test_the_speed_after_a_lossy_collision_matches_the_closed_form(speed, loss):
 
 
 @pytest.mark.parametrize("contact", ["power:5", "linear_gap", "hunt_crossley:0.5"])
-def test_a_sampled_sine_drives_any_law_like_the_sine_itself(contact):
+def test_a_sampled_sine_gives_the_same_motion_as_the_sine_under_any_contact_law(contact):
     specimen, rate = paper(contact), 20_000.0
     sine = DRIVE.amplitude_m * np.sin(2.0 * np.pi * DRIVE.frequency_hz * np.arange(1300) / rate)
     sampled = integrate(specimen, Sampled(sine, rate), 0.05, Accuracy.REFERENCE)

@@ -104,7 +104,7 @@ def test_the_smallest_gaps_agree_with_direct_integration(contact, gap_m):
 @pytest.mark.thorough
 @pytest.mark.parametrize("contact", [*SPRINGY, *POWERS])
 @pytest.mark.parametrize("drive", [Harmonic(130.0, 1e-2), Harmonic(50e3, 1e-2)])
-def test_very_large_drives_agree_with_direct_integration(contact, drive):
+def test_motions_under_very_large_drives_agree_with_direct_integration(contact, drive):
     specimen, duration_s = paper(contact), 0.0015
     ours = integrate(specimen, drive, duration_s, Accuracy.REFERENCE)
     theirs = as_written(specimen, drive, duration_s, longest_step_s=1e-6)

@@ -167,7 +167,7 @@ def test_a_hard_impact_oscillator_has_the_exponent_of_its_closed_form_flow(case)
     assert (found.verdict is ExponentVerdict.CHAOTIC) == (RECOMPUTED[case] > 0.0)
 
 
-def test_each_hard_impact_adds_twice_the_logarithm_of_the_restitution():
+def test_each_hard_impact_adds_twice_the_logarithm_of_restitution_to_the_sum_of_exponents():
     specimen, drive = hard(2.8, 0.8)
     period = 2.0 * math.pi / 2.8
     found = lyapunov_spectrum(
@@ -224,7 +224,7 @@ def test_two_attractors_coexist_just_above_grazing(omega, chaotic, largest):
 
 
 @pytest.mark.parametrize("omega", [0.72, 0.76])
-def test_the_soft_oscillator_below_grazing_decays_by_its_damper(omega):
+def test_below_grazing_the_exponent_of_the_soft_oscillator_is_the_decay_by_its_damper(omega):
     found = exponent(soft(omega), omega, 500)
     assert found.source is Source.MODES
     assert found.exponent_per_s == pytest.approx(-0.01, rel=1e-7)

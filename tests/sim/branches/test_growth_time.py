@@ -15,7 +15,7 @@ PERIODS = 12
 
 
 @pytest.mark.thorough
-def test_distance_from_an_unstable_motion_grows_by_factor_e_per_growth_time():
+def test_the_distance_from_an_unstable_motion_grows_by_a_factor_of_e_in_one_growth_time():
     specimen = replace(gong2025(), contact=PowerLaw(100e-6, ((3, 0.1 * gong2025().stiffnesses[1] * 100e-6),)))
     found = next(shoot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
     branch = found.branch

@@ -46,7 +46,7 @@ def test_a_branch_over_the_drive_level_folds_at_the_ends_of_its_unstable_part(fr
 
 
 @pytest.mark.thorough
-def test_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
+def test_the_motion_with_contacts_begins_at_0_818_um_and_97_95_hz():
     specimen, path = gong2025(), AmplitudePath(97.95)
     found = list(shoot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))
     levels = [

@@ -172,7 +172,7 @@ def test_the_asymmetric_branch_begins_and_ends_at_symmetry_breaking(near_the_fir
     assert sorted(joins) == pytest.approx(sorted(own), abs=0.02)
 
 
-def test_the_linear_motion_at_a_grazing_point_equals_the_gap():
+def test_the_linear_motion_at_a_grazing_point_just_reaches_the_stop():
     specimen = gong2025()
     free = gong2025(contact="linear")
     linear = steady_response(free, Harmonic(60.0, 1e-6), "reference", 20.0, 1.0)

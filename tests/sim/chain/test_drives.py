@@ -75,7 +75,7 @@ def test_a_cell_of_negligible_mass_does_not_disturb_its_neighbour(drive):
 
 
 @pytest.mark.parametrize("drive", [LinearSweep(80.0, 300.0, 0.1, 20e-6), noise(3, 2001, 20e3, 20e-6)])
-def test_a_split_or_sampled_chain_run_equals_the_whole_run(drive):
+def test_a_chain_run_that_is_split_or_sampled_equals_the_whole_run(drive):
     chain = chain_of(gong2025(), 2)
     whole = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE)
     sampled = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE, sample_rate_hz=7e3)

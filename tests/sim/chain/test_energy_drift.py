@@ -68,7 +68,7 @@ def test_energy_is_conserved_for_every_law_drive_and_accuracy_level(contact, cel
 
 
 @pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
-def test_motion_deep_in_a_steep_contact_is_integrated_at_every_accuracy(accuracy):
+def test_a_motion_deep_inside_a_steep_contact_is_integrated_at_every_accuracy_level(accuracy):
     """At reference accuracy the step control once asked for less than rounding, and the run stalled."""
     specimen = gong2025(damping_time_s=0.0, contact="power:47")
     chain = chain_of(specimen, 1)

@@ -29,7 +29,7 @@ def test_the_exponent_of_one_chaotic_cell_matches_the_tangent_flow_within_the_er
     assert apart < 4.0 * math.hypot(ours.standard_error_per_s, theirs.standard_error_per_s)
 
 
-def test_a_run_with_too_many_impacts_has_no_exponent():
+def test_a_chain_run_with_too_many_impacts_has_no_exponent():
     found = chain_lyapunov_exponent(
         chain_of(gong2025(), 2), Harmonic(220.0, 40e-6), duration_s=1.0, max_impact_rate_hz=1.0
     )
@@ -39,7 +39,7 @@ def test_a_run_with_too_many_impacts_has_no_exponent():
 
 
 @pytest.mark.parametrize("duration_s", [0.01, math.inf])
-def test_a_duration_without_an_error_is_refused_in_one_sentence(duration_s):
+def test_a_duration_too_short_to_give_an_error_is_refused_in_one_sentence(duration_s):
     with pytest.raises(
         ValueError, match=r"^Duration .* s is not allowed for an exponent at 260\.0 Hz: .*\.$"
     ):

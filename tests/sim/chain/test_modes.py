@@ -65,7 +65,7 @@ def test_one_cell_has_the_transmissibility_of_the_specimen():
 
 @given(frequency=st.floats(5.0, 1500.0), cells=st.integers(1, 40), damping=st.floats(1e-6, 1e-4))
 @settings(max_examples=40, deadline=None)
-def test_a_finite_chain_responds_as_two_bloch_waves(frequency, cells, damping):
+def test_the_response_of_a_finite_chain_is_the_sum_of_two_bloch_waves(frequency, cells, damping):
     """The free end reflects waves: x_n = U cos((N - n + 1/2) mu) / cos((N + 1/2) mu), q = exp(i mu)."""
     specimen = gong2025(damping_time_s=damping)
     ours = chain_transmissibility(chain_of(specimen, cells), [frequency])[0, :, 0]
@@ -104,7 +104,7 @@ def test_a_long_chain_has_no_natural_frequency_within_a_gap():
         assert not np.any(inside)
 
 
-def test_frequencies_below_or_at_zero_are_refused():
+def test_zero_and_negative_frequencies_are_refused():
     with pytest.raises(ValueError, match=r"^Frequencies must be"):
         chain_transmissibility(chain_of(gong2025(), 2), [-1.0])
     with pytest.raises(ValueError, match=r"^Frequencies must be"):

@@ -21,7 +21,7 @@ def impulse_response(chain, later):
 
 
 @pytest.mark.parametrize("damping_time_s", [0.0, 2e-5, 1e-4])
-def test_cross_responses_of_cells_within_a_window_stay_below_their_bound(damping_time_s):
+def test_the_response_of_a_cell_to_another_within_a_window_stays_below_its_bound(damping_time_s):
     chain = chain_of(gong2025(damping_time_s=damping_time_s), 4)
     window = 40e-6
     bounds = cross_answers(markov_between(chain), window)
@@ -34,7 +34,7 @@ def test_cross_responses_of_cells_within_a_window_stay_below_their_bound(damping
                     assert relative[i, j] <= bounds[abs(i - j)] * (1.0 + 1e-6) + 1e-15
 
 
-def test_neighbour_coupling_grows_with_the_window_to_the_3rd_or_6th_power():
+def test_the_coupling_of_neighbours_grows_with_the_3rd_or_6th_power_of_the_window():
     for damping_time_s, order in ((2e-5, 3.0), (0.0, 6.0)):
         between = markov_between(chain_of(gong2025(damping_time_s=damping_time_s), 2))
         coarse, fine = (cross_answers(between, window)[1] for window in (1e-6, 0.5e-6))
@@ -42,7 +42,7 @@ def test_neighbour_coupling_grows_with_the_window_to_the_3rd_or_6th_power():
 
 
 @pytest.mark.parametrize("accuracy", list(Accuracy))
-def test_the_shorter_window_keeps_simultaneous_contacts_within_tolerance(accuracy):
+def test_the_shortest_window_keeps_simultaneous_contacts_within_tolerance(accuracy):
     chain = chain_of(gong2025(), 6)
     tables = chain_tables(chain, DRIVE, accuracy)
     allowed = CROSS_SHARE * accuracy.tolerance

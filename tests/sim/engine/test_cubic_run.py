@@ -80,7 +80,7 @@ def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_standard_accuracy_differs_from_reference_within_its_promise(contact):
+def test_standard_accuracy_differs_from_reference_accuracy_by_no_more_than_promised(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 20e-6, 0.5, 2e-5)
     run, _ = advance(specimen, pieces, 2e-5)
     exact, _ = advance(specimen, pieces, 2e-5, Accuracy.REFERENCE)
@@ -97,7 +97,7 @@ def test_a_run_ends_at_the_first_impact_that_cannot_be_stored():
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_nan_drive_is_reported_without_hanging(contact):
+def test_a_drive_with_nan_is_reported_and_does_not_hang_the_run(contact):
     pieces = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
     run = CubicRun(gong2025(contact=contact), 1e-5, np.zeros(6), Accuracy.STANDARD.tolerance)
     motions, impacts = run.follow(pieces, RunRecord(10))
@@ -105,7 +105,7 @@ def test_a_nan_drive_is_reported_without_hanging(contact):
     assert run.advance(pieces, RunRecord(10)) is not Outcome.REACHED_END
 
 
-def test_empty_intervals_and_outside_ends_are_refused():
+def test_empty_intervals_and_times_outside_the_intervals_are_refused():
     with pytest.raises(ValueError, match=r"Interval 0\.0 s is not allowed"):
         CubicRun(gong2025(), 0.0, np.zeros(6), 1e-7)
     run = CubicRun(gong2025(), 1e-5, np.zeros(6), 1e-7)

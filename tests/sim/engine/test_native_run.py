@@ -23,7 +23,7 @@ def native(specimen, drive, duration_s, accuracy="standard", start=None, first_s
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_standard_accuracy_differs_from_reference_within_its_promise(law):
+def test_standard_accuracy_differs_from_reference_accuracy_by_no_more_than_promised(law):
     specimen, drive = gong2025(contact=law), Harmonic(130.0, 20e-6)
     quick, _, _ = native(specimen, drive, 1.0)
     exact, _, _ = native(specimen, drive, 1.0, "reference")

@@ -49,7 +49,7 @@ def test_exponents_agree_with_the_statements_of_the_paper_on_chaos():
         assert still.exponent_per_s < 4.0
 
 
-def test_the_exponent_of_a_periodic_motion_by_multipliers_matches_its_average():
+def test_the_exponent_of_a_periodic_motion_from_its_multipliers_matches_the_averaged_one():
     found = lyapunov_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
     assert found.source is Source.MULTIPLIERS
     assert found.standard_error_per_s < 1e-3
@@ -70,7 +70,7 @@ def test_an_exponent_run_ends_as_soon_as_its_error_is_small_enough():
     assert abs(short.exponent_per_s - whole.exponent_per_s) < 4.0 * short.standard_error_per_s
 
 
-def test_a_failed_run_has_no_exponent_and_states_the_reason():
+def test_the_exponent_of_a_failed_run_is_missing_with_a_reason():
     found = lyapunov_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
     assert found.verdict is ExponentVerdict.UNKNOWN
@@ -87,6 +87,6 @@ def test_a_failed_run_has_no_exponent_and_states_the_reason():
         ({"initial_state": np.zeros(5)}, "six finite numbers"),
     ],
 )
-def test_invalid_runs_for_an_exponent_are_refused(options, message):
+def test_exponents_of_invalid_runs_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
         lyapunov_exponent(gong2025(), CHAOS, **options)

@@ -92,5 +92,5 @@ def test_a_stop_without_rebound_gives_one_or_two_exponents_of_minus_infinity(dri
         ([2.0, -math.inf], 1.0),
     ],
 )
-def test_the_dimension_matches_the_kaplan_yorke_formula(exponents, dimension):
+def test_the_dimension_of_an_attractor_matches_the_kaplan_yorke_formula(exponents, dimension):
     assert kaplan_yorke(np.array(exponents)) == pytest.approx(dimension, abs=1e-4)

@@ -44,7 +44,7 @@ def test_a_contact_free_final_motion_begins_after_the_last_impact():
 
 
 @pytest.mark.parametrize("cycle", [1, 2, 3, 7])
-def test_a_periodic_final_motion_begins_where_the_section_starts_to_repeat(cycle):
+def test_a_periodic_final_motion_begins_where_its_poincare_section_starts_to_repeat(cycle):
     repeated = np.random.default_rng(8).standard_normal((cycle, 6))
     section = CHAOTIC_SECTION.copy()
     section[300:] = repeated[np.arange(100) % cycle]
@@ -54,7 +54,7 @@ def test_a_periodic_final_motion_begins_where_the_section_starts_to_repeat(cycle
     assert 300 <= found.since + cycle <= 300 + 2 * cycle
 
 
-def test_a_section_sampled_within_a_period_is_not_classified_as_periodic():
+def test_a_poincare_section_sampled_within_a_period_is_not_classified_as_periodic():
     found = settling(a_run(noise(2.0), np.ones((COUNT, 6)), periods=0), np.ones(6))
     assert found.motion is FinalMotion.THROUGHOUT
 
@@ -89,7 +89,7 @@ def test_no_end_of_chaos_is_found_in_noise_around_zero():
     ("drive", "source"),
     [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)],
 )
-def test_transient_chaos_is_reported_with_time_and_exponent(drive, source):
+def test_transient_chaos_is_reported_with_its_duration_and_exponent(drive, source):
     # The chaotic lifetime depends on the initial state; the final motion does not.
     spread = np.repeat([2e-5, 2e-2], 3)
     starts = [np.random.default_rng(seed).uniform(-1.0, 1.0, 6) * spread for seed in range(14)]

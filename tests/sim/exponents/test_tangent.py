@@ -36,7 +36,7 @@ def by_differences(specimen, step, accuracy=Accuracy.REFERENCE):
 @pytest.mark.thorough
 @pytest.mark.parametrize("gap_m", GAPS)
 @pytest.mark.parametrize("contact", [*ELASTIC, "hunt_crossley:0.5", "rigid:0.8"])
-def test_finite_differences_converge_to_the_tangent(contact, gap_m):
+def test_finite_differences_converge_to_the_tangent_map(contact, gap_m):
     specimen = gong2025(contact=contact, gap_m=gap_m)
     tangent, _, impacts = run_with_tangent(specimen)
     assert impacts > 2 or not specimen.contact.kind.startswith(("hertz", "hunt"))
@@ -58,7 +58,7 @@ def test_phase_space_volume_shrinks_by_the_damping_alone(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7", "rigid:1"])
-def test_the_tangent_without_damping_is_symplectic(contact):
+def test_the_tangent_map_without_damping_is_symplectic(contact):
     # D' J D = J holds for displacements and momenta; here velocities are scaled by the masses.
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
@@ -68,7 +68,7 @@ def test_the_tangent_without_damping_is_symplectic(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:29"])
-def test_computing_the_tangent_does_not_change_the_motion(contact):
+def test_computing_the_tangent_map_does_not_change_the_motion(contact):
     specimen = gong2025(contact=contact)
     _, carried, _ = run_with_tangent(specimen, Accuracy.STANDARD, 0.3)
     plain = integrate(specimen, DRIVE, 0.3, Accuracy.STANDARD)
@@ -76,7 +76,7 @@ def test_computing_the_tangent_does_not_change_the_motion(contact):
 
 
 @pytest.mark.parametrize("contact", ["hertz", "power:7"])
-def test_a_higher_accuracy_gives_a_tangent_closer_to_the_reference(contact):
+def test_a_higher_accuracy_level_gives_a_tangent_map_closer_to_the_reference(contact):
     specimen = gong2025(contact=contact)
     found = {level: run_with_tangent(specimen, level, 0.2)[0] for level in Accuracy}
     size = np.abs(found[Accuracy.REFERENCE]).max()

@@ -152,7 +152,7 @@ def test_the_contact_energy_matches_the_deepest_penetration():
         assert contact_energy_j(unlike, replace(found, relative_i=1.0)) == 0.0
 
 
-def test_a_map_estimate_grows_with_work_and_shrinks_with_workers():
+def test_the_estimated_time_of_a_map_grows_with_work_and_shrinks_with_workers():
     plan = Map(frequency_hz=FREQUENCIES, amplitude_m=LEVELS, coarse=2)
     one, two = estimate_map(plan, 1), estimate_map(plan, 2)
     assert (one.points, one.coarse_points) == (20, 9)
@@ -165,7 +165,7 @@ def test_a_map_estimate_grows_with_work_and_shrinks_with_workers():
     assert replace(one, work_s=1e3).most_useful_workers == one.points
 
 
-def test_the_largest_cost_of_a_map_grows_with_its_drive_periods():
+def test_the_largest_possible_cost_of_a_map_grows_with_its_drive_periods():
     plan = Map(frequency_hz=FREQUENCIES, amplitude_m=2e-5)
     usual, long = (estimate_map(plan.model_copy(update={"periods": each}), 1) for each in (3000, 300_000))
     assert usual.work_s <= usual.longest_work_s < 0.02 * long.longest_work_s

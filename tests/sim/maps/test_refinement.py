@@ -77,7 +77,7 @@ def test_a_thin_region_of_a_map_is_refined_completely_once_found():
     assert known.mean() < 0.3
 
 
-def test_a_response_jump_within_one_kind_of_motion_is_refined_in_a_map():
+def test_a_map_is_refined_at_a_response_jump_even_within_one_kind_of_motion():
     codes = np.zeros((40, 40), dtype=np.int64)
     sizes = np.where(np.indices(codes.shape)[1] > 17, 1.0, 0.0)
     known, _ = refine(codes, 8, sizes=sizes)

@@ -74,7 +74,7 @@ def test_shares_over_common_initial_states_have_the_uncertainty_of_these_states(
             assert each.share.high >= of_starts.high - 1e-12
 
 
-def test_a_basin_map_distinguishes_attractors_that_return_after_a_small_kick():
+def test_a_basin_map_distinguishes_attractors_the_motion_returns_to_after_a_small_kick():
     plan = Map(
         frequency_hz=160.0,
         amplitude_m=4e-6,
@@ -92,7 +92,7 @@ def test_a_basin_map_distinguishes_attractors_that_return_after_a_small_kick():
     assert all(each.returned.share == 1.0 for each in found if results.motions[each.motion] in solid)
 
 
-def test_kick_stability_requires_a_basin_map(adaptive):
+def test_stability_under_kicks_is_given_only_by_a_basin_map(adaptive):
     with pytest.raises(InvalidStudy, match="that varies only the start"):
         kick_stability(adaptive)
     with pytest.raises(InvalidStudy, match="-3 kicks were requested; give 1 or more"):

@@ -67,7 +67,7 @@ def test_drive_work_equals_damping_work_in_a_periodic_motion():
 
 
 @pytest.mark.parametrize("contact", ["hertz", "hunt_crossley:0.5", "linear_gap", "power:3", "power:47"])
-def test_samples_match_the_motion_in_flight_and_in_contact(contact):
+def test_samples_match_the_motion_between_contacts_and_in_contact(contact):
     specimen = paper(contact)
     run = integrate(specimen, PERIODIC, 0.1, Accuracy.REFERENCE, sample_rate_hz=50_000.0)
     p = run.states[:, 1] - run.states[:, 2]
@@ -114,7 +114,7 @@ def test_no_impact_of_a_finely_sampled_motion_is_missed(frequency_hz, amplitude_
     assert run.impacts.count >= len(onsets)
 
 
-def test_too_many_impacts_end_the_run_and_state_what_to_change():
+def test_too_many_impacts_end_the_run_with_a_statement_of_what_to_change():
     run = integrate(paper(), PERIODIC, 30.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.end_time_s < 30.0

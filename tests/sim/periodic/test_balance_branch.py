@@ -39,7 +39,7 @@ def kinds(branch):
     return [event.kind for event in branch.events]
 
 
-def test_a_first_order_branch_folds_at_the_closed_form_frequencies():
+def test_a_branch_of_first_order_balance_folds_at_the_closed_form_frequencies():
     zeta, alpha, force = 0.02, 0.5, 0.1
     structure, spring = oscillator(2.0 * zeta), PowerSpring(1.0, ((3, alpha),))
     options = BalanceOptions(fewest=1, most=1)

@@ -14,7 +14,7 @@ def test_every_zero_of_a_polynomial_with_known_zeros_is_found(zeros):
     np.testing.assert_allclose(found, zeros, rtol=1e-7)
 
 
-def test_an_exponent_of_two_hundred_neither_overflows_nor_hides_a_zero():
+def test_a_polynomial_exponent_of_two_hundred_neither_overflows_nor_hides_a_zero():
     # Zeros of u^201 - 1e200 u + 1e-100: the last two terms balance at 1e-300, the first two at 10.
     found = positive_zeros(np.array([1.0, -1e200, 1e-100]), np.array([201.0, 1.0, 0.0]))
     np.testing.assert_allclose(np.log10(found), [-300.0, 1.0], rtol=1e-12)

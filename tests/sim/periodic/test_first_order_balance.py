@@ -30,7 +30,7 @@ def test_first_order_balance_refuses_an_even_power():
 
 @pytest.mark.parametrize("frequency_hz", [80.0, 180.0, 199.0, 260.0, 420.0, 550.0])
 @pytest.mark.parametrize("amplitude_m", [1e-6, 5e-6, 50e-6])
-def test_every_first_order_state_satisfies_equation_5_of_the_paper(frequency_hz, amplitude_m):
+def test_every_first_order_solution_satisfies_equation_5_of_the_paper(frequency_hz, amplitude_m):
     specimen, omega = gong2025(), 2.0 * math.pi * frequency_hz
     # Equation 5 of the paper in coordinates (x, p, z), with displacements A cos + B sin.
     m0, m1, m2 = specimen.masses
@@ -65,7 +65,7 @@ def test_a_weak_drive_gives_the_linear_response(exponent):
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 29, 201])
-def test_a_huge_drive_gives_the_response_of_the_joined_masses(exponent):
+def test_a_very_strong_drive_gives_the_response_of_the_joined_masses(exponent):
     # p grows as the n-th root of the force, so x approaches the response of the joined masses.
     specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     states = first_order_states(structure_of(specimen), spring, 300.0, 10.0)

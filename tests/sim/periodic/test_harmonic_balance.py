@@ -61,7 +61,7 @@ def balance_of(orbit, highest):
 
 
 @pytest.mark.parametrize(("highest", "error"), [(101, 3e-4), (201, 2e-5), (401, 3e-6)])
-def test_harmonic_balance_of_contact_converges_to_the_exact_orbit(exact_orbit, highest, error):
+def test_harmonic_balance_with_contact_converges_to_the_exact_orbit(exact_orbit, highest, error):
     _, drive, x, p = exact_orbit
     found = balance_of(exact_orbit, highest)
     assert found.outcome is not BalanceEnd.NO_SOLUTION
@@ -95,7 +95,7 @@ def test_drive_power_equals_damping_power(exact_orbit):
     assert given == pytest.approx(taken, rel=5e-4)
 
 
-def test_too_few_harmonics_are_reported(exact_orbit):
+def test_a_balance_with_too_few_harmonics_is_reported(exact_orbit):
     few = balance_of(exact_orbit, 21)
     assert few.outcome is BalanceEnd.NO_SOLUTION
     more = balance_of(exact_orbit, 101)

@@ -68,7 +68,7 @@ def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward_branch
         assert 0.01 * expected < growth < 100.0 * expected
 
 
-def test_a_branch_leaves_the_stops_at_linear_grazing():
+def test_a_branch_leaves_the_stops_where_the_linear_motion_grazes():
     # A weak drive at 60 Hz is raised until p reaches the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
     orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)
@@ -92,7 +92,7 @@ def test_an_isolated_branch_closes_beside_another_branch():
     assert sorted(folds) == pytest.approx([94.1881, 98.8147], abs=2e-4)
 
 
-def test_a_branch_between_equal_ends_is_refused():
+def test_a_branch_with_equal_start_and_end_values_is_refused():
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     with pytest.raises(ValueError, match="two different positive ends"):
         periodic_branch(orbit, Parameter.FREQUENCY, 130.0)

@@ -24,7 +24,7 @@ def hardening():
         (PhaseReference.ABSOLUTE, (480.0, 520.0)),
     ],
 )
-def test_phase_resonance_without_contact_is_linear_quadrature(of, band_hz):
+def test_phase_resonance_without_contact_is_where_the_linear_phase_lag_is_90_degrees(of, band_hz):
     specimen = gong2025()
     branch = phase_resonance_branch(specimen, band_hz, (1e-8, 1e-7), of)
     assert np.ptp(branch.frequencies_hz) < 1e-6
@@ -37,7 +37,7 @@ def test_phase_resonance_without_contact_is_linear_quadrature(of, band_hz):
 
 
 @pytest.mark.thorough
-def test_a_hardening_mode_is_periodic_with_90_degrees_lag():
+def test_the_motion_at_phase_resonance_of_a_hardening_mode_is_periodic_with_90_degrees_lag():
     specimen = hardening()
     branch = phase_resonance_branch(specimen, (92.0, 97.0), (4e-7, 5e-6))
     assert branch.frequencies_hz[-1] > branch.frequencies_hz[0] + 10.0
@@ -67,7 +67,7 @@ def test_a_frequency_band_without_phase_resonance_is_refused(band_hz, levels_m, 
 
 
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
-def test_a_failed_newton_iteration_is_refused(low_m):
+def test_a_phase_resonance_is_refused_if_its_newton_iteration_fails(low_m):
     """Its last iterate at 17 Hz was once returned as a motion in a band of 92 to 97 Hz."""
     with pytest.raises(ValueError, match="No motion with this phase is found"):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))

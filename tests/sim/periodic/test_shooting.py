@@ -83,7 +83,7 @@ def test_a_poincare_section_of_a_known_sequence_has_its_period():
     assert smallest_period(points + np.arange(24.0)[:, None], np.ones(6)) is None
 
 
-def test_shooting_in_chaos_is_refused_or_finds_an_unstable_orbit():
+def test_shooting_from_a_chaotic_state_is_refused_or_finds_an_unstable_orbit():
     orbit = periodic_orbit(SPECIMEN, Harmonic(260.0, 5e-6))
     if orbit.outcome is ShootingEnd.CONVERGED:
         assert not orbit.is_stable
@@ -93,7 +93,7 @@ def test_shooting_in_chaos_is_refused_or_finds_an_unstable_orbit():
         assert orbit.defect > 1e-9 or math.isinf(orbit.defect)
 
 
-def test_zero_drive_and_mirrored_double_periods_are_refused():
+def test_a_drive_of_zero_and_mirrored_orbits_of_two_periods_are_refused():
     with pytest.raises(ValueError, match="positive amplitude"):
         periodic_orbit(SPECIMEN, Harmonic(100.0, 0.0))
     with pytest.raises(ValueError, match="mirrored motion cannot have 2 periods"):

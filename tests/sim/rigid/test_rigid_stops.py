@@ -345,7 +345,7 @@ def test_each_accuracy_level_meets_its_tolerance_with_chatter(restitution):
 
 
 @pytest.mark.parametrize(("restitution", "drive"), [(0.8, BOUNCING), (0.5, STICKING), (0.0, STICKING)])
-def test_a_sampled_sine_with_rigid_stops_equals_the_sine(restitution, drive):
+def test_a_sampled_sine_gives_the_same_motion_as_the_sine_with_rigid_stops(restitution, drive):
     specimen, rate = rigid(restitution), 40_000.0
     sine = drive.amplitude_m * np.sin(2.0 * np.pi * drive.frequency_hz * np.arange(1300) / rate)
     sampled = integrate(specimen, Sampled(sine, rate), 0.03, Accuracy.REFERENCE, sample_rate_hz=1e4)
@@ -370,7 +370,7 @@ def test_a_chattering_motion_is_equal_for_a_sweep_and_its_sampled_drive():
 @example(first_s=0.020404096147730984, restitution=0.6).via(
     "a release whose speed is rounding of either sign"
 )
-def test_a_split_run_equals_the_whole_even_during_sticking(first_s, restitution):
+def test_a_run_split_during_sticking_equals_the_whole_run(first_s, restitution):
     specimen = rigid(restitution)
     for drive in (STICKING, LinearSweep(180.0, 220.0, 0.03, 50e-6)):
         whole = integrate(specimen, drive, 0.03, Accuracy.REFERENCE)

@@ -83,7 +83,7 @@ def test_computing_times_of_larger_budgets_are_learnt_separately(ledger):
 
 
 @pytest.mark.thorough
-def test_a_pilot_corrects_the_planned_cost():
+def test_a_pilot_run_corrects_the_planned_cost():
     """Without a pilot a map over 50 to 600 Hz was planned as 1.8 s, and took 21 s."""
     calm, chaotic, timed = (
         lambda _, drive=drive, target=target: Scene(gong2025(), drive, target=target)

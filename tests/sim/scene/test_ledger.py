@@ -36,7 +36,7 @@ def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
     assert np.mean(held) < 0.985 or scatter < 0.2
 
 
-def test_cost_estimates_follow_a_slower_machine(ledger):
+def test_cost_estimates_adapt_to_a_slower_machine(ledger):
     for taken_s in [1.0] * 100 + [3.0] * 100:
         ledger.learn(KIND, 1.0, taken_s)
     assert ledger.expected_time(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
@@ -85,7 +85,7 @@ def test_invalid_computing_times_are_not_learnt(ledger):
     assert ledger.expected_time(KIND, 1.0).runs == 0
 
 
-def test_costs_of_unused_kinds_of_run_follow_a_slower_machine(ledger):
+def test_costs_of_kinds_of_run_not_yet_used_adapt_to_a_slower_machine(ledger):
     random = np.random.default_rng(8)
     kinds = [f"method {number}/law" for number in range(6)]
     for run in range(60):

@@ -43,7 +43,7 @@ def errors_off(found, truth):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_periodic_motion_is_within_its_stated_error(contact):
+def test_a_prediction_of_a_periodic_motion_is_within_its_stated_error(contact):
     scene = target_scene(contact, 100.0 if contact.startswith("power") else 130.0, 5e-6, error=1e-6)
     scene = scene if contact.startswith("power") else target_scene(contact, error=1e-6)
     found = solve_scene(scene)
@@ -93,7 +93,7 @@ def test_the_error_of_a_mean_over_initial_states_includes_the_error_of_the_runs(
         ("rigid:0.6", 7.22e-6, 5.448e-6, 247.9, 5.844e-6, True),
     ],
 )
-def test_a_mean_over_initial_states_is_chaotic_only_with_growing_perturbations(
+def test_a_mean_over_initial_states_is_called_chaotic_only_if_perturbations_grow(
     contact, gap_m, damping_s, frequency_hz, amplitude_m, is_chaos
 ):
     specimen = gong2025(damping_s, gap_m, contact)
@@ -138,7 +138,7 @@ def test_an_error_below_rounding_is_reported_as_unreachable():
     assert report.text.endswith("is not known")
 
 
-def test_the_error_of_a_prediction_in_a_transient_includes_the_transient():
+def test_the_error_of_a_prediction_during_a_transient_includes_the_transient():
     soon = solve_scene(target_scene(time_s=1e-6))
     settled = solve_scene(target_scene(error=1e-6))
     assert soon.error_estimate > abs(soon.response_i / settled.response_i - 1.0) > 1e-3
@@ -177,7 +177,7 @@ def test_a_window_length_may_be_given_with_a_target():
     assert found.window_s == pytest.approx(1.0)
 
 
-def test_the_stated_error_of_a_mean_covers_it_in_95_percent():
+def test_the_stated_error_of_a_mean_covers_the_true_mean_in_95_percent_of_cases():
     random = np.random.default_rng(3)
     held = [
         abs(values.mean() - 1.0) <= mean_error([np.full(4, each) for each in values], None)[0] * values.mean()
@@ -188,7 +188,7 @@ def test_the_stated_error_of_a_mean_covers_it_in_95_percent():
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
 @pytest.mark.parametrize("other", [0.3, 3.0])
-def test_the_error_of_a_mean_over_two_motions_holds_and_is_not_too_wide(share, other):
+def test_the_stated_error_of_a_mean_over_two_motions_holds_and_is_not_too_large(share, other):
     random, count = np.random.default_rng(4), 100
     true, scatter = 1.0 + share * (other - 1.0), abs(other - 1.0) * np.sqrt(share * (1.0 - share) / count)
     held, errors = [], []

@@ -46,7 +46,7 @@ def test_quasi_periodic_motion_and_noise_do_not_count_as_repeating():
     assert repetition(section_of(noise), OMEGA, FORGETTING, SHARP) is None
 
 
-def test_alternating_values_that_differ_by_5e_6_give_no_verdict():
+def test_alternating_values_that_differ_by_5_millionths_give_no_verdict():
     nearly_one = np.resize([1.0, 1.0 + 5e-6], COUNT)
     assert repetition(section_of(nearly_one), OMEGA, FORGETTING, SHARP) is None
 

@@ -57,7 +57,7 @@ def test_equal_motions_from_two_initial_states_are_recognised(one, other, same):
     assert len(motions_among([one, other])) == (1 if same else 2)
 
 
-def test_a_motion_is_reported_from_the_run_with_the_smallest_error():
+def test_a_motion_reached_by_several_runs_is_reported_from_the_run_with_the_smallest_error():
     (motion,) = motions_among([reached_motion(OPEN, None, 1.0, 1e-6), reached_motion(TORUS, None, 1.0, 1e-6)])
     assert kind_among(motion, FORGETTING_S) is TORUS
 
@@ -93,7 +93,7 @@ def test_intermittent_chaos_is_not_classified_as_a_torus():
         ((MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED), (True, False, False)),
     ],
 )
-def test_one_of_several_chaotic_motions_may_turn_into_another(kinds, final):
+def test_of_several_chaotic_motions_one_that_may_turn_into_another_is_not_called_final(kinds, final):
     """Of 400 runs, 2 % were in the motion after 300 s that nine of sixteen runs had after 60 s."""
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final

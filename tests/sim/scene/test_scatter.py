@@ -27,7 +27,7 @@ def test_too_few_blocks_give_no_scatter():
 
 
 @pytest.mark.parametrize("blocks", [1, 5, 10])
-def test_two_windows_differ_by_at_most_the_stated_error_in_95_percent(blocks):
+def test_two_windows_differ_by_at_most_the_stated_error_in_95_percent_of_cases(blocks):
     """Coverage is 95 % for one block per window; with more blocks the stated error is conservative."""
     random = np.random.default_rng(6)
     inside = 0

@@ -101,7 +101,7 @@ def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
-def test_runs_still_chaotic_at_their_end_count_as_possibly_unknown_motion():
+def test_runs_that_are_still_chaotic_at_their_end_count_as_possibly_an_unknown_motion():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
     ).ensemble
@@ -110,7 +110,7 @@ def test_runs_still_chaotic_at_their_end_count_as_possibly_unknown_motion():
     assert found.unseen_share > pending / found.starts
 
 
-def test_lasting_chaos_has_a_lower_bound_of_lifetime():
+def test_chaos_that_lasts_is_reported_with_a_lower_bound_of_its_lifetime():
     found = solve_scene(scene("hertz", 260.0, 5e-6))
     assert found.motion is MotionKind.CHAOTIC
     assert found.ensemble.escape.escapes == 0

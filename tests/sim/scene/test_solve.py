@@ -107,7 +107,7 @@ def test_no_part_of_chaos_is_skipped(integrated_s):
     assert sum(integrated_s) >= 30.0
 
 
-def test_perturbations_are_computed_where_chaos_is_uncertain(monkeypatch):
+def test_perturbations_are_computed_where_it_is_uncertain_whether_a_motion_is_chaotic(monkeypatch):
     carried, follow = [], FollowedRun.follow
 
     def note(run, *options, **more):
@@ -146,7 +146,7 @@ def test_a_torus_is_distinguished_from_chaos():
 
 
 @pytest.mark.thorough
-def test_chaos_ending_in_a_torus_is_not_chaotic():
+def test_chaos_that_ends_in_a_quasi_periodic_motion_is_not_called_chaotic():
     specimen = replace(gong2025(2.2e-5), lower_gap_m=38e-6, gap_m=52e-6)
     found = solve_scene(
         Scene(
@@ -193,7 +193,7 @@ def test_the_lyapunov_exponent_matches_the_final_motion():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
-def test_chaos_that_ends_while_its_exponent_is_averaged_has_no_negative_exponent():
+def test_chaos_that_ends_during_the_averaging_of_its_exponent_gets_no_negative_exponent():
     """Each initial state is another realisation; on every computer some end in or after the window."""
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
     cubic = gong2025(6.483827302321825e-6, 27.07246318911318e-6, "power:3")
@@ -234,7 +234,7 @@ def stiff_specimen():
 
 
 @pytest.mark.thorough
-def test_perturbation_swinging_between_displacement_and_velocity_does_not_count_as_growing():
+def test_a_perturbation_that_swings_between_displacement_and_velocity_is_not_growing():
     slow = Scene(stiff_specimen(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)
     assert found.memory is StartMemory.KEPT
@@ -286,7 +286,7 @@ def test_a_slowly_decaying_motion_is_undecided(contact, damping_time_s, frequenc
         (118.43285, 30.028e-6, 4.588e-5),
     ],
 )
-def test_errors_of_a_chosen_window_cover_a_later_window(frequency_hz, amplitude_m, damping_time_s):
+def test_the_errors_of_a_chosen_window_hold_for_a_later_window(frequency_hz, amplitude_m, damping_time_s):
     asked = Scene(
         gong2025(damping_time_s=damping_time_s),
         Harmonic(frequency_hz, amplitude_m),
@@ -305,7 +305,7 @@ def test_a_window_of_too_many_drive_periods_is_refused():
         solve_scene(fast)
 
 
-def test_a_perturbation_that_shrinks_to_zero_is_handled():
+def test_a_perturbation_that_shrinks_to_zero_gives_a_valid_result():
     """With a gap of 1e-300 m the perturbation underflows, which once raised "math domain error"."""
     tiny = Scene(
         gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)
@@ -314,7 +314,7 @@ def test_a_perturbation_that_shrinks_to_zero_is_handled():
 
 
 @pytest.mark.parametrize("duration", [AutomaticDuration(longest_s=20.0), FixedDuration()])
-def test_a_slow_drift_is_undecided_while_it_lasts(duration):
+def test_a_motion_is_undecided_while_a_slow_drift_lasts(duration):
     drift = Scene(gong2025(damping_time_s=3e-5), Harmonic(119.88743, 20e-6), duration=duration)
     answer = solve_scene(drift)
     assert answer.motion is MotionKind.UNDECIDED
@@ -328,7 +328,7 @@ def test_a_motion_of_undamped_modes_and_the_drive_is_quasi_periodic():
     assert answer.motion is MotionKind.QUASI_PERIODIC
 
 
-def test_an_unstable_repeating_motion_is_not_periodic():
+def test_an_unstable_motion_that_repeats_is_not_called_periodic():
     specimen, drive = gong2025(2.39e-5), Harmonic(121.99, 46.75e-6)
     near = (-1.33e-6, -8.49e-6, -2.97e-6, 0.0572, 0.0793, 0.0805)
     orbit = periodic_orbit(specimen, drive, start=near)

@@ -58,7 +58,7 @@ def test_spectral_lines_are_computed_over_whole_periods_of_the_motion(window_s):
     assert errors(found)[1] < 1e-6
 
 
-def test_responses_agree_within_errors_if_only_one_accuracy_finds_the_period():
+def test_responses_agree_within_errors_even_if_only_one_accuracy_level_finds_the_period():
     """Only quick finds the period of five drive periods; over other lengths the leakage is 4e-3."""
     specimen = gong2025(1.2805892626268502e-05, 1.9123796753034876e-05, "power:3")
     drive, length = Harmonic(247.36193250882872, 1.0156553904452063e-06), FixedDuration(0.8114, 0.4708)
@@ -70,7 +70,7 @@ def test_responses_agree_within_errors_if_only_one_accuracy_finds_the_period():
         assert np.all(off <= errors(found) + errors(reference))
 
 
-def test_undamped_motions_differ_between_starts_within_the_stated_error():
+def test_undamped_motions_from_different_initial_states_differ_within_the_stated_error():
     """Each of 24 differences is within the error at 95 % probability; fewer than 16 at 0.01 %."""
     scene = scene_of("hunt_crossley:1", 64.4, 20e-6, 0.0, duration=FixedDuration(3.0, 1.0))
     found = solve_scene(scene)
@@ -102,7 +102,7 @@ def test_spectral_lines_of_two_windows_agree_within_the_stated_error():
     ("contact", "amplitude_m", "frequency_hz", "duration_s"),
     [("rigid:1", 10e-6, 100.0, 0.4), ("linear_gap", 10e-6, 100.0, 0.35), ("rigid:0.5", 20e-6, 240.0, 0.4)],
 )
-def test_stated_errors_of_exact_laws_include_growing_rounding_errors(
+def test_the_stated_errors_of_exactly_solved_laws_include_the_growth_of_rounding_errors(
     contact, amplitude_m, frequency_hz, duration_s
 ):
     """Scaled lengths give the same scene. Compared with itself, an exact law had an error of 1e-11."""

@@ -57,7 +57,7 @@ def test_the_closed_form_without_contact_equals_the_integration(seed):
     assert m0 == pytest.approx(s * moved[M0], rel=3e-3)
 
 
-def test_the_closed_form_predicts_the_loaded_base_better_than_a_bare_table():
+def test_the_closed_form_predicts_the_base_better_with_the_specimen_than_without_it():
     rng = np.random.default_rng(7)
     off_db = []
     for _ in range(12):
@@ -74,7 +74,7 @@ def test_the_closed_form_predicts_the_loaded_base_better_than_a_bare_table():
 
 
 @given(st.floats(5.0, 2e3))
-def test_the_specimen_response_over_the_base_is_independent_of_the_shaker(frequency_hz):
+def test_the_response_of_the_specimen_to_its_base_does_not_depend_on_the_shaker(frequency_hz):
     specimen = gong2025()
     per_volt = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz).per_volt[0]
     answer = base_transmissibility(specimen, frequency_hz)[0]
@@ -108,7 +108,7 @@ def test_the_computed_voltage_gives_the_requested_base_motion(frequency_hz, base
 
 
 @given(st.floats(20.0, 600.0), st.floats(1e-3, 10.0))
-def test_the_closed_form_limits_the_relative_displacement_to_the_gap(frequency_hz, volts):
+def test_the_relative_displacement_of_the_closed_form_is_limited_to_the_gap(frequency_hz, volts):
     specimen = gong2025()
     motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
     moved = motion.response(volts, specimen.gap_m)[0]

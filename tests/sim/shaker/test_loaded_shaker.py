@@ -112,7 +112,7 @@ def test_the_base_motion_has_a_notch_at_the_specimen_resonance(linear_motion):
     assert np.min(np.abs(acceleration)) < 0.97 * alone[LINES_HZ == 266]
 
 
-def test_a_negligible_specimen_leaves_the_bare_table():
+def test_a_table_with_a_negligible_specimen_moves_like_the_bare_table():
     dust = gong2025(contact="linear")
     dust = type(dust)(
         masses=tuple(1e-6 * m for m in dust.masses),
@@ -129,7 +129,7 @@ def test_a_negligible_specimen_leaves_the_bare_table():
 
 
 @pytest.mark.parametrize("amplitude_v", [1e-3, 0.4])
-def test_electrical_work_is_heat_friction_and_stored_energy(amplitude_v):
+def test_the_electrical_work_equals_heat_and_friction_and_stored_energy(amplitude_v):
     specimen = gong2025()
     table = loaded_shaker(specimen)
     drive = amplitude_v * np.sin(2 * np.pi * 260 * STEP_S * np.arange(SECOND))
@@ -183,7 +183,7 @@ def test_noise_is_added_at_the_amplifier_output():
     assert np.array_equal(table.move(np.zeros(SECOND), noise).amplifier_voltage, noise)
 
 
-def test_the_rubber_stops_end_the_stroke_and_are_counted():
+def test_the_rubber_stops_limit_the_stroke_and_their_contacts_are_counted():
     table = loaded_shaker()
     free = abs(stroke_per_volt(8.0)[0]) * 6.0
     stroke = SHAKER.stroke_m
@@ -201,7 +201,7 @@ def test_a_small_drive_never_touches_the_rubber_stops():
     assert table.structure["limited_steps"] == 0
 
 
-def test_a_non_finite_motion_is_an_error_with_its_time():
+def test_a_motion_that_is_not_finite_raises_an_error_that_states_its_time():
     table = loaded_shaker()
     drive = np.zeros(100)
     drive[40] = np.nan

@@ -45,7 +45,7 @@ def complex_tones(samples, rate_hz, frequencies_hz):
 
 
 @pytest.mark.parametrize("rate_hz", [5120.0, 44_100.0])
-def test_weak_tones_match_the_closed_form_in_amplitude_and_phase(rate_hz):
+def test_the_response_to_weak_tones_matches_the_closed_form_in_amplitude_and_phase(rate_hz):
     tones_hz = np.array([60.0, 94.0, 201.0, 310.0, 520.0])
     time_s = np.arange(round(7 * rate_hz)) / rate_hz
     volts = 1e-3 * np.sum(np.cos(2 * np.pi * np.outer(tones_hz, time_s)), axis=0)
@@ -69,7 +69,7 @@ def test_a_long_recording_is_simulated_in_parts_without_seams():
     assert rough.max() < 1e-5 * np.abs(motion.base_acceleration).max()
 
 
-def test_the_response_of_the_sensors_is_included():
+def test_a_simulated_recording_includes_the_response_of_its_sensors():
     rate_hz, tone_hz = 12_800.0, np.array([150.0])
     time_s = np.arange(round(5 * rate_hz)) / rate_hz
     volts = 1e-3 * np.cos(2 * np.pi * tone_hz[0] * time_s)
@@ -81,7 +81,7 @@ def test_the_response_of_the_sensors_is_included():
     assert base[1] / base[0] == pytest.approx(150j / (150j + 20), rel=1e-3)
 
 
-def test_impacts_are_counted_and_depend_on_nanometres_of_the_initial_state():
+def test_impacts_are_counted_and_depend_on_the_initial_state_to_a_nanometre():
     rate_hz = 51_200.0
     time_s = np.arange(round(2 * rate_hz)) / rate_hz
     volts = 2.5 * np.cos(2 * np.pi * 260 * time_s) * (time_s > 1.0)

@@ -30,7 +30,7 @@ def test_a_fitted_power_law_has_the_force_of_hertz_at_one_micrometre(name):
 
 @settings(deadline=None)
 @given(st.floats(1e-6, 60e-6))
-def test_the_three_power_force_is_between_its_lowest_and_highest_power(p):
+def test_the_force_of_a_sum_of_three_powers_lies_between_its_lowest_and_highest_power(p):
     at, still = np.array([p]), np.zeros(1)
     third, sum_, seventh = (
         float(spring_of(gong2025(contact=name)).force(at, still)[0])
@@ -82,7 +82,7 @@ def test_a_contact_law_is_found_by_its_name(text, law):
         ("linear_gap:nan", "Stop stiffness nan N/m is not allowed"),
     ],
 )
-def test_a_wrong_contact_law_name_is_refused_in_one_sentence(text, sentence):
+def test_the_name_of_an_unknown_contact_law_is_refused_in_one_sentence(text, sentence):
     with pytest.raises(ValueError, match=sentence):
         law_by_name(text, HERTZ.stiffness, GAP)
 

@@ -39,7 +39,7 @@ def test_the_lever_ratio_gives_x_for_any_relative_displacement(stiffer):
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 200.0, 440.0])
 @pytest.mark.parametrize("amplitude_m", [80e-6, 300e-6])
-def test_the_fundamental_estimates_large_motion_against_stops_within_30_percent(frequency_hz, amplitude_m):
+def test_the_fundamental_predicts_large_motion_against_stops_within_30_percent(frequency_hz, amplitude_m):
     specimen = gong2025()
     settled = steady_response(specimen, Harmonic(frequency_hz, amplitude_m), duration_s=12.0, window_s=2.0)
     answer = base_response(specimen, frequency_hz)

@@ -60,7 +60,7 @@ def test_modes_of_an_undamped_specimen_do_not_decay():
     assert np.abs(modal_form(gong2025(damping_time_s=0.0)).rates.real).max() < 1e-10
 
 
-def test_coinciding_modes_are_refused_with_advice():
+def test_a_specimen_with_coinciding_eigenvalues_is_refused_with_advice():
     # m0 is critically damped and coupled to m2 only through a vanishing spring.
     k0, m0 = 1000.0, 1e-3
     critical = dataclasses.replace(
@@ -112,7 +112,7 @@ def test_a_slow_mode_is_separated_from_fast_decays():
         assert residual[-1] < 1e-12 * residual[0]
 
 
-def test_frequencies_that_double_precision_cannot_hold_together_are_refused():
+def test_natural_frequencies_too_far_apart_for_double_precision_are_refused():
     specimen = dataclasses.replace(gong2025(), masses=(5.8e-3, 1e-300, 2e-3))
     with pytest.raises(ValueError, match="span more than double precision resolves"):
         modal_form(specimen)

@@ -29,7 +29,7 @@ def test_stiffness_proportional_damping_ratios_grow_with_frequency():
     )
 
 
-def test_the_paper_damping_read_in_si_units_overdamps_every_mode():
+def test_the_damping_of_the_paper_overdamps_every_mode_if_read_in_si_units():
     np.testing.assert_allclose(gong2025(damping_time_s=1e-2).damping_ratios, [2.97, 8.36, 15.7], rtol=3e-3)
 
 

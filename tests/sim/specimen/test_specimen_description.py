@@ -113,7 +113,7 @@ def test_a_specimen_file_may_be_based_on_another_file(tmp_path):
     assert specimen.gaps_m == (30e-6, math.inf)
 
 
-def test_a_specimen_with_changed_values_has_no_description_text(tmp_path):
+def test_a_specimen_with_changed_values_loses_its_description_text(tmp_path):
     changed = load_specimen(write_file(tmp_path, 'name = "mine"\nmodel = "gong2025"\ngap_m = 62e-6\n'))
     assert "45 um" in load_specimen("gong2025").about
     assert changed.about == ""
@@ -170,7 +170,7 @@ def test_specimen_files_based_on_each_other_are_refused(tmp_path):
         load_specimen(write_file(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
 
 
-def test_a_specimen_table_outside_a_file_may_not_name_a_file(tmp_path):
+def test_a_specimen_table_given_without_a_file_cannot_name_another_file(tmp_path):
     """Specimen tables in recordings and study results may name shipped specimens only."""
     with pytest.raises(ValidationError, match="no specimen that comes with vibench"):
         SpecimenTable.model_validate({"model": str(write_file(tmp_path, WHOLE))})
@@ -229,7 +229,7 @@ DAMPERS = "dampings_ns_per_m = [0.474821, 0.0165809, 0.240926]"
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_mass_that_changes_a_spring_constant_gives_a_warning(tmp_path, index):
+def test_a_mass_whose_change_alters_a_spring_constant_gives_a_warning(tmp_path, index):
     masses = [5.8e-3, 2.1e-3, 2.0e-3]
     masses[index] *= 1.5
     own = f'name = "mine"\nmodel = "gong2025"\nmasses_kg = {masses}\n'
@@ -246,7 +246,7 @@ def test_a_mass_that_changes_a_spring_constant_gives_a_warning(tmp_path, index):
     assert kept.dampings == pytest.approx(gong2025().dampings, rel=1e-5)
 
 
-def test_springs_that_change_damping_give_a_warning(tmp_path):
+def test_springs_whose_change_alters_the_damping_give_a_warning(tmp_path):
     own = 'name = "mine"\nmodel = "gong2025"\nsingle_frequencies_hz = [322.0, 120.0, 390.6]\n'
     with pytest.warns(SpecimenWarning, match=r"dampings changed .* damping_time_s = 2e-05 to confirm"):
         load_specimen(write_file(tmp_path, own))

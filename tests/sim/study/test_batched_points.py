@@ -99,7 +99,7 @@ def test_scenes_that_batches_do_not_support_are_solved_singly():
     assert found[1].method is Method.CLOSED_FORM
 
 
-def test_a_long_lead_in_with_thinned_states_is_not_reported_as_start_dependent():
+def test_a_long_lead_in_stored_with_thinned_states_is_not_reported_as_start_dependent():
     # Of 13,000 drive periods only 4,096 states are stored for the comparison of initial states.
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT

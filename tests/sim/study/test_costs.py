@@ -26,7 +26,7 @@ def test_the_cost_of_a_measured_point_is_not_estimated_again():
     assert 0 not in list(costs.learn(1, 7.0))
 
 
-def test_unmeasured_cost_estimates_are_scaled_by_the_error_of_measured_ones():
+def test_cost_estimates_of_new_points_are_scaled_by_the_error_at_measured_points():
     costs = line_of([1.0, 1.0, 1.0, 2.0])
     is_missing = np.array([False, True, True, True])
     assert costs.remaining_s(is_missing) == pytest.approx(4.0)

@@ -39,7 +39,7 @@ def test_ranges_and_numbers_can_be_mixed_and_duplicates_count_once():
     assert expand_ranges(given) == [1.0, 2.0, 2.25, 2.5, 3]
 
 
-def test_values_other_than_ranges_are_left_to_later_validation():
+def test_values_that_are_not_ranges_are_left_to_later_validation():
     assert expand_ranges("all") == "all"
     assert expand_ranges({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
     assert expand_ranges([1.0, "two"]) == [1.0, "two"]

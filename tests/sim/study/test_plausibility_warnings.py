@@ -9,7 +9,7 @@ def warnings_for(amplitudes_m, gaps_m=(45e-6,)):
     return list(plausibility_warnings(amplitudes_m, gaps_m))
 
 
-def test_metres_instead_of_micrometres_give_a_warning_with_the_likely_value():
+def test_metres_typed_instead_of_micrometres_give_a_warning_with_the_likely_value():
     (doubt,) = warnings_for([5.0])
     assert "5 m is 1.1e+05 times the gap of 4.5e-05 m" in doubt
     assert doubt.endswith("give 5e-06")

@@ -131,7 +131,7 @@ def test_a_study_file_needs_no_recent_hdf5_version(small, tmp_path):
         file.visititems(require_plain)
 
 
-def test_sessions_record_which_executor_computed_which_point(small, tmp_path):
+def test_the_file_records_which_executor_computed_which_point(small, tmp_path):
     path = tmp_path / "a.h5"
     make_file(path, small)
     count = itertools.count()
@@ -189,7 +189,7 @@ def test_a_file_of_another_study_is_refused_with_the_differences(small, tmp_path
 
 
 @pytest.mark.thorough
-def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
+def test_a_study_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     path = tmp_path / "a.h5"
     with FileStore.create(path, small):
         with pytest.raises(StudyError, match="is being written by another run"):
@@ -200,7 +200,7 @@ def test_a_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     FileStore(path, small).close()
 
 
-def test_a_short_read_of_its_file_does_not_stop_a_study(small, tmp_path):
+def test_a_study_starts_even_while_its_file_is_read_for_a_moment(small, tmp_path):
     """A reader holds the HDF5 lock for a moment; a study that starts then must wait for its file."""
     path = tmp_path / "a.h5"
     make_file(path, small)
