@@ -75,14 +75,14 @@ def test_the_smallest_sufficient_input_range_is_used(task):
     ("limits", "allowed"),
     [((-10, 10), "5 on cDAQ1Mod1/ai1"), ((1, 1), "below AI_Max"), ((2, -2), "below AI_Max")],
 )
-def test_limits_beyond_every_input_range_are_refused_with_the_allowed_ranges(task, limits, allowed):
+def test_limits_beyond_the_widest_input_range_are_refused_with_the_allowed_ranges(task, limits, allowed):
     task.ai_channels.add_ai_voltage_chan(MODULE, min_val=limits[0], max_val=limits[1])
     with pytest.raises(DaqError, match=allowed) as caught:
         verify(task)
     assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
 
 
-def test_sensors_need_a_device_with_excitation(task):
+def test_sensors_with_excitation_need_a_device_that_supplies_it(task):
     excited_channel(task, 0.002, "Dev2/ai0")
     with pytest.raises(DaqError, match="0 A on Dev2/ai0"):
         verify(task)
@@ -108,7 +108,7 @@ def test_units_other_than_volts_are_refused(task):
         )
 
 
-def test_a_terminal_configuration_the_device_does_not_have_is_refused(task):
+def test_a_terminal_configuration_that_the_device_lacks_is_refused(task):
     task.ai_channels.add_ai_voltage_chan(MODULE, terminal_config=TerminalConfiguration.RSE)
     with pytest.raises(DaqError, match="PSEUDO_DIFF"):
         verify(task)
@@ -145,7 +145,7 @@ def test_missing_inputs_and_invalid_combinations_are_refused(task, names, code):
         task.ai_channels.add_ai_voltage_chan(names)
 
 
-def test_a_later_channel_of_a_list_may_leave_out_its_device(task):
+def test_later_channels_of_a_list_may_leave_out_the_device(task):
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0, ai2")
     assert task.channel_names == ["Dev1/ai0", "Dev1/ai2"]
 
@@ -160,7 +160,7 @@ def test_channels_have_the_names_given_by_the_program(task):
     assert [device.name for device in task.devices] == ["Dev1"]
 
 
-def test_a_setting_of_a_channel_list_reaches_every_channel(task):
+def test_a_setting_made_on_a_list_of_channels_reaches_every_channel(task):
     both = task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1")
     both.ai_coupling = Coupling.AC
     assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2

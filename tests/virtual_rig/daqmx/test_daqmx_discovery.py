@@ -68,7 +68,7 @@ def test_a_device_can_be_given_the_name_in_a_configuration(connect):
 
 
 @pytest.mark.parametrize(("product", "name"), [("NI 9999", "Dev1"), ("NI 9234", "dev1")])
-def test_an_impossible_system_is_refused(product, name):
+def test_a_simulated_system_with_an_impossible_device_is_refused(product, name):
     with pytest.raises(ConfigurationError, match="nothing was started"):
         catalogue_with(product, name)
 

@@ -61,7 +61,7 @@ def test_a_task_can_be_closed_while_a_callback_is_registered(daq):
         task.close()
 
 
-def test_events_for_the_wrong_direction_are_refused(task):
+def test_events_that_belong_to_the_other_direction_are_refused(task):
     task.timing.cfg_samp_clk_timing(1000)
     with daq_error(DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT):
         task.register_every_n_samples_transferred_from_buffer_event(10, lambda *event: 0)

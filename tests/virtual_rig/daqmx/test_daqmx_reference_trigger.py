@@ -70,7 +70,7 @@ def test_a_task_waiting_for_its_trigger_can_be_stopped(daq, task):
     assert caught == [DAQmxErrors.RUNTIME_ABORTED_ROUTING]
 
 
-def test_in_real_time_a_reference_trigger_waits_for_its_line(connect):
+def test_a_reference_trigger_in_real_time_waits_for_its_trigger_line(connect):
     daq = connect(WallPace(speed=20.0))
     task = daq.inputs("Dev1/ai1", RATE_HZ, samples=SAMPLES)
     by_line(task)

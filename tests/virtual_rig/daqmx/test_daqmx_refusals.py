@@ -67,7 +67,7 @@ def test_a_cleared_task_is_refused_as_invalid(daq):
         interpreter.start_task(handle)
 
 
-def test_a_second_task_with_the_same_name_is_refused_or_attached(daq, task):
+def test_a_second_task_of_the_same_name_is_refused_or_attached_as_the_grpc_option_says(daq, task):
     def options(behavior):
         return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
 

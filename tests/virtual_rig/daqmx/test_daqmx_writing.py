@@ -65,7 +65,7 @@ def test_blocks_written_in_time_are_played_without_a_gap(pair):
 
 
 @pytest.mark.parametrize(("device", "block"), [("Dev1", 1000), ("Dev2", 1000), ("Dev2", 7000)])
-def test_a_buffer_as_large_as_the_first_block_suffices_with_the_memory_of_the_device(daq, device, block):
+def test_a_buffer_of_the_first_block_suffices_together_with_the_memory_of_the_device(daq, device, block):
     inputs, outputs = daq.task(), daq.task()
     inputs.ai_channels.add_ai_voltage_chan(f"{device}/ai0", min_val=-10, max_val=10)
     outputs.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-3.5, max_val=3.5)
@@ -153,7 +153,7 @@ def test_a_value_beyond_the_limits_is_refused_and_nothing_is_played(pair, daq):
         outputs.start()
 
 
-def test_limits_beyond_the_device_are_refused(daq):
+def test_output_limits_beyond_the_range_of_the_device_are_refused(daq):
     task = daq.outputs(OUTPUT, 10)
     with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, r"-3\.5 to 3\.5 V"):
         task.control(TaskMode.TASK_VERIFY)
@@ -196,7 +196,7 @@ def test_a_waveform_object_is_played_sample_by_sample(pair):
     np.testing.assert_allclose(inputs.read(500), ramp(500), atol=1e-12)
 
 
-def test_writing_to_a_task_of_inputs_is_refused(daq):
+def test_writing_to_a_task_with_inputs_is_refused(daq):
     task = daq.inputs("Dev1/ai0")
     with daq_error(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK):
         AnalogSingleChannelWriter(task.out_stream).write_many_sample(np.zeros(3))

@@ -30,7 +30,7 @@ def bench_on(rig):
     return open_bench(rig, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
 
 
-def test_loopback_needs_no_token_and_every_other_address_does():
+def test_loopback_needs_no_token_but_every_other_address_does():
     assert token_for("127.0.0.1:31763") is None
     assert token_for("localhost:0") is None
     assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")

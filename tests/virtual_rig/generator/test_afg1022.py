@@ -66,7 +66,7 @@ def errors(device):
         ("*WAI", "*OPC?", "1"),
     ],
 )
-def test_a_setting_reads_back_and_leaves_no_error(command, query, answer):
+def test_a_setting_is_read_back_as_set_and_leaves_no_error(command, query, answer):
     device = generator()
     assert device.execute(command.encode()).data == b""
     assert ask(device, query) == answer
@@ -124,7 +124,7 @@ def test_a_refused_command_queues_its_error_number_and_changes_nothing(command, 
     assert (device.settings(1), device.settings(2), device.memory.names) == settings
 
 
-def test_the_peak_limit_is_10_v_open_and_5_v_into_50_ohm():
+def test_the_peak_limit_is_10_v_into_an_open_circuit_and_5_v_into_50_ohm():
     device = generator()
     device.execute(b"VOLT 8;VOLT:OFFS 1")
     assert errors(device) == []
@@ -136,7 +136,7 @@ def test_the_peak_limit_is_10_v_open_and_5_v_into_50_ohm():
     assert errors(device) == [-221]
 
 
-def test_declaring_another_load_changes_the_reading_and_not_the_output():
+def test_declaring_another_load_changes_the_displayed_voltage_and_not_the_output():
     device = generator()
     device.execute(b"VOLT 2;:OUTP:IMP INF")
     assert ask(device, "VOLT?") == "4.0E+00"
@@ -144,7 +144,7 @@ def test_declaring_another_load_changes_the_reading_and_not_the_output():
     assert float(ask(device, "VOLT?")) == pytest.approx(3.0)
 
 
-def test_phase_is_in_radians_and_kept_in_whole_degrees():
+def test_phase_is_given_in_radians_and_kept_in_whole_degrees():
     device = generator()
     device.execute(b"PHAS:ADJ 31.9DEG")
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
@@ -158,7 +158,7 @@ def test_a_shape_with_a_lower_frequency_limit_reduces_the_frequency():
     assert ask(device, "FREQ?") == "1.25E+07"
 
 
-def test_locked_channels_share_one_frequency():
+def test_channels_with_locked_frequency_share_one_frequency():
     device = generator()
     device.execute(b"SOUR1:FREQ 100;:SOUR1:FREQ:CONC ON")
     assert ask(device, "SOUR2:FREQ?") == "1.0E+02"
@@ -197,7 +197,7 @@ def test_the_error_queue_overflows_at_its_end_and_clears_with_cls():
 
 
 @pytest.mark.parametrize("points", [2, 3, 8192])
-def test_an_uploaded_waveform_reads_back_identical(points):
+def test_an_uploaded_waveform_is_read_back_unchanged(points):
     codes = np.random.default_rng(points).integers(0, 16384, points).astype(">u2").tobytes()
     count = str(len(codes))
     block = f"#{len(count)}{count}".encode() + codes
@@ -209,7 +209,7 @@ def test_an_uploaded_waveform_reads_back_identical(points):
 
 
 class TestQuirks:
-    def test_the_first_identity_after_clear_is_empty_and_the_second_is_not(self):
+    def test_the_identity_is_empty_at_the_first_query_after_a_clear_and_correct_at_the_second(self):
         device = generator(replace(PLAIN, first_identity_after_clear_is_empty=True))
         identity = ask(device, "*IDN?")
         assert identity.split(",")[:3] == ["TEKTRONIX", "AFG1022", "C010101"]
@@ -233,13 +233,13 @@ class TestQuirks:
         assert device.execute(b"VOLT:LIM?").data == b""
         assert errors(device) == [-113]
 
-    def test_a_value_out_of_range_silently_becomes_the_default(self):
+    def test_a_value_out_of_range_is_silently_replaced_by_the_default(self):
         device = generator(replace(PLAIN, out_of_range_becomes_default=True))
         device.execute(b"VOLT 0.2;VOLT 11;:FREQ 30MHz")
         assert ask(device, "VOLT?;:FREQ?") == "1.0E+00;1.0E+06"
         assert errors(device) == []
 
-    def test_the_load_can_be_set_only_at_the_panel_with_the_panel_quirk(self):
+    def test_with_the_panel_quirk_the_load_can_be_set_only_at_the_panel(self):
         device = generator(replace(PLAIN, panel_load_ohm=50.0))
         device.execute(b"OUTP:IMP INF")
         assert errors(device) == [-113]

@@ -18,7 +18,7 @@ def reply_to(generator, message):
     return generator.execute(message).data
 
 
-def test_a_message_with_too_many_queries_loses_its_answers_with_error_430(afg):
+def test_a_message_with_too_many_queries_loses_its_answers_and_queues_error_minus_430(afg):
     query = b"DATA:DATA? EMEM"
     one = len(reply_to(afg, query))
     many = LONGEST_REPLY // one

@@ -34,7 +34,7 @@ def test_the_mean_of_a_shape_agrees_with_a_midpoint_sum(shape, start, span):
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, first=SPANS, second=SPANS)
-def test_means_over_two_adjacent_parts_add_up_to_the_mean_over_both_parts(shape, start, first, second):
+def test_the_means_over_two_adjacent_parts_combine_to_the_mean_over_both(shape, start, first, second):
     middle = (start + first) % 1.0
     parts = first * mean(shape, start, first) + second * mean(shape, middle, second)
     assert (first + second) * mean(shape, start, first + second) == pytest.approx(parts, abs=1e-9)

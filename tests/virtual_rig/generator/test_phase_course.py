@@ -18,7 +18,7 @@ def turn(first, second):
 
 
 @given(frequency_uhz=FREQUENCIES, time_s=TIMES)
-def test_a_day_at_25_mhz_loses_less_than_a_millionth_of_a_cycle(frequency_uhz, time_s):
+def test_a_day_at_25_mhz_shifts_the_phase_by_less_than_a_millionth_of_a_cycle(frequency_uhz, time_s):
     exact = Fraction(frequency_uhz, 1_000_000) * Fraction(time_s) % 1
     assert turn(SteadyPhase(frequency_uhz, 0.0).phase(time_s), float(exact)) < 1e-7
 
@@ -32,7 +32,7 @@ def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
 
 
 @pytest.mark.parametrize("spacing", Spacing)
-def test_a_sweep_has_its_start_and_stop_frequency_at_its_ends(spacing):
+def test_a_sweep_begins_at_its_start_frequency_and_ends_at_its_stop_frequency(spacing):
     sweep = SweptPhase(100.0, 900.0, 2.0, 1.0, spacing, begin_s=0.0, anchor_s=0.0, offset=0.0)
     edges = np.array([0.0, 1e-6, 1.0, 1.0 + 1e-6, 2.0 - 1e-6, 2.0])
     _, span = sweep.stretches(edges)

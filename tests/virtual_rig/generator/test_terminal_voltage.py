@@ -156,7 +156,7 @@ def test_rendered_samples_do_not_depend_on_the_block_size(mode):
 
 
 @given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))
-def test_the_terminal_noise_has_the_rms_of_its_density_up_to_nyquist(seed, density):
+def test_the_rms_of_the_terminal_noise_is_that_of_its_density_up_to_nyquist(seed, density):
     rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed))
     rig.send("FUNC DC;:OUTP ON")
     noise = rig.render(20_000)
@@ -207,7 +207,7 @@ def test_selecting_noise_is_accepted_but_the_previous_shape_keeps_playing():
     assert rig.render(1000) == pytest.approx(sine_means(1.0, 100.0, 0.0, 1000), abs=1e-10)
 
 
-def test_the_built_in_dc_ignores_the_offset_and_a_flat_waveform_does_not():
+def test_the_built_in_dc_shape_ignores_the_offset_but_a_flat_waveform_does_not():
     rig = Rig()
     rig.send("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
     assert not rig.render(5).any()
@@ -216,7 +216,7 @@ def test_the_built_in_dc_ignores_the_offset_and_a_flat_waveform_does_not():
     assert rig.render(5) == pytest.approx([1] * 5, abs=1e-6)
 
 
-def test_a_welded_relay_keeps_playing_although_the_output_reports_off():
+def test_a_welded_relay_keeps_the_output_playing_although_it_reports_off():
     rig = Rig()
     rig.send("FREQ 100;:VOLT 2;:OUTP ON")
     rig.generator.stick_output_relay(is_stuck=True)

@@ -162,7 +162,7 @@ class TestEffects:
         # The first retry fails at once; rig time advances only by half a second in each further retry.
         assert failures == 5
 
-    def test_a_disk_full_fault_ends_during_retries(self, scripted):
+    def test_a_fault_of_a_full_disk_ends_during_retries(self, scripted):
         with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
             power.let_pass(0.2)
             refusals = 0

@@ -90,7 +90,7 @@ def amplitude(volts):
     return np.std(volts) * np.sqrt(2)
 
 
-def test_a_sine_set_by_pyvisa_is_read_by_nidaqmx_through_the_whole_chain(switch_on):
+def test_a_sine_set_through_pyvisa_is_read_through_nidaqmx_over_the_whole_signal_chain(switch_on):
     program = switch_on()
     program.play(160, 0.2)
     task = program.task()
@@ -133,7 +133,7 @@ def test_two_rigs_of_one_configuration_agree_bit_for_bit(switch_on):
     assert np.array_equal(recorded[0], recorded[1])
 
 
-def test_a_load_that_only_the_panel_can_set_doubles_the_voltage(switch_on):
+def test_a_wrong_load_that_only_the_panel_can_set_doubles_the_voltage(switch_on):
     program = switch_on(quirks=Quirks(panel_load_ohm=50.0))
     program.play(160, 0.2)
     volts = program.read(program.task(), 6400)
@@ -200,7 +200,7 @@ def test_a_rig_on_an_address_in_use_is_refused_and_starts_nothing():
         assert serials_on_the_bus() == ["C060606"]
 
 
-def test_the_scale_of_the_driver_matches_the_step_of_the_samples(switch_on):
+def test_samples_are_multiples_of_the_step_that_the_driver_states(switch_on):
     program = switch_on()
     program.play(260, 1.0)
     task = program.task()

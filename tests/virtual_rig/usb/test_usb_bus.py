@@ -54,7 +54,7 @@ def plugged():
 
 
 @ignore_discovery_warnings
-def test_a_plain_pyvisa_script_lists_opens_queries_and_uploads(plugged):
+def test_a_plain_pyvisa_script_can_list_and_open_and_query_and_upload(plugged):
     # The code below does not know that the instrument is simulated.
     rm = pyvisa.ResourceManager("@py")
     (name,) = [name for name in rm.list_resources() if "::1689::851::" in name]
@@ -82,7 +82,7 @@ def test_a_plain_pyvisa_script_lists_opens_queries_and_uploads(plugged):
 
 
 @pytest.mark.parametrize("points", [2, 3, 31, 1000, 8191, 8192])
-def test_an_upload_of_any_length_reads_back_identical(plugged, points):
+def test_an_upload_of_any_length_is_read_back_unchanged(plugged, points):
     codes = np.random.default_rng(points).integers(0, 16384, points)
     plugged.instrument.write_binary_values("DATA:DATA EMEM,", codes, datatype="H", is_big_endian=True)
     back = plugged.instrument.query_binary_values(
@@ -93,7 +93,7 @@ def test_an_upload_of_any_length_reads_back_identical(plugged, points):
     assert plugged.instrument.query("SYST:ERR?").startswith("0,")
 
 
-def test_a_reply_beyond_the_timeout_is_a_visa_timeout_and_then_arrives(plugged):
+def test_a_reply_later_than_the_timeout_is_a_visa_timeout_and_arrives_afterwards(plugged):
     plugged.instrument.timeout = 500
     plugged.generator.delay_next_reply(0.8)
     with pytest.raises(VisaIOError) as error:
@@ -102,14 +102,14 @@ def test_a_reply_beyond_the_timeout_is_a_visa_timeout_and_then_arrives(plugged):
     assert plugged.instrument.read().strip() == "1"
 
 
-def test_reading_without_a_query_is_a_visa_timeout_with_error_420(plugged):
+def test_reading_without_a_query_is_a_visa_timeout_and_queues_error_minus_420(plugged):
     with pytest.raises(VisaIOError):
         plugged.instrument.read()
     assert plugged.instrument.query("SYST:ERR?").startswith("-420,")
 
 
 @pytest.mark.parametrize("how", ["cable", "bus"])
-def test_a_lost_device_raises_on_every_call(plugged, how):
+def test_a_lost_device_raises_an_error_on_every_call(plugged, how):
     if how == "cable":
         plugged.cable.pull_cable()
     else:

@@ -60,7 +60,7 @@ def test_the_proxy_raises_the_errors_of_a_timeout_and_of_a_stall(proxy):
     proxy.bulk_out(bytes([1, 1, 254, 0, 4, 0, 0, 0, 1, 0, 0, 0]) + b"*CLS")
 
 
-def test_a_pulled_cable_and_a_dead_server_raise_no_such_device(rig, proxy):
+def test_a_pulled_cable_and_a_dead_server_raise_the_error_no_such_device(rig, proxy):
     rig.cable.pull_cable()
     with pytest.raises(OSError, match="No such device") as pulled:
         proxy.bulk_out(bytes(12))
@@ -71,7 +71,7 @@ def test_a_pulled_cable_and_a_dead_server_raise_no_such_device(rig, proxy):
     assert pulled.value.errno == dead.value.errno == errno.ENODEV
 
 
-def test_a_connection_closed_by_the_client_raises_no_such_device(proxy):
+def test_a_connection_that_the_client_closed_raises_the_error_no_such_device(proxy):
     proxy.close()
     with pytest.raises(OSError, match="No such device") as error:
         proxy.bulk_in(64, 1000)

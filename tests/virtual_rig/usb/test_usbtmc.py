@@ -87,7 +87,7 @@ def test_a_new_message_discards_an_unread_reply_and_queues_an_error():
     assert host.ask(b"SYST:ERR?") == b'-410,"Query INTERRUPTED"\n'
 
 
-def test_a_read_without_a_query_times_out_and_reports_it():
+def test_a_read_without_a_query_times_out_and_queues_an_error():
     host = Host()
     with pytest.raises(TimeoutError):
         host.read()
@@ -127,7 +127,7 @@ def test_capabilities_state_488_2_without_remote_control_or_trigger():
 
 
 @pytest.mark.parametrize("damage", [b"", b"\x01\x01\x01\x00" + bytes(8), b"\x63\x01\xfe\x00" + bytes(8)])
-def test_a_malformed_transfer_stalls(damage):
+def test_a_malformed_transfer_stalls_the_endpoint(damage):
     host = Host()
     with pytest.raises(BrokenPipeError):
         host.device.bulk_out(damage)
@@ -140,7 +140,7 @@ def test_an_unsupported_class_request_stalls(request_number):
         Host().control(request_number)
 
 
-def test_a_trigger_message_stalls():
+def test_a_trigger_message_stalls_the_endpoint():
     host = Host()
     with pytest.raises(BrokenPipeError):
         host.device.bulk_out(host.header(128, 0, 0))

@@ -54,7 +54,7 @@ def test_decimation_keeps_a_constant_unchanged(ratio):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 300.0])
-def test_decimated_samples_are_complete_without_future_or_missing_input(ratio, delay_steps):
+def test_decimated_samples_use_no_future_input_and_miss_none(ratio, delay_steps):
     filtered = decimator(ratio, 1000, delay_steps)
     assert filtered.first_step(0) >= 1000 - history_steps(ratio, delay_steps)
     for sample in range(50):

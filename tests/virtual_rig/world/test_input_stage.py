@@ -53,7 +53,7 @@ def test_an_open_input_reads_zero_unless_excitation_is_on():
     assert stage(OPEN_INPUT, iepe_current_a=0.002).pass_on(signals(SINE))[1]
 
 
-def test_iepe_excitation_shifts_a_voltage_source_by_its_internal_voltage_drop():
+def test_iepe_excitation_shifts_a_voltage_source_by_the_drop_at_its_internal_resistance():
     volts, _ = stage(SOURCE, iepe_current_a=0.002).pass_on(signals(SINE))
     assert volts == pytest.approx(SINE + 0.1)
 

@@ -35,7 +35,7 @@ def noise(amplitude_vpp, realisation):
 
 
 @pytest.mark.parametrize("quantity", [BaseQuantity.FORCE, BaseQuantity.CURRENT, BaseQuantity.STROKE])
-def test_the_strongest_sine_stays_within_the_shakers_limits_from_fifty_hertz_up(quantity):
+def test_the_strongest_sine_from_fifty_hertz_up_stays_within_the_limits_of_the_shaker(quantity):
     limits = RIG.shaker.limits
     allowed = {
         BaseQuantity.FORCE: limits.force_n.value,

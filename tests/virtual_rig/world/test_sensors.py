@@ -40,7 +40,7 @@ def accelerometer(noise_m_per_s2=0.0, **config):
     )
 
 
-def test_a_steady_velocity_gives_volts_by_the_decoder_range():
+def test_a_steady_velocity_gives_the_voltage_set_by_the_decoder_range():
     volts = vibrometer().volts(np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
