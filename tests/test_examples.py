@@ -44,7 +44,7 @@ def test_the_branches_example_finds_symmetry_breaking_and_the_exponent_sum():
     assert 4.0 < float(re.search(r"dimension ([\d.]+)", lines[-1])[1]) < 5.0
 
 
-def test_the_chain_example_shows_transmission_in_the_gap_with_impacts():
+def test_the_chain_example_shows_that_impacts_transmit_motion_in_the_band_gap():
     gap, weak, strong = lines_of("chain_and_its_gap.py")
     assert gap == "gap of the endless chain: 373.4 to 462.0 Hz"
     within, above = (

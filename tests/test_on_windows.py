@@ -70,7 +70,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_posix_functions_removed_for_windows_tests_exist_here():
+def test_the_posix_functions_that_windows_tests_remove_exist_on_this_system():
     # A misspelt name, or one removed from Python, would test nothing.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
     assert int(call("-c", program).stdout) > 25

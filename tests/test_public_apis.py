@@ -195,5 +195,5 @@ def modules_loaded_by(program):
         ),
     ],
 )
-def test_importing_a_public_api_loads_no_large_library_without_need(program, heavy):
+def test_importing_a_public_api_loads_no_large_library_that_it_does_not_need(program, heavy):
     assert heavy.isdisjoint(modules_loaded_by(program))
