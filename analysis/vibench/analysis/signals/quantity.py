@@ -107,7 +107,7 @@ def converted_signal(
     for line_hz in (each for each in lines_hz if low_hz <= each <= high_hz):
         line = steady_line(rest, line_hz / sample_rate_hz)
         rest = rest - line.real
-        steady += (line * complex(derivative_factor(np.array(line_hz), given, wanted))).real
+        steady += (line * complex(derivative_factor(np.array(line_hz), power))).real
     centred = np.arange(rest.size) - 0.5 * (rest.size - 1)
     slope = float(centred @ rest) / max(float(centred @ centred), 1.0)
     spectrum = fft.rfft(rest - np.mean(rest) - slope * centred, padded)
