@@ -26,7 +26,7 @@ class RunningProgram:
         self.is_alive = is_alive
         try:
             with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                self._facts = file.read()  # read at once, because the program may remove the file
+                self._facts = file.read()  # read immediately: the program may remove the file
         except OSError:
             self._facts = b""
 

@@ -126,7 +126,7 @@ def second_region(r: Reading) -> Values:
         change("sweep", Direction.DOWN),
         *DAMPINGS,
     ),
-    draws=16,  # the last impact of a sweep depends on the end of chaos
+    draws=16,  # the last impact of a sweep depends on when chaos ends
     remark=(
         "The paper does not state the sweep's base amplitude, or its change with frequency. "
         "Once started, collisions continue at frequencies where they would not start, so their end is random."

@@ -117,7 +117,7 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
     for claim in claims:
-        # Claims on continuous models take too long to be computed under the settings in between.
+        # Claims on continuous models take too long for the intermediate settings.
         claim_settings = settings if claim.is_scored else [settings[0], settings[-1]]
         held = {
             each.name: "holds" if holds_from_rest(claim, evidence, each) else "fails"

@@ -31,7 +31,7 @@ def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> No
 def print_failures(plan: "GridPlan", failures: Failures) -> int:
     """Print each failed point with the reason on standard error; return the number of failed points."""
     for where, why in failures[:SHOWN_FAILURES]:
-        # Leave out axes that have a single value.
+        # Leave out axes with a single value.
         axes = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
         place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in axes)
         errors.print(f"error: {place}: {why}")

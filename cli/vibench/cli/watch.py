@@ -73,7 +73,7 @@ def stop(
     failures = []
     with ThreadPoolExecutor(
         len(programs)
-        # Stop all programs in parallel, so that one that does not answer does not delay the others.
+        # Stop all programs in parallel: an unresponsive program must not delay the others.
     ) as pool:
         deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
         for program, delivery in zip(programs, deliveries, strict=True):
@@ -112,7 +112,7 @@ def release(pid: Pid = None) -> None:
     """Continue a measurement that `vibench stop --level hold` or the window has put on hold."""
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
-        # A hold may have been requested without having taken effect yet, as in a pause; release it as well.
+        # A requested hold may not have taken effect yet, for example during a pause; release it as well.
         client.resume()
     console.print(f"{engine.what}, process {engine.pid}: has received the release.")
 

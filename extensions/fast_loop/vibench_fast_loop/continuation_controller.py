@@ -144,7 +144,7 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
         before, unknowns = seen, solver.correct(harmonics, predicted)
-        # A secant is used: nonzero harmonics change the level too, so that no bracket stays valid.
+        # Use a secant, not a bracket: nonzero harmonics also change the level, so a bracket becomes invalid.
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
             unknowns[1] -= min(max(wrong / slope, -most), most)

@@ -199,7 +199,7 @@ class Pool:
                     _call_back(job, kind, value)
 
     def _drop_worker(self, worker: "Worker", error: BaseException) -> None:
-        if worker in self.workers:  # unless a callback has closed the pool
+        if worker in self.workers:  # false if a callback has closed the pool
             self.workers.remove(worker)
             worker.end()
             if worker.job is not None:

@@ -109,7 +109,7 @@ class BenchLock:
         try:
             os.ftruncate(descriptor, 0)
             write_at(descriptor, f"{os.getpid()} of {getuser()}".encode(), 0)
-        except (OSError, KeyError, ImportError):  # another user's file, a full disk, a user without a name
+        except (OSError, KeyError, ImportError):  # another user's file, full disk, user without a name
             return
 
     def close(self) -> None:
@@ -365,13 +365,13 @@ def open_bench(
 def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.reachable_rig
-    # Open the generator first, which silences it: a killed program may have left it on, the converter busy.
+    # Open the generator first, which silences it: a killed program may have left its output on.
     generator = generator_driver(connected.generator).open(connected.generator)
     with ExitStack() as silencing:
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
-        note_open_bench(simulated + next(_instruments(rig)))  # the generator, as rig names may repeat
+        note_open_bench(simulated + next(_instruments(rig)))  # names the generator, as rig names may repeat
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)

@@ -181,7 +181,7 @@ class Attempts:
             self._bench = self._reopen_bench(self._reopen, error)
             self._note(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self._bench.idle(LOOK_EVERY_S)  # repeating at once seldom works
+            self._bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
         self._note(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _reopen_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:

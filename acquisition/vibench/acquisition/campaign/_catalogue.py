@@ -257,7 +257,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - only question marks
-                # The empty stamp has the file read again next time, because a disk error may be temporary.
+                # With an empty stamp the file is read again next time, because a disk error may be temporary.
                 (*astuple(entry), "" if entry.state == UNREADABLE else stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))

@@ -108,7 +108,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     """Lock on to the resonance at every level and record there; each level starts where the last ended."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # The tracked order may be 1 % of the whole motion, so the whole motion would seem settled too early.
+        # The tracked order may be 1 % of the motion, and the whole motion would seem settled too early.
         loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])

@@ -45,7 +45,7 @@ class DriveClock:
         angle = 2 * pi * self._near_hz * offset_s
         basis = np.stack([np.sin(angle), np.cos(angle), np.ones(count)], axis=1)
         solution = np.linalg.lstsq(basis, drive)[0]
-        # Phase in cycles of A sin(2 pi (f t + c)) at the block's centre, minus that of the nominal frequency.
+        # Phase [cycles] of A sin(2 pi (f t + c)) at the block's centre, relative to the nominal frequency.
         turns = float(np.arctan2(solution[1], solution[0])) / (2 * pi) - self._near_hz * centre_s
         before = self._phases[-1] if self._phases else turns
         turns = before + (turns - before + 0.5) % 1.0 - 0.5

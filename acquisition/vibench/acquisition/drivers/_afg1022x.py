@@ -46,7 +46,7 @@ class AFG1022X(ScpiInstrument):
     )
     # Frequencies are sent with a resolution of 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp. Half of that plus 0.1 % of the value is rounding; more means another value.
+    # The panel resolves 1 mVpp. A deviation above half of this plus 0.1 % of the value is no rounding.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape, too, because the sine's may be too high for the memory.
+            # Set the frequency before the shape too: that of the sine may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)

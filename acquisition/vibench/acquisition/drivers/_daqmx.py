@@ -300,7 +300,7 @@ class DaqmxDigitizer:
         with daqmx_call(
             f"reading samples {first_sample} to {first_sample + samples - 1} of {self._config.device}"
         ):
-            self._is_running = False  # until the block is complete, the run counts as failed
+            self._is_running = False  # the run counts as failed until the block is complete
             volts, counts = self._next_samples(samples)
             overloaded_roles = self._overloaded_roles()
             self._is_running = True

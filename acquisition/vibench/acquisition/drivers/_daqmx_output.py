@@ -21,7 +21,7 @@ from ._overload import require_playable
 _WRITE_TIMEOUT_S = 10.0
 # Number of zeros at the end: the output holds the last value, and some devices need more than one sample.
 _ZERO_SAMPLES = 64
-# Rounding of the rate that is read back; a larger deviation means that the rate is another one.
+# Rounding error of the rate that is read back; a larger deviation means a different rate.
 _SAME_RATE = 1e-6
 
 
@@ -131,7 +131,7 @@ class DaqmxOutput:
     def close(self) -> None:
         """Set the output to zero volts and release it. May be called at any time."""
         self._is_open = False
-        if self._task is not None:  # otherwise `stop` has succeeded, or raised its error
+        if self._task is not None:  # otherwise `stop` has succeeded or raised an error
             self.stop()
 
     def _reserve(self) -> Task:

@@ -115,7 +115,7 @@ class GeneratorModel:
                 f"{fewest} to {most} points. Nothing was sent; resample it"
             )
         peak = float(np.max(np.abs(values)))
-        # This form, and not "peak > 1", also refuses a NaN.
+        # Unlike "peak > 1", this form also refuses a NaN.
         if not peak <= 1.0 + 1e-9:
             raise LimitExceeded(
                 f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "

@@ -88,7 +88,7 @@ class ScpiInstrument:
             else:
                 block = pyvisa.util.to_ieee_block(codes.tolist(), "H", is_big_endian=True)
                 self._link.write_raw(message.encode("ascii") + block + b"\n")
-            # Some firmware drops messages that come too soon after a command, without reporting it.
+            # Some firmware silently drops messages that come too soon after a command.
             if self._settle_s > 0:
                 self._pause(self._settle_s)
             return self.complaints()

@@ -72,7 +72,7 @@ def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
 
 def _follow_parent(handler: RequestHandler) -> None:
     """Wait until the parent has closed the standard input and no work remains, then end the engine."""
-    # Not through sys.stdin: a buffer on which a thread waits cannot be closed at the end of the process.
+    # Do not use sys.stdin: a buffer on which a thread waits cannot be closed when the process ends.
     while os.read(sys.stdin.fileno(), 4096):
         pass
     pause = Event()

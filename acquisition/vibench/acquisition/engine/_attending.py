@@ -68,7 +68,7 @@ class _Program:
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
             self._lived_s = monotonic()
-        os._exit(0)  # this ends the process even while the other thread waits
+        os._exit(0)  # ends the process even while the other thread waits
 
 
 def main() -> None:

@@ -167,7 +167,7 @@ class Engine:
         if request.twin is TwinSwitch.ON or may_end_by_change:
             self.turn_twin(TwinSwitch.ON)
         try:
-            # Before the check of the bench: a plan that cannot be played is refused before anything moves.
+            # This precedes the check of the bench, so an unplayable plan is refused before anything moves.
             require_all_within_limits(request.campaign.points(), self.bench)
             make_folder(request.folder)
             with stop_on_signal(self.switch):

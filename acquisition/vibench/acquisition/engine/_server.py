@@ -105,7 +105,7 @@ class Admission:
         oldest = next(iter(self._waiting.values()), None)
         if oldest is not None and len(self._waiting) >= WAITING_MOST:
             if monotonic() - oldest.since_s < YOUNG_S:
-                sleep(YOUNG_S / 10)  # messages of waiting clients may be on the way; they are read first
+                sleep(YOUNG_S / 10)  # first read messages that waiting clients may have sent
                 return
             self._turn_away(next(iter(self._waiting)))
         try:
@@ -244,7 +244,7 @@ class Server:
         try:
             # Thread.start would wait until the thread runs, which never happens without memory.
             start_new_thread(self._serve, (viewer,))
-        except RuntimeError:  # the system gives no more threads
+        except RuntimeError:  # the system refuses further threads
             self._leave(viewer)
 
     def _make_room(self) -> None:

@@ -90,7 +90,7 @@ class EngineProcess(ClosedOnLeaving):
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        # Close the pipes last: when its input ends, an engine takes its parent as ended.
+        # Close the pipes last: an engine whose input ends assumes that its parent has ended.
         self._close_pipes()
 
     def _close_pipes(self) -> None:
@@ -188,7 +188,7 @@ def stop_engine(
             return StopDelivery.UNHEEDED
         case Fate.NOT_TAKEN if _runs(engine):
             if isinstance(engine, Announcement):
-                with suppress(EngineError):  # the engine hangs: the stop remains in the folder
+                with suppress(EngineError):  # the engine does not respond; the stop remains in the folder
                     return _send_stop(engine, level, reason)
             return StopDelivery.KEPT
     with suppress(OSError):

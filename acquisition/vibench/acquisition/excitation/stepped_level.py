@@ -82,10 +82,10 @@ class SteppedLevel(FixedSine):
                 yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
 
     def _steps(self) -> int:
-        # Count without building the list: a typing error in the step could give millions of levels.
+        # Count without building the list: a typing error in the step could mean millions of levels.
         ways = sum(1 for _ in self.direction.passes(()))
         return ways * self._count()
 
     def _count(self) -> int:
-        # 1e-9 includes a lowest level that the steps miss only by rounding.
+        # The tolerance 1e-9 keeps a lowest level that the steps miss only by rounding.
         return floor((self.amplitude_vpp - self.lowest_vpp) / self.step_vpp + 1e-9) + 1

@@ -33,7 +33,7 @@ class FrequencyGrid(FrozenModel):
             )
         steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
         if steps > 2 * MOST_STEPS:
-            # Check before building the list: a typing error in the step could give millions of values.
+            # Check before building the list: a typing error in the step could mean millions of values.
             raise ValueError(
                 f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: raise step_hz or "
                 "split the measurement"
@@ -43,7 +43,7 @@ class FrequencyGrid(FrozenModel):
     @property
     def values_hz(self) -> tuple[float, ...]:
         """Frequencies in ascending order [Hz]."""
-        # 1e-9 includes a stop frequency that the steps miss only by rounding.
+        # The tolerance 1e-9 keeps a stop frequency that the steps miss only by rounding.
         count = floor((self.stop_hz - self.start_hz) / self.step_hz + 1e-9) + 1
         return tuple(self.start_hz + number * self.step_hz for number in range(count))
 

@@ -69,7 +69,7 @@ class Range(FrozenModel):
     def _count(self) -> int:
         if self.step is None:
             return self.count or 0
-        # 1e-9 includes a stop that the steps miss only by rounding.
+        # The tolerance 1e-9 keeps a last value that the steps miss only by rounding.
         return floor((self.stop - self.start) / self.step + 1e-9) + 1
 
 

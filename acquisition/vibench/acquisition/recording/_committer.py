@@ -152,7 +152,7 @@ class Committer:
     def _next(self) -> tuple[Batch | None, bool]:
         """Return the next batch (None if a commit is due, or none is left), and whether all is written."""
         with self._changed:
-            # With nothing to commit, wait for the next batch without a time limit.
+            # If there is nothing to commit, wait for the next batch without a time limit.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
             timeout_s = None if remaining_s is None else max(remaining_s, 0.0)
             self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)

@@ -105,7 +105,7 @@ def _hold_dropouts(velocity: Samples, longest: float) -> list[Dropout]:
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
     steep = change > _QUANTA * np.min(change, where=change > 0.0, initial=np.inf)
-    # A clipped peak also has equal samples, but at the channel's largest magnitude.
+    # Samples of a clipped peak are also equal, but have the channel's largest magnitude.
     is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
     held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
     ends = zip(first[held].tolist(), last[held].tolist(), strict=True)
@@ -169,7 +169,7 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
             # The flanks end at the neighbouring runs, whose samples are not motion.
             before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
             is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
-            is_short = one.stop - one.first <= longest + flank  # includes ringing on both sides
+            is_short = one.stop - one.first <= longest + flank  # `flank` allows for ringing on both sides
             if so_far is not None and is_alone and is_short:
                 rough = _roughness(velocity, one, before, after)
                 if rough < np.inf:
@@ -308,6 +308,6 @@ class BridgedChannel:
         heard = find_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
-        if end == stop + margin:  # otherwise a growing recording may get more samples here
+        if end == stop + margin:  # otherwise a growing recording may add samples here
             known[self.role, place] = found
         return found

@@ -62,7 +62,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     name = str(channel["long_name"]) or role
     data = view.create_group(role)
     write_attributes(data, {"NX_class": "NXdata", "signal": SIGNAL, "axes": layout.TIME, "time_indices": 0})
-    # Low and high of each bin alternate; both are NaN if all samples of the bin are lost.
+    # Lowest and highest value of each bin alternate; both are NaN if all its samples are lost.
     counts = np.column_stack((overview.low, overview.high)).ravel()
     values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
     physical = np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)

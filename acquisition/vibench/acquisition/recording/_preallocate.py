@@ -229,7 +229,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                             sync_folder(path.parent)
                         return answer
                 finally:
-                    with suppress(OSError):  # absent after the rename
+                    with suppress(OSError):  # after the rename, the file no longer exists
                         tmp.unlink()
     except RecordingError:
         raise

@@ -479,8 +479,8 @@ def open_read_only(path: Path) -> sqlite3.Connection:
 
 
 # An analysis must read the same samples that were checked, although it reads the file again.
-# The check therefore keeps the state of each channel's checksum before every piece, by seal. When a piece is
-# read later from a file with this seal, it is hashed again and compared with these states.
+# For each seal, the check therefore keeps the state of each channel's checksum before every piece. A piece
+# that is read later from a file with this seal is hashed again and compared with these states.
 
 _KNOWN: dict[str, ChannelStates] = {}
 """Checksum states by seal; about 20 kB for a recording of a minute."""

@@ -231,7 +231,7 @@ class PhaseRunner:
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
             yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # leave out the time of the next command
+            self.loop.enter(None)  # exclude the time that the next command takes
         waits = self._drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:

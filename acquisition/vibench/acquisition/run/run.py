@@ -317,7 +317,7 @@ class Run(ClosedOnLeaving):
             playing = phases(self._measurement)
         if self._until is not None:
             playing = self._until.phases(self._measurement)
-        # An analogue output writes in advance, so it reads the same phases earlier than the run.
+        # An analogue output is written in advance, so it needs each phase before the run does.
         playing, announced = tee(playing)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:

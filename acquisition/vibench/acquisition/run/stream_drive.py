@@ -132,7 +132,7 @@ class OutputSynthesizer:
 
 BLIND_FADE_S = 0.1
 """Duration of the fade when the run ends without sampling [s]."""
-# Keeps rounding errors from adding a part to a duration of a whole number of blocks.
+# Prevents a rounding error from adding a block to a duration of a whole number of blocks.
 _ROUNDING = 1e-9
 
 

@@ -113,7 +113,7 @@ class UntilWatch(ClosedOnLeaving):
         self._longest_s = phase.duration_s
         self._begin(min(self._until.shortest_s, phase.duration_s))
         left_s = phase.duration_s
-        while left_s > 1e-9 and not self._is_reached:  # 1e-9 ignores a remainder due to rounding
+        while left_s > 1e-9 and not self._is_reached:  # the tolerance ignores a remainder due to rounding
             piece_s = min(PIECE_S, left_s)
             yield Phase(phase.state, phase.play, piece_s, phase.segment)
             left_s -= piece_s

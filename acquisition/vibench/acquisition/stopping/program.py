@@ -32,7 +32,7 @@ from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 
 # A stop needs no connection: it is a file in the state folder, which a driving program checks all the time.
-# The file name contains process, start time and level, so a process that may open no more files can still see
+# The file name contains process, start time and level, so a process that cannot open more files can still see
 # the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
 
 SILENT_REASON = "a stop request in the state folder"
@@ -83,7 +83,7 @@ class KeptStops:
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             self._taken.add(path)
             with suppress(OSError):
-                _answer(path, "silent").unlink(missing_ok=True)  # this file is the answer to an earlier stop
+                _answer(path, "silent").unlink(missing_ok=True)  # the answer to an earlier stop
                 rename(path, _answer(path, "taken"))
         self.confirm()
 
@@ -284,7 +284,7 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
             continue
         try:
             yield path, model.model_validate_json(_read_announcement(path))
-        except (ValueError, OSError):  # a file from another version, of another type, or removed meanwhile
+        except (ValueError, OSError):  # the file is of another version or type, or was removed
             continue
 
 

@@ -59,7 +59,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     found = np.full(last, -1, dtype=np.int64)
     tried = 4
     while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
-        # A list of neighbour ranks keeps the result two-dimensional.
+        # With a list of ranks, the result is two-dimensional even for one neighbour.
         ranks = list(range(1, min(tried, last) + 1))
         reach, index = (np.asarray(each) for each in tree.query(points[wanted], k=ranks))
         allowed = (np.abs(index - wanted[:, np.newaxis]) >= apart) & (reach > floor)

@@ -227,7 +227,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
             break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
-        # These numbers of peaks include the peak itself.
+        # The counted peaks include the peak itself.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
     return tuple(sorted(peaks, key=lambda each: each.frequency_hz))

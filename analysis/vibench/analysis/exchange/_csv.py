@@ -241,7 +241,7 @@ def _encoding(path: Path) -> str:
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    # Text has no zero bytes, except UTF-16, which has one in nearly every second place.
+    # Text contains no zero bytes, except UTF-16, where nearly every second byte is zero.
     zeros = [2 * head[place::2].count(0) / max(len(head), 1) for place in (0, 1)]
     if max(zeros) > 0.9 and min(zeros) == 0.0:
         return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"

@@ -36,8 +36,8 @@ from ._source_channel import (
 
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #
-# Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". A header of 128 bytes, then elements: a tag
-# (type, bytes) and data padded to eight bytes. A matrix contains elements, a compressed element contains one.
+# Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". After a header of 128 bytes, each element has
+# a tag (type, bytes) and data padded to eight bytes. A matrix has several elements, a compressed element one.
 
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15

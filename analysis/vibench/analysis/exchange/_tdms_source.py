@@ -61,7 +61,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
                 for name in properties or ():
-                    # The text of npTDMS for a time is wrong by a second near the end of a second.
+                    # Near the end of a second, the text that npTDMS gives for a time is wrong by a second.
                     statements.setdefault(name, {})[self._before.get(name, 0)] = tuple(
                         (each, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
                         for each, value in self.object_metadata[name].properties.items()

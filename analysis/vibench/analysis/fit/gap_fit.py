@@ -94,7 +94,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
         if hz.size < _LEAST_INTERVALS or sweep.collisions.is_unexplained[before].any():
             continue
         apart = _apart(motion.response_ii[before], np.abs(swept_response(linear, hz, rate)[:, _M0]))
-        # Fit a line over frequency, because collisions disturb the base motion.
+        # Fit a line over frequency below the collisions, because they disturb the base motion.
         line = np.polynomial.Polynomial.fit(hz, a0_m, 1)
         drive_sd = float(np.median(motion.sd_drive_amplitude_m[before] / a0_m))
         near = np.append(edge.frequency_hz, np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS))

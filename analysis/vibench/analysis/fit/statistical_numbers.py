@@ -21,7 +21,7 @@ from .specimen_fit import SpecimenFit
 
 # Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.
 #
-# Parameters are drawn from a box (a range of each), and a run is simulated for each. Each parameter is
+# Parameters are drawn from a box (one range each), and a run is simulated for each. Each parameter is
 # regressed on the statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The
 # posterior is the prediction for the observed statistics plus leave-one-out errors. Its intervals have the
 # stated coverage for parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman

@@ -370,7 +370,7 @@ class _Sums:
 
     def misfit_rates(self, poles: Reals) -> Reals:
         """Return the derivatives of the residual with respect to each pole."""
-        # That the factors depend on the poles does not change the gradient (Kaufman 1975, BIT 15, 49-57).
+        # Although the factors depend on the poles, the gradient is the same (Kaufman 1975, BIT 15, 49-57).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)

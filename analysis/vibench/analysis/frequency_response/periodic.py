@@ -90,7 +90,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
     the repetition frequency, up to `TRUSTED_BAND` of the sample rate.
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
-    # Continue the record periodically by the reach of the interpolation.
+    # Continue the record periodically, as far as the interpolation reaches.
     size = samples.shape[-1]
     missing = max(0, int(np.ceil(periods * period_samples)) - size)
     before = interpolate(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)

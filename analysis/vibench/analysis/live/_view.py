@@ -61,7 +61,7 @@ class ImpactCounter:
         self._difference[::span] = _SIXTH_DIFFERENCE
         kink = _kink(self._difference, sample_rate_hz, 3 - quantity.derivatives)
         power = float(kink @ kink)
-        # Difference and matched filter in one: the input are samples, the output is the strength of kinks.
+        # Difference and matched filter in one: its input is samples, its output the strength of kinks.
         self._finder = np.convolve(self._difference, kink[::-1]) / power
         self._gain = float(np.sqrt(np.sum(self._finder**2)))
         self._beam = np.correlate(kink, kink, mode="full") / power

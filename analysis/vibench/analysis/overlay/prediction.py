@@ -80,7 +80,7 @@ def predict(
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
-    # If points follow one another, half of the time is for settling after the step in frequency.
+    # If points follow one another, half of the time is allowed for settling after the frequency step.
     window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
 
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:

@@ -116,7 +116,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
             f"more than {votes}"
         )
     ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
-    # Take the maximum over the neighbours: real resonances may differ a little from the described ones.
+    # Take the maximum over neighbouring intervals: real and described resonances may differ a little.
     rung = maximum_filter1d(_RINGING * np.nan_to_num(sweep.linear_impacts), votes)
     impacts = sweep.velocity.impacts > np.maximum(_IMPACTS, rung)
     most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))

@@ -158,7 +158,7 @@ def slow_change(parts: Complexes | Reals) -> float:
     power = float(np.sum(np.abs(off) ** 2))
     if count < _FEWEST_BLOCKS or power == 0.0:
         return 0.0
-    # Neighbouring parts of a linear trend correlate less if there are few parts.
+    # With few parts, neighbouring parts of a linear trend are less correlated.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
     if float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) <= min(limit, _SLOW) * power:
         return 0.0

@@ -122,7 +122,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     inside = line[edge:-edge]
     # Remove sensor drift: it would jump where the record is continued, and integration amplifies jumps.
     data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
-    # Outside the step, frequency or level differ, and integration would mix them in. Instead, continue the
+    # Outside the step, frequency or level differ, and integration would include them. Instead, continue the
     # sine exactly, and the rest by copies.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]

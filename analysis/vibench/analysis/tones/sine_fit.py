@@ -202,7 +202,7 @@ def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float
     factor = np.abs(derivative_factor(density.frequency_hz[kept], -2))
     spacing_hz = density.sample_rate_hz / density.segment_samples
     power = density.density[kept] * spacing_hz
-    # Lines within one noise bandwidth are not independent; the rms has half the relative spread of the power.
+    # Lines within a noise bandwidth depend on each other; the rms has half the relative spread of the power.
     lines = np.count_nonzero(kept) / (density.noise_bandwidth_hz / spacing_hz)
     return NoiseDriveLevel(
         low_hz=low_hz,

@@ -198,7 +198,7 @@ def _channel(bench: Mapping[str, Any], role: str, mine: Mapping[str, Any]) -> It
     if angle is None:
         yield Contribution(Cause.ALIGNMENT, None, f"{sensor}: alignment_deg is not stated")
     else:
-        # Root of the mean of (angle^2 / 2)^2 over a uniform angle.
+        # Rms of angle^2 / 2 for a uniformly distributed angle.
         relative = np.radians(float(angle["value"])) ** 2 / np.sqrt(20.0)
         yield Contribution(Cause.ALIGNMENT, float(relative), f"{sensor}: {angle['source']}")
 

@@ -114,7 +114,7 @@ def simulated_dwell(
 
 def _scatter(found: DwellResponse) -> tuple[float, float]:
     """Return the relative scatter of both Responses, as for a recording."""
-    # A small non-repeating part counts as noise.
+    # A small part that does not repeat counts as noise.
     like_noise = float(np.nan_to_num(found.noise_error_i)) / found.response_i
     chance = of_one_draw(found).relative or 0.0
     return float(np.hypot(like_noise, chance)), found.sd_response_ii / found.response_ii

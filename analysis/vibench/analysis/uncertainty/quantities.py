@@ -235,7 +235,7 @@ def _largest(
         own = [from_scatter(Cause.NOISE, float(scatter[top]), value, source)]
         if isinstance(found, SweepResponse):
             is_hidden = ~found.is_clear | np.isnan(found.response_i)
-            # Motion that a bridge over a drop-out misses adds to the scatter within its interval.
+            # Motion missed by the interpolation over a drop-out adds to the scatter of its interval.
             if np.any((found.response_ii + 2 * sd)[is_hidden] > found.response_ii[top]):
                 own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
         if collides[top]:

@@ -238,7 +238,7 @@ def _even(low: float, high: float) -> list[float]:
     rough = (high - low) / 6
     decade = 10 ** floor(log10(rough))
     step = next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough)
-    edge = 1e-9  # gives limits that are round numbers a tick, in spite of rounding errors
+    edge = 1e-9  # a round limit gets a tick in spite of rounding errors
     first, last = ceil(low / step - edge), floor(high / step + edge)
     return [log10(n * step) for n in range(first, last + 1) if n > 0]
 

@@ -144,7 +144,7 @@ def chain_lyapunov_exponent(
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
     """Return the second motion, moved on the line between both to the small distance from the first."""
     apart = second - first
-    # Compare at least with a displacement of all masses by the drive amplitude: at rest the size is zero.
+    # The size is at least a displacement of all masses by the drive amplitude, because it is zero at rest.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))

@@ -97,7 +97,7 @@ def chain_response_to(
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
     """Raise ValueError if computing one drive period exceeds the time limit, from trials of rising length."""
-    integrate_chain(chain, drive, TRIED_S, accuracy)  # not timed: it prepares the engine
+    integrate_chain(chain, drive, TRIED_S, accuracy)  # not timed, because it prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
         tried_s, began_s = 4.0 * tried_s, time.monotonic()

@@ -71,7 +71,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     if len(counts) == 0 or variances[0] == 0.0:
         error = 0.0 if len(series) > 1 else math.nan
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
-    # Choose the smallest block length from which on neighbouring blocks are not correlated.
+    # Choose the smallest block length at and above which neighbouring blocks are uncorrelated.
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
     # For n independent values the correlation of neighbours has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]

@@ -297,7 +297,7 @@ class SettlingCourse:
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have become quasi-periodic, which does not repeat either, but whose growth is zero.
+        # Chaos may have become quasi-periodic: such a motion does not repeat either, but its growth is zero.
         run.follow_tangent()
         begins, made = run.copy(), round(run.time_s * pace.frequency_hz)
         last = [

@@ -31,7 +31,7 @@ def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
     try:
         return _fixed_point(near, period)
     except (ValueError, np.linalg.LinAlgError):
-        # The iteration left the allowed states, or a Floquet multiplier is one.
+        # The iteration left the allowed states, or a Floquet multiplier equals 1.
         return None
 
 

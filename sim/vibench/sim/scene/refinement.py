@@ -268,7 +268,7 @@ class _Refinement:
                 return None
             spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The nominal cost, which is the same on every machine, sets the length, unless far too low.
+            # Unless far too low, the nominal cost sets the length, because it is the same on every machine.
             self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 

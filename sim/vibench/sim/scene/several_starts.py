@@ -241,7 +241,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # Share out the budget that finished starts did not use.
+                continue  # Distribute the budget that finished starts did not use.
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)

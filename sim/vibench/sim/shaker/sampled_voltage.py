@@ -106,7 +106,7 @@ def follow_voltage(
         motion = shaken.move(fine, block=block)
         impacts.append(motion.contacts)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
-        # The last samples can be filtered only with the motion after them, except at the end of the record.
+        # Filtering the last samples requires the motion after them, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]

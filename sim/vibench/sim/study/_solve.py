@@ -59,7 +59,7 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     # The name of the start does not change the motion.
     content["start"].pop("name", None)
     if content["target"] is None:
-        # Keep the digests in files that were written before scenes had a target.
+        # Keeps the digests of files that were written before scenes had a target.
         del content["target"]
     if continued:
         content["start"] = {"continues": continued}

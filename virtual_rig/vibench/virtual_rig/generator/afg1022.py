@@ -202,7 +202,7 @@ def _whole_degrees(parameter: bytes) -> int:
     angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
         raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
-    # A small margin prevents truncation of 31 degrees, sent in radians, to 30.
+    # Without this margin, 31 degrees sent in radians could be truncated to 30.
     return math.floor(angle_deg + 1e-9)
 
 

@@ -22,7 +22,7 @@ from .terminal_voltage import (
 )
 
 # Settings by channel, and their limits. Amplitude and offset are stored as open-circuit voltages. The panel,
-# commands and queries use that voltage divided down by the declared load (``OUTP:IMP``), so declaring another
+# commands and queries use the voltage across the declared load (``OUTP:IMP``), so declaring another
 # load changes the reading, not the output.
 
 LOWEST_FREQUENCY_HZ = 1e-6

@@ -308,6 +308,6 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     # Coinciding edges give empty intervals, which have no weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # Divisions of other intervals must not change the mean of an undivided one, even in the last bit.
+    # Dividing other intervals must not change the mean of an undivided interval, even in the last bit.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

@@ -139,7 +139,7 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-# Cache peaks: a chaotic curve has thousands, and they are needed whenever a curve is ticked.
+# Cache peaks: a chaotic curve has thousands, which are needed whenever a curve is ticked.
 _peaks = lru_cache(maxsize=64)(curve_peaks)
 
 

@@ -133,7 +133,7 @@ class FilesPage(Page):
         entries, shown = found.recordings, self.table.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
-        # A late result must not replace a newer selection.
+        # The late result of an older selection must not replace a newer one.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
         shown.show_entries(entries)

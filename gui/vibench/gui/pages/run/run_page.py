@@ -335,7 +335,7 @@ class ArmCard(QGroupBox):
         if words != self._armed:
             self._armed, self._read = words, ()
             if words:
-                # Focus Cancel, so that the key that armed the plan cannot start it as well.
+                # Focus Cancel, so that the key press that armed the plan cannot start it as well.
                 self.cancel_button.setFocus()
                 self.news.emit()
         self.start_button.setEnabled(self.is_read)

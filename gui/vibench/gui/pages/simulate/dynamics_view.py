@@ -155,7 +155,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _buttons(self) -> QLayout:
         self._begin = push_button("Find", "Start the computation in a separate process", self.begin, "first")
-        self.simulator.cancel_button.setText("Cancel")  # without the key Alt+C, which another tab uses
+        self.simulator.cancel_button.setText("Cancel")  # no shortcut Alt+C: another tab uses it
         return row((self._begin, 1), self.simulator.cancel_button)
 
     def _right(self) -> QWidget:

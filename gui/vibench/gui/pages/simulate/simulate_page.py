@@ -52,7 +52,7 @@ class SimulatePage(Page):
         self._build()
         self.form.changed.connect(self._say_cost)
         context.scene_requested.connect(self.show_scene)
-        with suppress(ValueError):  # the stored scene may be from another version, or edited by hand
+        with suppress(ValueError):  # another version or a user may have written the stored scene
             self.form.form.show_content(dict(json.loads(context.settings.text(SettingKey.SCENES))))
         if self.form.value is None:
             self.form.form.show_content({})
