@@ -89,7 +89,7 @@ def stop_programs(level: str, reason: str, pid: str) -> int | None:
         return None
     for each, fate in zip(living, fates, strict=True):
         if fate is Fate.SILENT:
-            print(f"{each.name()}: has carried out the stop ({level}); its output is off.")  # noqa: T201
+            print(f"{each.name()}, has carried out the stop ({level}); its output is off.")  # noqa: T201
     unconfirmed = [each for each in programs if each not in living]
     unconfirmed += [each for each, fate in zip(living, fates, strict=True) if fate is not Fate.SILENT]
     for each in unconfirmed:

@@ -127,7 +127,7 @@ def stops_more_chaotic(r: Reading) -> Values:
 
 @costly_claim(
     "4, Fig. 10(c)",
-    "Smallest increase of the share of frequencies at which they differ by over 10 per second.",
+    "Smallest increase of the share of frequencies at which the two exponents differ by over 10 per second.",
     at_least("smallest increase of frequencies", "%", 0.0),
 )
 def exponents_part(r: Reading) -> Values:

@@ -53,7 +53,7 @@ def rates(r: Reading, model: str, what: str) -> Reals:
 
 @claim(
     "4, Fig. 1(c)",
-    "Shares of the upper half of the gap in which this holds; the sum has equal shares of force.",
+    "Share of the upper half of the gap where each statement holds; the sum has equal shares of force.",
     at_least("upper half-gap with sum between 5 and 7", "%", 1.0),
     at_least("with larger n closer", "%", 1.0),
     tried=(SEVENTH_COUNTS,),
@@ -103,7 +103,7 @@ def cubic_ii(r: Reading) -> Values:
 
 @claim(
     "4, Fig. 7(e-h)",
-    "Eqs. 6 and 7 at 1 µm, the smaller of 5 and 10 µm, and 50 µm.",
+    "Eqs. 6 and 7 at 1 µm, at 5 or 10 µm (smaller rate), and at 50 µm.",
     *_fall_and_rise("lower of 5 and 10 µm"),
     tried=(*FITTED, *DAMPINGS),
     draws=_DRAWS,

@@ -89,4 +89,4 @@ def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_o
 @pytest.mark.parametrize("time", ["1e9h", "1e300h"])
 def test_long_campaign_times_are_valid(vibench_here, tmp_path, time):
     ran = vibench_here("measure", "quick", "--out", "a", "--estimate", "--within", time, cwd=tmp_path)
-    assert "add until to a measurement" in ran.stderr
+    assert "add 'until' to a measurement" in ran.stderr

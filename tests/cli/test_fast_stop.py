@@ -64,7 +64,7 @@ def test_the_fast_stop_delivers_the_stop_with_its_options(words, told):
     with driving_program("north") as north:
         said = vibench_stop(*words)
         assert said.returncode == 0
-        assert f"north, process {north.pid}: has carried out the stop" in said.stdout
+        assert f"north, process {north.pid}, has carried out the stop" in said.stdout
         assert north.communicate(timeout=20)[0] == f"{told}\n"
 
 

@@ -61,7 +61,7 @@ def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
         told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         for what, program in (("north", north), ("south", south)):
-            assert f"{what}, process {program.pid}: has carried out the stop (off)" in told.stdout
+            assert f"{what}, process {program.pid}, has carried out the stop (off)" in told.stdout
             assert program.communicate(timeout=20)[0] == "off smoke\n"
 
 
@@ -87,7 +87,7 @@ def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_h
             told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
             assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
             assert told.returncode == 1
-            assert f"south, process {south.pid}: has carried out the stop (abort)" in told.stdout
+            assert f"south, process {south.pid}, has carried out the stop (abort)" in told.stdout
             assert f"hangs, process {hangs.pid} runs but does not answer" in told.stderr
         assert hangs.communicate(timeout=20)[0] == "abort vibench stop\n"
 
@@ -99,8 +99,8 @@ def test_all_programs_are_found_in_containers_that_share_a_state_folder(vibench_
         programs = [running.enter_context(driving_program(what, *CONTAINER)) for what in ("north", "south")]
         told = vibench_here("stop", "--level", "abort", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
-        assert "north, process 1: has carried out the stop (abort)" in told.stdout
-        assert "south, process 1: has carried out the stop (abort)" in told.stdout
+        assert "north, process 1, has carried out the stop (abort)" in told.stdout
+        assert "south, process 1, has carried out the stop (abort)" in told.stdout
         assert [each.communicate(timeout=20)[0] for each in programs] == ["abort smoke\n"] * 2
     assert all(".silent-" in each.name for each in engines_folder().iterdir())
 

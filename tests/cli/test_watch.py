@@ -168,7 +168,7 @@ class TestWithoutAnEngine:
         assert [(each["pid"], each["what"]) for each in listed["programs"]] == [(script.pid, "alone")]
         told = vibench_here("stop", "--level", "abort", "--reason", "from elsewhere", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
-        assert f"alone, process {script.pid}: has carried out the stop (abort)" in told.stdout
+        assert f"alone, process {script.pid}, has carried out the stop (abort)" in told.stdout
         said = script.communicate(timeout=60)[0]
         assert said.splitlines()[-1].startswith("stopped")
         with open_recording(tmp_path / "alone.h5") as recording:

@@ -24,10 +24,10 @@ OPTIONS = ("method", *SPECIMEN, "harmonics", "places", "starts", "most_periods",
 def branches(
     amplitude: Annotated[
         str | None,
-        option("Amplitude of the base displacement; a range to follow branches along it.", "M|START:STOP"),
+        option("Amplitude of the base displacement, or a range to follow branches along.", "M|START:STOP"),
     ] = None,
     frequency: Annotated[
-        str | None, option("Drive frequency [Hz]; a range to follow branches along it.", "F|START:STOP")
+        str | None, option("Drive frequency [Hz], or a range to follow branches along.", "F|START:STOP")
     ] = None,
     like: Annotated[
         Path | None,
@@ -48,7 +48,7 @@ def branches(
         str | None, option("Error of harmonic balance, such as 1%; shooting is far more accurate.", "E")
     ] = None,
     time_limit: Annotated[
-        str | None, option("Time limit of the search, such as 20s; keeps what was found.", "T", name="--time")
+        str | None, option("Time limit of the search, such as 20s; results are kept.", "T", name="--time")
     ] = None,
     holdable: Annotated[
         Path | None,

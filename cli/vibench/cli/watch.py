@@ -62,7 +62,7 @@ def stop(
     pid: Annotated[int | None, option("Process id; default: all; for hold: the only one.", "N")] = None,
     level: Annotated[
         StopLevel,
-        option("hold until vibench release; ramp as planned; abort: shortest ramp; off: at once."),
+        option("hold: until vibench release; ramp: as planned; abort: shortest ramp; off: at once."),
     ] = StopLevel.RAMP,
     reason: Annotated[str, option("Reason, stored in the recording.")] = "vibench stop",
 ) -> None:
@@ -103,9 +103,9 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
                 f"an instrument or the computer hangs. {SWITCH_OFF}"
             )
         case StopDelivery.TOLD if level is StopLevel.HOLD:
-            return f"{name}: has received the hold; 'vibench release' resumes it."
+            return f"{name}, has received the hold; 'vibench release' resumes it."
         case StopDelivery.TOLD | StopDelivery.TAKEN:
-            return f"{name}: has carried out the stop ({level.value}); its output is off."
+            return f"{name}, has carried out the stop ({level.value}); its output is off."
 
 
 def release(pid: Pid = None) -> None:
@@ -114,7 +114,7 @@ def release(pid: Pid = None) -> None:
     with EngineClient.attach(engine.address) as client:
         # A requested hold may not have taken effect yet, for example during a pause; release it as well.
         client.resume()
-    console.print(f"{engine.what}, process {engine.pid}: has received the release.")
+    console.print(f"{engine.what}, process {engine.pid}, has received the release.")
 
 
 def _facts(engine: Announcement) -> dict[str, object]:

@@ -109,7 +109,7 @@ def test_the_stated_errors_of_spectral_lines_hold_in_95_percent_of_cases():
     [
         ({"accuracy": "quick"}, "accuracy was given, but the error or time"),
         ({"duration_s": 3.0}, "duration_s was given, but the error or time"),
-        ({"drive": "swept", "stop_hz": 300.0}, "is for a steady drive, not swept"),
+        ({"drive": "swept", "stop_hz": 300.0}, "needs a steady drive, not swept"),
     ],
 )
 def test_options_fixed_by_an_error_target_of_a_chain_are_refused(given, said):

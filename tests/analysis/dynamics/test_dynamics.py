@@ -199,7 +199,7 @@ def test_motions_that_can_be_held_are_reported_in_figure_text_table_and_json():
     loop_s = 0.1 * math.sqrt(growth_s[3] * growth_s[4])
     diagram = BranchDiagram(BranchRequest(start=100.0, stop=120.0, loop_time_s=loop_s), (FOLDED,), 1.0)
     assert diagram.holdable[0].tolist() == [True, True, True, True, False]
-    assert "1 of 2 unstable motions; the fastest growth takes 0.023 s" in diagram.holding_sentence
+    assert "1 of 2 unstable ones; the fastest growth takes 0.023 s" in diagram.holding_sentence
     drawn = branches_figure(diagram)
     third = drawn.figure.axes[2]
     labelled = {each.get_label(): each for each in third.get_lines()}

@@ -77,7 +77,7 @@ def test_a_gap_change_of_1_um_is_detected_within_a_second(live_world, dwell, kin
     while not said:
         said += running.go_on(BLOCK)
     assert running.samples / 51_200 - changed_s < 1.0
-    assert "The specimen has changed at" in said[0]
+    assert "The specimen changed at" in said[0]
     said.clear()
     while not said:
         said += running.go_on(BLOCK)

@@ -215,7 +215,7 @@ def _idle_finding(output: AnalogOutput) -> Finding:
 def _latency(bench: Bench) -> Finding:
     latency_s = bench.generator.measured_latency_s()
     verdict = LATENCY_S.verdict(latency_s)
-    advice = "shorten generator.settle_s, or reduce other traffic on the bus: a stop takes as long"
+    advice = "shorten generator.settle_s, or reduce other bus traffic: a stop takes as long as a command"
     return finding_of("time per command", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
 
 

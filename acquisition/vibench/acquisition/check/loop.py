@@ -218,7 +218,7 @@ class LoopCheck:
     def _clocks(self) -> Finding:
         ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
-        advice = "compare daq.sample_rate_hz with the source's clock; a drift spoils phases over minutes"
+        advice = "compare daq.sample_rate_hz with the source's clock; over minutes, a drift shifts phases"
         expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
         return finding_of(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 

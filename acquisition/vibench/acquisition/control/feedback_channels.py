@@ -108,7 +108,7 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
             return rows.index(role)
     raise ConfigurationError(
         f"feedback needs the channel {' or '.join(role.value for role in roles)}, which this rig lacks. "
-        "Nothing was played; add it to daq.channels, or use an excitation without feedback"
+        "Nothing was played; add this channel to daq.channels, or use an excitation without feedback"
     )
 
 

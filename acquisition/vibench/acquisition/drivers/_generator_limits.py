@@ -221,7 +221,7 @@ class NoGenerator:
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Refuse: the description of the generator has no internal sweep."""
-        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot play: this bench has {self.name}")
+        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot be played by {self.name}")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Accept a new frequency if a recording is played back; otherwise refuse it."""

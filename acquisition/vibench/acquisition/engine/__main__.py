@@ -45,7 +45,7 @@ def _options() -> argparse.Namespace:
         "--forgotten-s",
         type=float,
         default=FORGOTTEN_S,
-        help="unattended, no campaign started: end the engine after this time without a request [s]",
+        help="time without a request after which an unattended engine without a campaign ends [s]",
     )
     return parser.parse_args()
 

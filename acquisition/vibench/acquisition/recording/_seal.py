@@ -370,7 +370,7 @@ def _missing_seal(excuse: str, key: SealKey | None) -> SealCheck:
     """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
-    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none signed with the key ({key.name})", "")
+    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none made with the key ({key.name})", "")
 
 
 def _signature_check(

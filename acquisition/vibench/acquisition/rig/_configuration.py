@@ -442,7 +442,7 @@ class Rig(FrozenModel):
         if Role.M0_VELOCITY not in self._roles:
             raise ConfigurationError(
                 f"a scan needs the vibrometer, but the rig {self.name!r} has no channel m0_velocity. Nothing "
-                "was played; add it to daq.channels, or leave the scan out"
+                "was played; add this channel to daq.channels, or leave the scan out"
             )
         if role is not Role.M0_VELOCITY and role in self._roles:
             raise ConfigurationError(

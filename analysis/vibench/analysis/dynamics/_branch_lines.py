@@ -221,7 +221,7 @@ class BranchDiagram(Tabular):
         harmonics = self.request.balance_options.most
         return (
             f"Harmonic balance with at most {harmonics} harmonics found no motion: no motion has the period "
-            "of the drive, or it needs more harmonics, as with impacts; use the method shooting"
+            "of the drive, or more harmonics are needed, as with impacts; use the method 'shooting'"
         )
 
     @property
@@ -242,7 +242,7 @@ class BranchDiagram(Tabular):
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
         text = (
             f"A control loop with {self.request.loop_time_s:.3g} s delay can hold motions whose deviations "
-            f"take {self.least_growth_time_s:.3g} s or more to grow by e: {held} of {count} unstable motions"
+            f"take {self.least_growth_time_s:.3g} s or more to grow e-fold: {held} of {count} unstable ones"
         )
         return text + (f"; the fastest growth takes {quickest:.2g} s." if count else ".")
 

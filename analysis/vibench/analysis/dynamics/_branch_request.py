@@ -90,18 +90,18 @@ class BranchRequest(SpecimenChoice):
         law = self.chosen_specimen.contact
         if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
             raise ValueError(
-                f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the method "
-                "balance or shooting"
+                f"one harmonic cannot describe {self.law}: choose a power law such as power:5, or the "
+                "method 'balance' or 'shooting'"
             )
         if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
             raise ValueError(
-                "harmonic balance needs a finite contact force, and rigid stops have none; take the "
-                "method shooting"
+                "harmonic balance needs a finite contact force, and rigid stops have none; choose "
+                "the method 'shooting'"
             )
         if self.error is not None and self.method is BranchMethod.FIRST_ORDER:
             raise ValueError(
                 f"an error of {self.error:g} was given, but the error of one harmonic is fixed; use "
-                "the method balance or shooting, or leave out the error"
+                "the method 'balance' or 'shooting', or leave out the error"
             )
         self._refuse_other_resonances()
         pairs = self.recorded_level

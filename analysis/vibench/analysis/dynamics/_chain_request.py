@@ -95,7 +95,7 @@ class ChainRequest(SpecimenChoice):
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:
-            raise ValueError(f"an error or a time is for a steady drive, not {self.drive}; leave it out")
+            raise ValueError(f"an error or time needs a steady drive, not {self.drive}; leave it out")
         for name in ("accuracy", "duration_s", "settle_s"):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f"{name} was given, but the error or time determines it; leave {name} out")

@@ -657,7 +657,7 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     if unknown:
         raise InvalidRequest(
             f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
-            f"channels that all state it or all do not{_or_ignore(channels)}"
+            f"only channels that state it, or only others{_or_ignore(channels)}"
         )
     if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(

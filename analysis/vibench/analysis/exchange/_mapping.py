@@ -86,7 +86,7 @@ class ChannelMapping(FrozenModel):
         if self.role not in KNOWN_ROLES:
             if not (self.quantity and self.unit):
                 raise ValueError(
-                    f"{self.role} needs quantity and unit; only {', '.join(KNOWN_ROLES)} have default ones"
+                    f"{self.role} needs quantity and unit; only {', '.join(KNOWN_ROLES)} have defaults"
                 )
             return self
         for given, needed in zip((self.quantity, self.unit), KNOWN_ROLES[self.role], strict=True):
@@ -99,9 +99,7 @@ class ChannelMapping(FrozenModel):
     @model_validator(mode="after")
     def _has_a_scale(self) -> Self:
         if self.scale == 0:
-            raise ValueError(
-                f"the scale of {self.role} is 0, so all values would be 0; give the unit per number"
-            )
+            raise ValueError(f"the scale of {self.role} is 0, so all values would be 0; give another scale")
         if isinstance(self.scale, str):
             self.factor("V")
         return self
@@ -154,7 +152,7 @@ class Part(FrozenModel):
     def _rises(self) -> Self:
         if self.stop_s <= self.start_s:
             raise ValueError(
-                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}; both are since file start"
+                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}, both from file start"
             )
         return self
 

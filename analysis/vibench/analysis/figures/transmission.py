@@ -192,7 +192,7 @@ def estimate_sentence(response: NoiseResponse) -> str:
     if response.hits is not None:
         fineness = (
             f"hits of {how.segment_s:.3g} s with a window exp(-{how.decay_per_s:.3g} t), which "
-            "widens the lines; the stated resonances are corrected for it"
+            "widens the lines; the stated resonances are corrected for this"
         )
     elif response.periodic is None:
         fineness = (

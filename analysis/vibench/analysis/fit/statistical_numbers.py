@@ -332,7 +332,7 @@ def statistical_numbers(
     if not found.fits:
         raise UnusableData(
             f"no simulated specimen has similar statistics (distance {found.distance:.2g} times the scatter "
-            "of repeated simulations): other values of rig or specimen are not as described"
+            "of repeated simulations): the description of rig or specimen is wrong in another value"
         )
     return tuple(_determined_parameters(found, specimen)), found.distance
 

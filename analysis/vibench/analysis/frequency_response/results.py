@@ -34,7 +34,7 @@ def require_estimator(estimator: Estimator, noise_ratio: float | None, confidenc
     if estimator is Estimator.HV and noise_ratio is None:
         raise InvalidRequest(
             "hv was requested without a noise ratio; give the noise density of the response over that of "
-            "the base, or use the estimator drive"
+            "the base, or use the estimator 'drive'"
         )
     if estimator is not Estimator.HV and noise_ratio is not None:
         raise InvalidRequest(f"a noise ratio has no meaning for {estimator.value}; only hv uses it")

@@ -239,7 +239,7 @@ class FrequencyResponseSums:
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
             raise InvalidRequest(
-                "the estimator drive needs a reference channel; create these sums for the estimator drive"
+                "the estimator 'drive' needs a reference channel; create these sums for that estimator"
             )
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:

@@ -425,7 +425,7 @@ class LiveTwin:
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             sentences.append(
-                f"The specimen has changed at {time_s:.1f} s: the measured motion no longer fits its "
+                f"The specimen changed at {time_s:.1f} s: the measured motion no longer fits its "
                 f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )

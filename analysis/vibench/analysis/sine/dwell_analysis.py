@@ -145,7 +145,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     # The few points of a short burst look like noise, and its maximum may lie outside the window.
     rise = _largest_rise(response, is_clear, verdict.evidence.periods)
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
-        why = f"a burst raises |x| {100 * rise:.2g} % above its usual maximum; find its cause, dwell again"
+        why = f"a burst raises |x| {100 * rise:.2g} % above its usual maximum; find the cause and dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
     # Bridged drop-outs can make a repeating motion look irregular, not the reverse.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:

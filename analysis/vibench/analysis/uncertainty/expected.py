@@ -522,8 +522,8 @@ def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     mine = [each for each in campaign.measurements if needs[each.name] is not None]
     if not mine:
         raise ConfigurationError(
-            f"{campaign.name} has no measurement with until whose time can be predicted, so there is nothing "
-            "to distribute. Nothing was played; add until to a measurement, or leave --within out"
+            f"{campaign.name} has no measurement with 'until' whose time can be predicted, so there is "
+            "nothing to distribute. Nothing was played; add 'until' to a measurement, or leave --within out"
         )
     places = campaign.places
     variable_s = sum(places * each.repeats * _cost(each) * recorded_s(each) for each in mine)

@@ -156,11 +156,11 @@ def of_one_draw(found: DwellResponse) -> Contribution:
     window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
     if blocks < _FEWEST_BLOCKS:
-        return Contribution(Cause.CHANCE, None, "the window is too short to determine chance")
+        return Contribution(Cause.CHANCE, None, "the window is too short to determine random error")
     largest = np.max(window[: window.size // blocks * blocks].reshape(blocks, -1), axis=1)
     largest = largest[largest > 0.0]
     if largest.size < _FEWEST_BLOCKS:
-        return Contribution(Cause.CHANCE, None, "drop-outs leave too little of a window to determine chance")
+        return Contribution(Cause.CHANCE, None, "drop-outs leave too little to determine random error")
     off = np.abs(largest / np.median(largest) - 1)
     if np.max(off) > max(BURST * np.median(off), _ALIKE):
         return Contribution(Cause.CHANCE, None, "a burst in the window sets the largest |x|; find its cause")
@@ -247,7 +247,7 @@ def _largest(
         if not collides[top] and name == RESPONSE_I:
             own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
             if isinstance(found, SweepResponse) and not _ENDS <= top < values.size - _ENDS:
-                own.append(Contribution(Cause.CHANCE, None, "at a sweep's end, it depends on the intervals"))
+                own.append(Contribution(Cause.CHANCE, None, "depends on the intervals at a sweep's end"))
         yield Budget(f"largest {name}, at {at}{rate}", value, "", (*_ratio(stated), *own))
 
 

@@ -134,7 +134,7 @@ _NEXT = {
     EngineState.CHECKING: "Wait for READY.",
     EngineState.ARMED: "Start the plan (F5), or disarm it (Cancel on the Run page).",
     EngineState.RUNNING: "Wait for the end of the measurement, or stop it (STOP, Esc).",
-    EngineState.HELD: "Press Go on (Run page), or stop the measurement (STOP, Esc).",
+    EngineState.HELD: "Press 'Go on' (Run page), or stop the measurement (STOP, Esc).",
     EngineState.RAMPING_DOWN: "Wait for READY.",
     EngineState.FAULT: "See Details for the cause, then open the bench again on the Rig page (Ctrl+1).",
 }

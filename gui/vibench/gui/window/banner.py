@@ -185,7 +185,7 @@ NEXT_STEPS = {
     EngineState.CHECKING: "The bench is being checked.",
     EngineState.ARMED: "Next: F5 starts the plan shown on the Run page; Cancel there disarms it.",
     EngineState.RUNNING: "STOP ramps down as planned; Esc aborts from every page.",
-    EngineState.HELD: "The drive may be on. Press Go on (Run page); STOP ramps down, Esc aborts.",
+    EngineState.HELD: "The drive may be on. Press 'Go on' (Run page); STOP ramps down, Esc aborts.",
     EngineState.RAMPING_DOWN: "Ramping down; Esc aborts.",
     EngineState.FAULT: "See Details for the cause. Open the bench again on the Rig page (Ctrl+1).",
 }

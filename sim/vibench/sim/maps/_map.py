@@ -184,7 +184,7 @@ class Range(FrozenModel):
     def _ascends(self) -> Self:
         if not self.start < self.stop:
             raise ValueError(
-                f"a range from {self.start:g} to {self.stop:g} does not ascend; give the lower first"
+                f"a range from {self.start:g} to {self.stop:g} does not ascend; give the lower end first"
             )
         if self.spacing is Spacing.LOGARITHMIC and self.start <= 0.0:
             raise ValueError(f"a logarithmic range cannot start at {self.start:g}; give a positive start")
@@ -312,7 +312,7 @@ class Map(GridPlan):
             raise ValueError(f"coarse = {self.coarse} is not a power of 2; give 2, 4, 8, 16, 32 or 64")
         if self.window_periods >= self.periods:
             raise ValueError(
-                f"window_periods = {self.window_periods} is not below periods = {self.periods}; give fewer"
+                f"window_periods = {self.window_periods} is not below periods = {self.periods}; lower it"
             )
         if self.grid.size > MOST_POINTS:
             raise ValueError(f"{self.grid.size} points were requested; a map has at most {MOST_POINTS}")
