@@ -38,7 +38,7 @@ def test_an_estimate_refuses_a_level_beyond_the_limits(refusal, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     plan.write_text(plan.read_text(encoding="utf-8").replace("[0.05]", "[0.05, 50]"), encoding="utf-8")
     said = refusal("measure", plan, "--bench", bench, "--out", "out", "--estimate")
-    assert "line-50vpp-200hz: the generator voltage would be 50 Vpp, allowed is at most 10 Vpp" in said
+    assert "line-50vpp-200hz: the generator voltage would be 50 Vpp, but must be at most 10 Vpp" in said
 
 
 @pytest.mark.thorough

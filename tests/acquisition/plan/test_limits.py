@@ -112,7 +112,7 @@ def test_a_violation_names_its_quantity_value_limit_source_and_remedy(rig):
         require_within_limits(plan(Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)), rig)
     text = str(refused.value)
     assert text.startswith("plan: the stroke (at 20 Hz, peak) would be 0.00")
-    assert "allowed is at most 0.004 m (4809 manual: 8 mm peak to peak between the rubber stops)" in text
+    assert "but must be at most 0.004 m (4809 manual: 8 mm peak to peak between the rubber stops)" in text
     assert "lower amplitude_vpp or raise the lowest frequency" in text
     assert text.endswith("Nothing was played.")
 
@@ -147,13 +147,13 @@ def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
     [
         (
             SineSweep(amplitude_vpp=1.5, start_hz=10, stop_hz=350, duration_s=20, hold="displacement"),
-            r"the lowest setting would be 0\.00122449 Vpp, allowed is at least 0\.002 Vpp",
+            r"the lowest setting would be 0\.00122449 Vpp, but must be at least 0\.002 Vpp",
         ),
         (Dwell(amplitude_vpp=0.0019, frequency_hz=160, duration_s=1), "smallest setting of the function"),
         (Dwell(amplitude_vpp=25, frequency_hz=160, duration_s=1), r"at most 20 Vpp \(range of the AFG1022"),
         (
             WhiteNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=200, points=16384),
-            r"points of a period would be 16384 points, allowed is at most 8192 points",
+            r"points of a period would be 16384 points, but must be at most 8192 points",
         ),
     ],
 )

@@ -57,7 +57,7 @@ def test_the_shipped_scan_visits_all_three_masses():
         ([point("top", "m3")], r"scan\.0\.body.*'m3': input should be 'm0', 'm1' or 'm2'"),
         ([point("top", x_m=float("nan"))], r"scan\.0\.x_m.*finite"),
         ([point("top", direction="up")], r"scan\.0\.direction.*'x', 'y', 'z'"),
-        ([point("t" * 60)], r"would have 66 characters, allowed are 64"),
+        ([point("t" * 60)], r"would have 66 characters; at most 64 are allowed"),
     ],
 )
 def test_an_invalid_scan_point_is_refused_with_one_sentence(points, sentence):

@@ -83,7 +83,7 @@ def test_an_output_over_a_limit_fades_out_and_the_limit_is_named(laboratory, tmp
         with pytest.raises(LimitExceeded) as failure:
             run_measurement(bench, tight, tmp_path / "run.h5")
         assert amplifier_input_v(virtual) < SILENT_V
-    assert re.search(r"base acceleration reached .* allowed is 36\.8 m/s2", one_sentence(failure))
+    assert re.search(r"base acceleration reached .* above the limit of 36\.8 m/s2", one_sentence(failure))
     drive = kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
     # The samples written ahead were played, then a ramp to zero.
     assert np.max(np.abs(drive[-200:])) < 0.01

@@ -102,8 +102,8 @@ class Campaign(FrozenModel):
                 continue
             if len(point.name) > LONGEST_NAME:
                 raise ValueError(
-                    f"scan: the recording name {point.name!r} would have {len(point.name)} characters, "
-                    f"allowed are {LONGEST_NAME}; shorten the name of the point or of the measurement"
+                    f"scan: the recording name {point.name!r} would have {len(point.name)} characters; "
+                    f"at most {LONGEST_NAME} are allowed: shorten the name of the point or of the measurement"
                 )
             if EXCITATION_KINDS[kind].is_feedback:
                 raise ValueError(

@@ -133,7 +133,7 @@ class LimitCheck:
     def complaint(self) -> str:
         """Return a clause that describes the violation of the limit and its remedy."""
         return (
-            f"{self.what} would be {self.value:.{_DIGITS}g} {self.unit}, allowed is {self.side.value} "
+            f"{self.what} would be {self.value:.{_DIGITS}g} {self.unit}, but must be {self.side.value} "
             f"{self.limit:.{_DIGITS}g} {self.unit} ({self.source}): {self.remedy}"
         )
 

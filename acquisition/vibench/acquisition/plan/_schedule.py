@@ -162,7 +162,7 @@ class Measurement(FrozenModel):
         length_s = self.excitation.playing_s
         if length_s > LONGEST_S:
             raise ValueError(
-                f"one measurement would play for {length_s:.4g} s, allowed are {LONGEST_S:g} s (30 days); "
+                f"one measurement would play for {length_s:.4g} s (at most {LONGEST_S:g} s, 30 days); "
                 "shorten it, or divide it into several measurements"
             )
         return self

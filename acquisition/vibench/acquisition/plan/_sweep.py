@@ -51,7 +51,7 @@ class Range(FrozenModel):
         if self.step is not None and self.spacing is RangeSpacing.LOGARITHMIC:
             raise ValueError("logarithmic values have no constant step; give count")
         if self._count() > MOST_VALUES:
-            raise ValueError(f"the range has {self._count()} values, allowed are {MOST_VALUES}; raise step")
+            raise ValueError(f"the range has {self._count()} values (at most {MOST_VALUES}); raise step")
         return self
 
     @property
@@ -182,7 +182,7 @@ class Sweep(FrozenModel):
         longest = passed if self.lead_points is None else min(passed, self.lead_points)
         if longest > MOST_LEAD_INS:
             raise ValueError(
-                f"a chain would have {longest} points, allowed are {MOST_LEAD_INS}; divide the sweep"
+                f"a chain would have {longest} points (at most {MOST_LEAD_INS}); divide the sweep"
             )
         return self
 
@@ -195,8 +195,8 @@ class Sweep(FrozenModel):
         if count > MOST_POINTS:
             shown = " x ".join(f"{number} {axis}" for axis, number in counts.items())
             raise ValueError(
-                f"the sweep {self.name!r} has {count} points ({shown}), allowed are {MOST_POINTS}; raise a "
-                "step or divide the sweep"
+                f"the sweep {self.name!r} has {count} points ({shown}); at most {MOST_POINTS} are allowed. "
+                "Raise a step or divide the sweep"
             )
         self.points()
         return self
@@ -312,7 +312,7 @@ def _with_lead_in(
 def _measurement(content: Mapping[str, Any], name: str) -> Measurement:
     if len(name) > LONGEST_NAME:
         raise ValueError(
-            f"the point name {name!r} has {len(name)} characters, allowed are {LONGEST_NAME}; give the "
+            f"the point name {name!r} has {len(name)} characters (at most {LONGEST_NAME}); give the "
             "sweep a shorter name"
         )
     try:

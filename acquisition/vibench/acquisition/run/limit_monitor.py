@@ -281,7 +281,7 @@ class LimitMonitor:
             time_s=sample / self._rate_hz,
         )
         raise LimitExceeded(
-            f"{monitored.what} reached {peak:.4g} {monitored.unit}, allowed is {monitored.limit:.4g} "
+            f"{monitored.what} reached {peak:.4g} {monitored.unit}, above the limit of {monitored.limit:.4g} "
             f"{monitored.unit} ({monitored.source}), on {monitored.role.value} at {trip.time_s:.4f} s "
             f"(sample {sample}). {_OFF}",
             trip,
