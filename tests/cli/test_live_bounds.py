@@ -34,7 +34,7 @@ RUN = RunStatus(
     frequency_hz=200.0,
     until=UNTIL,
 )
-SAID = "response_ii ± 2 % (1 % requested), about 12 s left"
+SAID = "response_ii ± 2 % (goal: 1 %), about 12 s left"
 
 
 def test_the_terminal_shows_the_bound_its_target_and_the_time_left():

@@ -165,8 +165,8 @@ def test_the_recording_continues_if_the_analysis_process_dies(rig, tmp_path, mon
 @pytest.mark.parametrize(
     ("bounds", "said"),
     [
-        ({}, "not known (1 % requested)"),
-        ({"response_i": None}, "not known (1 % requested)"),
+        ({}, "not known (goal: 1 %)"),
+        ({"response_i": None}, "not known (goal: 1 %)"),
         ({"response_i": 0.02}, "about 12 s left"),
         ({"response_i": 0.5}, "not within 20 s"),
     ],

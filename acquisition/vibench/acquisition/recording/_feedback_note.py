@@ -349,7 +349,7 @@ class UntilNote(AbstractNote):
     def sentence(self) -> str:
         """Return a sentence on bounds, requests, and remaining or recorded time."""
         text = ", ".join(
-            f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} ({100 * wish:.2g} % requested)"
+            f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} (goal: {100 * wish:.2g} %)"
             for name, wish in self.wishes.items()
             for bound in (self.bounds.get(name),)
         )
