@@ -60,7 +60,7 @@ def copy_all(found: dict[str, list[Path]], target: Path) -> None:
     }
     standing = next((each for each in copies.values() if each.exists()), None)
     if standing is not None:
-        raise ConfigurationError(f"{standing} exists already; nothing was copied, give another folder")
+        raise ConfigurationError(f"{standing} exists already; nothing was copied. Give another folder")
     for path, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
         with replace_file(copy) as coming:

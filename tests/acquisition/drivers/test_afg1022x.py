@@ -309,7 +309,7 @@ class TestFaults:
         plugged.instrument.corrupt_next_reply()
         with pytest.raises(InstrumentError):
             generator.set_frequency(261.0)
-        with pytest.raises(InstrumentError, match=r"no known settings"):
+        with pytest.raises(InstrumentError, match=r"settings unknown"):
             generator.start()
         generator.load_sine(262.0, 0.1)
         generator.start()

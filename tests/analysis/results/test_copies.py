@@ -29,7 +29,7 @@ def analysis_of(folder):
 def test_a_copy_of_a_recording_is_reported_and_not_counted(dwells):
     found = analysis_of(dwells)
     assert [each.name for each in found.facts] == ["weak"]
-    said = "weak: copies: weak_copy.h5 has the same samples as weak.h5; it is counted once"
+    said = "weak: copies: weak_copy.h5 has the same samples as weak.h5; they count once"
     assert said in list(check_warnings(found))
     assert len(campaign_summary(found)["results"]) == 1
 

@@ -429,7 +429,7 @@ def _wires(rig: Rig, confirmed: Confirmed, again: str) -> Iterator[str]:
         pair = _pair(rig, channel)
         answer = confirmed(pair)
         if not answer:
-            raise CheckFailed(f"not confirmed: {pair}. Nothing was played; connect it and {again}")
+            raise CheckFailed(f"not confirmed: {pair}. Nothing was played; connect both ends and {again}")
         yield f"- {pair}: {answer}"
 
 

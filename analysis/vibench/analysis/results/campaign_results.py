@@ -238,7 +238,7 @@ def without_copies(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
         if place != first:
             counted, copy = kept[first].analysis, each.analysis.facts
             sentence = copy_sentence(counted.facts, counted.facts.path.name, copy)
-            check = Check("Copies", Verdict.WARNING, f"{copy.path.name} {sentence}; it is counted once")
+            check = Check("Copies", Verdict.WARNING, f"{copy.path.name} {sentence}; they count once")
             analysis = replace(counted, checks=(*counted.checks, check))
             kept[first] = replace(kept[first], analysis=analysis)
     return tuple(kept.values())

@@ -248,7 +248,7 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
     if any(device.name.lower() == name.lower() and device is not old for device in devices):
         raise ConfigurationError(
             f"The simulated {product_type} cannot be called {name!r}: another device has this name; "
-            "nothing was started, choose another name"
+            "nothing was started. Choose another name"
         )
 
     def rename(text: str) -> str:

@@ -225,7 +225,7 @@ def _require_address(address: str) -> None:
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(
-            f"{address!r} is not an address to listen on; nothing was started, give HOST:PORT with a port up "
+            f"{address!r} is not an address to listen on; nothing was started. Give HOST:PORT with a port up "
             f"to {LAST_PORT}, such as 127.0.0.1:31763; port 0 selects a free port"
         )
 
