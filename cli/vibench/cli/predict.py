@@ -235,7 +235,7 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
     if points:
         print_table(rows)
     if step > 1:
-        console.print(f"one in {step} points is shown ({len(points)} in total); --json or --out gives all")
+        console.print(f"one in {step} points is shown (of {len(points)}); --json or --out gives all")
     motions = _motions_table(points)
     if motions is not None:
         print_table(motions)

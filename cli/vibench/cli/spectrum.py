@@ -79,5 +79,5 @@ def _print_result(found: ExponentSpectrum) -> None:
             f"({each.dimension_low:.3g} to {each.dimension_high:.3g}); {each.verdict}"
         )
     if step > 1:
-        console.print(f"one in {step} points is shown ({len(found.points)} in total); --json or --out gives all")
+        console.print(f"one in {step} points is shown (of {len(found.points)}); --json or --out gives all")
     console.print(found.cost_sentence)
