@@ -46,7 +46,7 @@ class AFG1022X(ScpiInstrument):
     )
     # Frequencies are sent with a resolution of 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp. A deviation above half of this plus 0.1 % of the value is no rounding.
+    # The panel resolves 1 mVpp. A deviation above half of this plus 0.1 % of the value is not rounding.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
