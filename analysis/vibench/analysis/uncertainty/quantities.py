@@ -23,6 +23,8 @@ _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
 _ALIKE = 1e-12
 """Relative difference of maxima that counts as rounding error."""
+_SHAPE_VARIANCE = 0.5633
+"""Variance of the shape k estimated from n maxima, times n (Hosking, Wallis and Wood 1985, for k = 0)."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
 """Chance that is not stated without draws of the twin: of a maximum, or of a 0.1 s interval of a sweep."""
@@ -172,7 +174,8 @@ def sd_of_largest(maxima: Reals) -> float:
     """Return the standard deviation of the largest of maxima with a generalised extreme value distribution.
 
     With their shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
-    largest of n values is n^-k times the scale of one: smaller for a bounded motion, equal otherwise.
+    largest of n values is n^-k times the scale of one: smaller for a bounded motion, equal otherwise. The
+    estimate of k is lowered by its standard error, because a k that is too large gives too small a bound.
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
         return 0.0
@@ -189,7 +192,7 @@ def sd_of_largest(maxima: Reals) -> float:
     )
     skewness = (6 * third - 6 * second + first) / (2 * second - first)
     off = 2 / (3 + skewness) - np.log(2) / np.log(3)
-    shape = float(np.clip(7.8590 * off + 2.9554 * off**2, 0.0, 0.5))
+    shape = float(np.clip(7.8590 * off + 2.9554 * off**2 - np.sqrt(_SHAPE_VARIANCE / count), 0.0, 0.5))
     return float(np.std(maxima, ddof=1) * count**-shape)
 
 
