@@ -83,12 +83,12 @@ def _with_ranges(schema: Json) -> None:
 
 @dataclass(frozen=True)
 class _Kind:
-    face: str
+    package: str
     model: str
     widen: Callable[[Json], None]
 
     def load(self) -> type[BaseModel]:
-        found: type[BaseModel] = getattr(import_module(self.face), self.model)
+        found: type[BaseModel] = getattr(import_module(self.package), self.model)
         return found
 
 
