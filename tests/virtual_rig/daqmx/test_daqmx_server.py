@@ -101,5 +101,5 @@ def test_the_simulated_daq_listens_on_loopback_by_default(daq):
 
 @pytest.mark.parametrize("address", ["nonsense", "127.0.0.1:99999", "127.0.0.1:-5", ":80", "127.0.0.1:"])
 def test_invalid_addresses_are_refused_before_listening(connect, address):
-    with pytest.raises(ConfigurationError, match="give HOST:PORT"):
+    with pytest.raises(ConfigurationError, match="Give HOST:PORT"):
         connect(address=address)

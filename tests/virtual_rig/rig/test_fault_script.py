@@ -69,7 +69,7 @@ class TestScripts:
         [
             (fault("pull_the_plug", 1), "pull_the_plug.*pull_usb_cable"),
             (fault("drop_laser", 1), "for_s is missing"),
-            (fault("jump_clock", 1, by_ms=3), "by_s is missing.*by_ms is not a known key"),
+            (fault("jump_clock", 1, by_ms=3), "by_ms is not a known key .did you mean by_s"),
             (fault("overrun", -1), r"at_s = -1"),
         ],
     )

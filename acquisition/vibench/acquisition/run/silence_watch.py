@@ -214,7 +214,7 @@ class SilenceWatch:
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
         if self.is_silent and self.is_heard:
             seen = f"{took_s:.3f} s after the stop was seen (now {self._residue_v:.2g} V)"
-            return f"switching off did not silence it: its amplitude had to be lowered, {seen}"
+            return f"not silent after switching off: its amplitude had to be lowered, {seen}"
         if self.is_silent:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"

@@ -27,7 +27,7 @@ def number_of(text: str, *units: str) -> float:
 
 
 def count_text(count: int, noun: str) -> str:
-    """Return a count with its noun, in the singular or plural: ``1 branch``, ``2 branches``."""
+    """Return ``count`` with ``noun`` in the singular or plural: ``1 branch``, ``2 branches``."""
     plural = "es" if noun.endswith("ch") else "s"
     return f"{count} {noun}{'' if count == 1 else plural}"
 
