@@ -1,9 +1,9 @@
 """Branches of periodic motions over drive frequency or level, with switching at bifurcations.
 
 `shoot_branches` searches for motions from rest, from the linear motion between the stops and from random
-states, and follows each by shooting. It also follows branches that leave where a period doubles or a symmetry
-breaks. `balance_branches` does the same for harmonic balances, including the paper's first-order balance.
-Branches are computed one by one, on demand. A motion on no known branch starts a new, maybe isolated, branch.
+states, and follows each by shooting. It also follows branches that fork off where a period doubles or a
+symmetry breaks. `balance_branches` does the same for harmonic balances, also for the paper's first-order one.
+Branches are computed one by one, on demand. A motion on no known branch starts a new branch (maybe isolated).
 
 >>> from itertools import islice
 >>> from vibench.sim import FrequencyPath, gong2025

@@ -34,7 +34,7 @@ INTERPOLATED = 0.06
 """Largest distance of a branch from the chord between two neighbouring points, over the chord's length;
 follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
-"""Distance between scaled states that `lies_on` allows in addition, for rounding errors."""
+"""Additional distance between scaled states that `lies_on` allows for rounding errors."""
 LENGTHS = 10.0
 """Length of the whole parameter range in the scaled units of branch following."""
 
@@ -51,7 +51,7 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """A branch of periodic motions with their period and symmetry, the branch's origin and computing time."""
+    """Branch of periodic motions, with the motions' period and symmetry, its origin and computing time."""
 
     branch: Branch
     shape: OrbitShape
@@ -65,7 +65,7 @@ class FoundBranch:
 
     @property
     def is_isolated(self) -> bool:
-        """Whether the branch is a closed curve, which sweeps along other branches do not reach."""
+        """Whether the branch is a closed curve, out of reach of sweeps along other branches."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches from motions on no known branch, and branches that leave these, until a time limit."""
+    """Yield branches that start at motions on no known branch, and their forks, until a time limit."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -132,9 +132,9 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Tried distances of the first guess from the state at a bifurcation, over the gap, to switch branches."""
+"""Distances of the first guess from the state at a bifurcation, over the gap, tried to switch branches."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Tried distances of the parameter from a bifurcation, over its range, to switch branches."""
+"""Distances of the parameter from a bifurcation, over the parameter's range, tried to switch branches."""
 LEFT = 1e-4
 """Distance from the old branch, over the gap, above which a motion counts as being on the new branch."""
 SWITCHED = {
@@ -164,7 +164,7 @@ def shoot_branches(
     search
         Settings of the search. It may miss branches; more starts find more branches.
     steps
-        Step lengths and tolerances. In their units the range is 10 long, and one gap of displacement is 1.
+        Step lengths and tolerances. In scaled units the range has length 10, and the gap has length 1.
 
     Yields
     ------
@@ -201,7 +201,7 @@ def _branch_switches(
     bounds: tuple[float, float],
     search: MotionSearch,
 ) -> Iterator[BranchStart[PeriodicOrbit]]:
-    """Yield one motion on each branch that leaves a given branch at a bifurcation."""
+    """Yield one motion on each branch that forks off a given branch at a bifurcation."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
@@ -248,11 +248,11 @@ def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
 
 
 UPDATES_TO_HOLD = 10.0
-"""Fewest control-loop updates while a perturbation grows by e, for the loop to stabilise the motion."""
+"""Fewest updates of a stabilising control loop in the time in which a perturbation grows by a factor e."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Return the time in which a small perturbation of a periodic motion grows by e [s]; infinite if stable.
+    """Return the time in which a small perturbation of a motion grows by a factor e [s]; infinite if stable.
 
     It is T / ln|mu| with the period T of the motion and its largest multiplier mu, for a given base motion.
 
