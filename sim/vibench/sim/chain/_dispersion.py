@@ -21,7 +21,7 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a band gap is a rounding error, as between equal cells within one unit."""
+"""Relative width below which a band gap is a rounding error, as for a unit of several equal cells."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
@@ -74,7 +74,7 @@ class CellResponse(NamedTuple):
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> CellResponse:
-    """Return the response of a cell without contact to its m0; finite even where m1 resonates alone."""
+    """Return the response of a cell without contact to motion of its m0; finite even where m1 resonates."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping

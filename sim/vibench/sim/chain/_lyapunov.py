@@ -142,7 +142,7 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Return the second motion, moved on the line between both to the small distance from the first."""
+    """Return the second motion, moved along the line between both motions to the small distance."""
     apart = second - first
     # The size is at least a displacement of all masses by the drive amplitude, because it is zero at rest.
     base = np.zeros_like(first)

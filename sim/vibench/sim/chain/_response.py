@@ -129,7 +129,7 @@ def chain_response(
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     """Return the response of a specimen as the response of a chain of one cell.
 
-    The spectral line of z follows from the equation of motion of m0 times exp(-i omega t), by parts.
+    The spectral line of z follows from the equation of m0 times exp(-i omega t), integrated by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
@@ -171,7 +171,7 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     forces
         Integral of the contact force of each cell times exp(-i omega t), shape (cells,) [N s].
     change
-        Change of the state over the ``line_s``, times exp(-i omega t), shape (cells, 6).
+        Change of the state over ``line_s``, times exp(-i omega t), shape (cells, 6).
     line_s
         Time of integration, a whole number of drive periods [s].
     """

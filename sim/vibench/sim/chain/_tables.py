@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Distance in cells up to which two cells may not both be in contact, by window, shape (windows,)."""
+    """Distance in cells up to which two cells may not both be in contact, for each window, (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
@@ -149,7 +149,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Return a bound on the velocity that a cell's own motion causes back via its neighbours in a window."""
+    """Return a bound on the velocity that a cell's motion feeds back to it via its neighbours in a window."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]

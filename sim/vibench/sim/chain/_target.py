@@ -50,7 +50,7 @@ def chain_response_to(
     chain, drive
         As in `chain_response`; the chain starts from rest.
     error
-        Requested relative error of the transmissibility of every cell; None for as small as time allows.
+        Requested relative error of every cell's transmissibility; None for the smallest that time allows.
     time_s
         Limit of the computing time [s]; None for one minute.
     """
@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Continue the run by ``periods``; return whether this succeeded and time is left to do it again."""
+        """Continue the run for ``periods``; return whether it succeeded with time left for as many again."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
@@ -96,7 +96,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Raise ValueError if computing one drive period exceeds the time limit, from trials of rising length."""
+    """Raise ValueError if trials of rising length show that one drive period exceeds the time limit."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # not timed, because it prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
