@@ -56,7 +56,7 @@ SLOWEST, FASTEST = 0.06, 5.0
 HARDEST_PRESS = 0.24
 """Largest acceleration due to other springs that the collision fit covers, over approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest rate of the acceleration by other springs over speed / u^2; ratio of later derivatives."""
+"""Largest time derivative of that acceleration, over speed / u^2; ratio of successive derivatives."""
 PAPER_TURN = 0.053
 """Fastest modal rate times u [rad], for the paper's specimen at a medium approach speed."""
 SLOWEST_TURN = 0.15
@@ -139,7 +139,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect on p of each repeated time integral of the force, over the second's effect."""
+    """Return the effect on p of each repeated time integral of the force, over that of the second one."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]

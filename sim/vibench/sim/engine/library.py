@@ -27,7 +27,7 @@ _NUMBERS: dict[str, DTypeLike] = {"double": np.float64, "int64_t": np.int64, "Ph
 def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
     """Return the numpy type of every structure, by name.
 
-    Raises ValueError when a declaration does not have this form.
+    Raises ValueError when a declaration does not have the form below.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class Engine:
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Return the tables of a scene. They point to its collision and step shapes: keep those alive.
+        """Return the tables of a scene. They point to the collision and step shapes: keep those alive.
 
         Raises ValueError when the engine rejects a number of the scene.
         """
@@ -199,7 +199,7 @@ class Engine:
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
-        """Decide whether m1 is in contact in ``state``, and store this there; return 0, or -1 if refused."""
+        """Determine whether m1 is in contact and store this in ``state``; return 0, or -1 if refused."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(

@@ -22,7 +22,7 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most time steps between contacts in one run: seconds of computing, or two days of the paper's motion."""
+"""Most time steps without contact in one run: seconds of computing, or two days of the paper's motion."""
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
 SPARE_IMPACTS = 100
@@ -99,7 +99,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces samples after the end due to rounding."""
+        """Return all samples, shape (samples, 6); ``last`` replaces samples put past the end by rounding."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 

@@ -178,7 +178,7 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the modal data of the motion in a linear stop: a spring parallel to k1, equilibrium shifted."""
+    """Fill the modal data of motion in a linear stop: a spring parallel to k1, with shifted equilibrium."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]

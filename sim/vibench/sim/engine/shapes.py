@@ -19,7 +19,7 @@ Table = NDArray[np.float64]
 POINTS = 16
 """Number of Gauss points in phi; the duration has an error of 1e-8, the speed only a rounding error."""
 TERMS = 8
-"""Number of terms of the series for spring forces that are slow compared with a collision."""
+"""Number of terms of the series for spring forces that vary slowly compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
 """First and last tabulated press, and number of tabulated values. The press is the acceleration due to all
 other springs, over speed^2 / depth."""
@@ -29,9 +29,9 @@ NEWTON_STEPS = 60
 HALF_FORCE = 1.25
 """Ratio k / m in units of free depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5."""
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
-"""Rows of a tabulated collision after the first sixteen, which are derivatives by the depth residuals. In
-order: derivatives by the residual at the end; derivatives of the duration by the residuals; depths at the
-points; derivatives of the depths by press, its rate, and forces through dampers and through springs."""
+"""Rows of a tabulated collision after the first sixteen, which are d/d(depth residuals). In order:
+d/d(residual at the end); d(duration)/d(residuals); depths at the points; derivatives of the depths with
+respect to press, its rate, and forces through dampers and through springs."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
 """Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to that of the
@@ -59,7 +59,7 @@ ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
 """Largest distance of the maximum from the middle of phi [rad], at which eight terms have an error of 1e-7;
-at a tenth of it they have rounding error."""
+at a tenth of it they have only rounding errors."""
 
 
 def _top_of(terms: Vector) -> float:
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions tabulated over the press, and their scalars; each is the next one's initial guess."""
+    """Return collisions tabulated over the press, and their scalars; each one is the guess for the next."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
