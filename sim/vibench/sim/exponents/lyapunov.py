@@ -99,13 +99,13 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of the exponent [1/s]; half the difference of two cycles, or zero for modes."""
+    """Standard error of the exponent [1/s]; for cycles, half the difference of two; for modes, zero."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
     """Kind of the final motion of the run."""
     since_s: float
-    """Time from which on growth is averaged, or at which the final motion begins [s]."""
+    """Time from which growth is averaged, or at which the final motion begins [s]."""
     blocks: BlockedMean | None
     """Mean growth rate and error from blocks of intervals [1/s]; None unless the source is the average."""
     interval_s: float
@@ -113,7 +113,7 @@ class LyapunovEstimate:
     local_time_s: Floats
     """End times of the intervals in which growth is measured, shape (n,) [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval, with the first one at time zero, shape (n,) [1/s]."""
+    """Growth rate in each interval, with the first interval at time zero, shape (n,) [1/s]."""
     transient: ChaoticTransient | None
     impacts: int
     """Number of impacts in the whole run."""
@@ -140,7 +140,7 @@ def lyapunov_exponent(
     """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
     During ``settle_s`` the motion approaches its attractor. Growth is averaged over the following
-    ``duration_s``, or over the final kind of motion if it changes. The defaults add up to the paper's 30 s
+    ``duration_s``, or over the final motion if the kind changes. The defaults add up to the paper's 30 s
     from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
 
     Parameters
@@ -235,7 +235,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return the largest exponent of a periodic motion [1/s]: mean and half difference of two cycles."""
+    """Return exponent and error of a periodic motion [1/s]: mean and half the difference of two cycles."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []

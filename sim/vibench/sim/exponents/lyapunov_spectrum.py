@@ -72,12 +72,12 @@ class LyapunovSpectrum:
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
-        """Return Student's confidence limits of the exponents (freedoms: blocks - 1), shape (6, 2)."""
+        """Return Student's confidence limits of the exponents (blocks - 1 degrees of freedom), (6, 2)."""
         reach = self._reach(confidence) * self.standard_errors_per_s
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence limits of the dimension, within 0 to 6, from the smallest number of blocks."""
+        """Return confidence limits of the dimension, within 0 to 6; t is that for the fewest blocks."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 

@@ -112,11 +112,11 @@ LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
 """Longest time between orthogonalisations: in radians of the fastest mode, and in its decay times. After this
 time the tangent vectors are still independent to several digits."""
 CHECKS = 32
-"""Largest number of tests, per run, of whether the run may end early."""
+"""Largest number of times that a run is tested for an early end."""
 ALMOST = 1e-9
 """Relative tolerance within which a duration is a whole number of intervals."""
 Enough = Callable[[Floats], bool]
-"""Test whether a run may end early, given the growth in each interval so far, shape (n, m)."""
+"""Function that returns whether a run may end early, from the growth in each interval so far, (n, m)."""
 CYCLES = 2.0
 """Default length of an interval in cycles of the slowest mode."""
 
@@ -216,7 +216,7 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return the number of parts in which an interval keeps the tangent vectors numerically independent."""
+    """Return into how many parts to divide an interval to keep tangent vectors numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
@@ -237,7 +237,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change of the state per cycle: below the first value a motion repeats, above the second not."""
+"""Change of state per cycle (relative) below which a motion repeats, and above which it does not."""
 LONGEST_CYCLE = 16
 """Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0
@@ -252,7 +252,7 @@ ALIGNING = 8
 
 
 class FinalMotion(StrEnum):
-    """Final kind of motion of a run, compared with the motion before."""
+    """Kind of the final motion of a run, compared with the preceding motion."""
 
     QUIET = "no impact will follow: the linear motion"
     PERIODIC = "a periodic motion"
@@ -262,7 +262,7 @@ class FinalMotion(StrEnum):
 
 @dataclass(frozen=True)
 class Settling:
-    """Final kind of motion of a run, and the interval in which this motion begins."""
+    """Kind of the final motion of a run, and the interval in which this motion begins."""
 
     motion: FinalMotion
     since: int
