@@ -2,7 +2,7 @@
 
 HDF5 2.0 crashes if a write fails while a file is being closed, and h5py only prints errors that occur while
 an object is being closed. Therefore HDF5 writes to a file object that accepts every write and stores the
-first error. The error is raised after HDF5 has closed the file; a Ctrl-C during a write waits as well.
+first error. The error is raised after HDF5 has closed the file; a Ctrl-C is delayed until then as well.
 """
 
 import signal
