@@ -33,7 +33,7 @@ SPREAD = 4.0
 
 @dataclass(frozen=True)
 class UncertaintyExponent:
-    """Exponent of basin boundaries: share of uncertain initial states is proportional to distance^exponent.
+    """Exponent of basin boundaries: the share of uncertain initial states varies as distance^exponent.
 
     The exponent is 1 for a smooth boundary, and 0 if a more accurate initial state does not help. The
     dimension of the boundary is 2 - exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).

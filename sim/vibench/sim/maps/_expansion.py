@@ -31,7 +31,7 @@ from ._refinement import ComparedCells, RefinementPlan, lattice, plan_refinement
 JUMP = 0.1
 """Relative difference of two neighbouring responses above which the points between them are computed."""
 BASIN_JUMP = 2e-3
-"""Replaces `JUMP` if only the initial state varies; one motion then differs only by its transients."""
+"""Replaces `JUMP` if only the initial state varies; values of one motion then differ only by transients."""
 NOTHING = -1
 BUNDLE_S = 0.3
 """Computing time of the scenes that a worker receives at once [s]; long enough to fill SIMD batches."""
@@ -41,7 +41,7 @@ def map_solver(plan: Map) -> Solver:
     """Return the solver of a map: in SIMD batches or one by one.
 
     Batches need points that do not continue one another, a single specimen, and wide processor registers.
-    Stops other than Hertz contacts, the accuracy *reference* and points with a target are solved one by one.
+    Points with non-Hertz stops, the accuracy *reference* or a target are solved one by one.
     """
     if plan.target is not None:
         return solve_scene
@@ -140,7 +140,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return a number per cell, shape (rows, columns); cells that reach the same motions have equal numbers.
 
-    ``label`` has the shape (rows, initial states, columns). The motion from the first must be the same too.
+    ``label`` has the shape (rows, initial states, columns). The first initial state must agree as well.
     """
     rows, starts, columns = label.shape
     if starts == 1:
@@ -180,7 +180,7 @@ class MapEstimate:
     work_s: float
     """Computing time of all points on one core [s], from recent run times on this machine."""
     longest_work_s: float
-    """Computing time of all points on one core [s] if no motion repeats, so that all runs are full length."""
+    """Computing time of all points on one core [s] if no motion repeats: all runs have full length."""
     coarse_work_s: float
     """Computing time of the first lattice on one core [s]."""
     workers: int
@@ -207,7 +207,7 @@ class MapEstimate:
 
     @property
     def most_useful_workers(self) -> int:
-        """Largest useful number of workers; more of them would wait for the main process."""
+        """Largest useful number of workers; further workers would wait for the main process."""
         return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:

@@ -243,7 +243,7 @@ class Map(GridPlan):
     amplitude_m: Positive = 5e-6
     """Amplitude of the base displacement [m]."""
     gap_m: Positive | None = None
-    """Clearance at both stops [m]. For it and the next five fields the default is the specimen's value."""
+    """Clearance at both stops [m]. The default of this and the next five fields is the specimen's value."""
     damping_time_s: NonNegativeFloat | Range | None = None
     """Damping over stiffness, c_i / k_i [s]."""
     k0_n_per_m: Positive | None = None
@@ -255,7 +255,7 @@ class Map(GridPlan):
     hertz_stiffness: Positive | None = None
     """Hertz stiffness k of a stop, F = k d^(3/2) [N/m^1.5]."""
     x_m: Number = 0.0
-    """Initial absolute displacement of m0; below those of m1 and m2, and the three velocities [m, m/s]."""
+    """Initial absolute displacement of m0; then those of m1 and m2, and the three velocities [m, m/s]."""
     y_m: Number = 0.0
     z_m: Number = 0.0
     vx_m_per_s: Number = 0.0
@@ -279,7 +279,7 @@ class Map(GridPlan):
     time_s: TargetTime | None = None
     """Limit of the computing time per point, 2 or "2 s"; one minute if only an error is given."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
-    """Length of the run, in drive periods, after which a motion that does not repeat is given up as such."""
+    """Length of the run, in drive periods, after which a motion counts as not repeating."""
     window_periods: Annotated[int, Field(ge=10)] = 200
     """Length of the response window of a motion that does not repeat, in drive periods."""
     refinement: Refinement = Refinement.ADAPTIVE

@@ -34,7 +34,7 @@ class MapMotion:
     response_ii: float
     share: Share
     """Share of initial states that reach this motion within the map's drive periods; chaos may end later. The
-    95 % intervals of all motions hold together. Random states equal in all cells count as one trial each."""
+    95 % intervals of all motions hold jointly. A random state used in all cells counts as one trial."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class MapResults(GridResults[Map]):
         return self._describe_motions(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Return the motions of a cell, the most common first; `place` = indices (second, first quantity)."""
+        """Return the motions of a cell, the most common first; `place` is (second, first) index."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -226,7 +226,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Return group numbers of points by label and size; a jump of size starts a new group."""
+    """Return group numbers of points by label and size; a jump in size starts a new group."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -237,7 +237,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Renumber motions by frequency: 0 is the most common one, 1 the next, and so on."""
+    """Renumber motions by how common they are: 0 is the most common one, 1 the next, and so on."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")

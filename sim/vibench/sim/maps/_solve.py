@@ -49,7 +49,7 @@ def solve_map(
 ) -> MapResults:
     """Compute a map, or the missing points of its file, and return the results.
 
-    Raises StudyError, for example if the file contains another map, the disk is full or a cluster is silent.
+    Raises StudyError, for example for a file of another map, a full disk or an unresponsive cluster.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
 
 
 def _mean(values: Floats, weights: Floats) -> Floats:
-    """Return the weighted mean over the finite corner values of each cell, (n, 4) to (n,); NaN if none is."""
+    """Return the weighted mean of each cell's finite corner values, (n, 4) to (n,); NaN if none is finite."""
     is_known = np.isfinite(values)
     counted = np.where(is_known, weights, 0.0)
     with np.errstate(invalid="ignore"):
