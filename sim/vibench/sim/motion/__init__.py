@@ -2,6 +2,6 @@
 
 `integrate` returns a `Trajectory`. `steady_response` returns Responses I and II in the window at the end of a
 run. `follow_samples` returns the motion at each sample of a recorded base motion. `poincare` finds a motion's
-period, and the derivative of the final state by the initial state. If a run cannot continue, its result has
-another `Outcome`; no exception is raised (docs/decisions/0004-contact-integration.md).
+period, and d(final state) / d(initial state). If a run cannot continue, the `Outcome` of its result says why;
+no exception is raised (docs/decisions/0004-contact-integration.md).
 """

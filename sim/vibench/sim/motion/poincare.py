@@ -40,7 +40,7 @@ def flow_derivative(
     duration_s: float,
     accuracy: Accuracy = Accuracy.REFERENCE,
 ) -> tuple[Floats, Floats]:
-    """Return the final state of a run from time zero of the drive, and its derivative by the initial state.
+    """Return the final state of a run from time zero of the drive, and d(final state) / d(initial state).
 
     The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop the
     derivative does not exist; very large numbers are then returned.
