@@ -127,7 +127,7 @@ UNKNOWN = ""
 
 
 class Place(Enum):
-    """Place where a process was started; only for `HERE` does its number identify the process."""
+    """Place where a process was started; the process number identifies it only if this is `HERE`."""
 
     HERE = auto()
     CONTAINER = auto()
