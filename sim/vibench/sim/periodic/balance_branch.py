@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Balances with a fixed number of harmonics along a drive path; a point ends with parameter / scale."""
+    """Balances with a fixed number of harmonics along a drive path; last coordinate: parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
@@ -176,7 +176,7 @@ class BalanceFamily:
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed error of p by neglected harmonics, over the fundamental of p."""
+        """Largest allowed error of p due to neglected harmonics, over the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
@@ -184,7 +184,7 @@ class BalanceFamily:
         return self.path.drive(float(point[-1]) * self.scale)
 
     def linearise(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the residual of the balance, and its derivatives by all unknowns and the parameter."""
+        """Return the residual of the balance, and its derivatives with respect to unknowns and parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
         residual, jacobian, by_omega, by_amplitude = self.problem.linearise(point[:-1], omega, amplitude)

@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle within which a Floquet multiplier counts as on it, as without damping."""
+"""Distance from the unit circle within which a Floquet multiplier lies on it, as without damping."""
 
 
 class Parameter(StrEnum):
@@ -34,11 +34,11 @@ class BifurcationKind(StrEnum):
     FOLD = "fold"
     """The branch turns back, and a sweep jumps to another branch. One Floquet multiplier is +1."""
     SYMMETRY_BREAKING = "symmetry breaking"
-    """Two motions, mirror images of each other, leave the symmetric motion. One Floquet multiplier is +1."""
+    """Two motions, mirror images of each other, branch off here. One Floquet multiplier is +1."""
     PERIOD_DOUBLING = "period doubling"
-    """A motion of twice the period leaves the branch. One Floquet multiplier is -1."""
+    """A motion of twice the period branches off here. One Floquet multiplier is -1."""
     NEIMARK_SACKER = "Neimark-Sacker"
-    """A quasi-periodic motion leaves the branch. A complex pair of multipliers crosses the unit circle."""
+    """A quasi-periodic motion branches off here. A complex pair of multipliers crosses the unit circle."""
     GRAZING = "grazing"
     """A contact appears in the motion, or disappears, at zero approach speed."""
 
@@ -123,14 +123,14 @@ POINTWISE = (
 # half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
 
 COMPLEX_PART = 1e-6
-"""Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs of product one."""
+"""Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs of product 1."""
 
 
 class OrbitShape(StrEnum):
     """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """Half its (odd) number of drive periods later, the motion is its own mirror image; needs equal gaps."""
+    """Mirror image of itself half a period later; needs an odd number of drive periods, and equal gaps."""
     REPEATED = "repeated"
     """The motion repeats after a whole number of drive periods."""
 
@@ -148,9 +148,9 @@ class OrbitSigns:
     """Number of contacts that begin in a period of the motion."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Difference of the state after half a period or mirrored, shape (6,); empty if not defined."""
+    """Closure error of the simpler motion (mirrored or half the period), (6,); empty if not defined."""
     joins: BifurcationKind | None = None
-    """Bifurcation at which this branch meets the branch of motions with half the period or mirrored."""
+    """Bifurcation at which this branch meets a branch of mirrored motions or of half the period."""
     grazing_distance: float = math.inf
     """Distance from grazing: p to the stop over the gap or, at a contact, dp/dt over the gap times 2 pi f."""
 
@@ -200,7 +200,7 @@ IS_SIMPLER = 1e-7
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch has passed a motion of half the period or mirrored, at which it ends."""
+    """Return whether a branch has passed a mirrored motion or one of half the period, where it ends."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -53,7 +53,7 @@ class FrequencyPath:
         return value, float(self._curve(self._clip(value)))
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """Return the derivatives of frequency (1) and amplitude [m/Hz] by the frequency."""
+        """Return the derivatives of frequency (1) and amplitude [m/Hz] with respect to frequency."""
         if len(self.amplitudes_m) == 1 or self._clip(value) != value:
             return 1.0, 0.0
         return 1.0, float(self._curve(value, 1))
@@ -81,7 +81,7 @@ class AmplitudePath:
         return self.frequency_hz, value
 
     def slopes(self, value: float) -> tuple[float, float]:  # noqa: ARG002 - the same everywhere
-        """Return the derivatives of frequency (0) and amplitude (1) by the amplitude."""
+        """Return the derivatives of frequency (0) and amplitude (1) with respect to amplitude."""
         return 0.0, 1.0
 
 
@@ -165,7 +165,7 @@ def follow(
     start
         Point on the curve, from which to start.
     toward, bounds
-        Direction in which the scaled parameter first changes (by the sign), and its range.
+        Sign of the first change of the scaled parameter, and range of this parameter.
     steps
         Step lengths and tolerances.
     """
@@ -286,7 +286,7 @@ class _FollowedBranch:
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
-        """End a branch at a motion of half the period or mirrored, beyond which the branch repeats itself."""
+        """End a branch at a mirrored motion or one of half the period, where the branch starts to repeat."""
 
         def measure(point: ArcPoint) -> float:
             return float(self.family.report(point.point).signs.apart @ signs.apart)

@@ -232,7 +232,7 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
     """Return a point beyond a kink, where a contact begins and the branch may turn back; None if not found.
 
     At a kink the parameter may reverse while the unknowns continue. Steps of growing length are tried along
-    the tangent, and along the tangent with reversed parameter, with any rotation of the tangent.
+    the tangent, and along the tangent with reversed parameter; any rotation of the tangent is allowed.
     """
     mirrored = here.tangent.copy()
     mirrored[-1] = -mirrored[-1]

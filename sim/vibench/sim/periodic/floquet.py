@@ -83,7 +83,7 @@ class _Departures:
         self._system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
         push = -np.linalg.solve(structure.mass, structure.direction)
         self._spring_in = np.concatenate([np.zeros(n), push])
-        """Derivative of the state's time derivative by the spring's force, shape (2 n,)."""
+        """Change of the state's time derivative per unit force of the spring, shape (2 n,)."""
         # Sum of the fastest eigenvalue of the structure and the frequency on the stiffest spring [rad/s].
         samples = grid_size(int(motion.harmonics[-1]))
         omega = 2.0 * math.pi * motion.frequency_hz

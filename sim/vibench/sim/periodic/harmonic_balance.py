@@ -74,7 +74,7 @@ def structure_of(specimen: Specimen) -> LinearStructure:
 
 
 class CondensedStructure(NamedTuple):
-    """Structure condensed to p at m harmonics of one frequency; "slope" fields are derivatives by omega."""
+    """Structure condensed to p at m harmonics of one frequency; "slope" fields are d/domega."""
 
     compliance: Complex
     """Compliance at the spring, b.Z_k^-1 b, for each harmonic, shape (m,) [m/N]."""
@@ -140,14 +140,14 @@ FEWEST_SAMPLES = 1024
 
 
 class ForceHarmonics(NamedTuple):
-    """Harmonics of the spring's force, and their derivatives by the harmonics of the motion."""
+    """Harmonics of the spring's force, and their derivatives with respect to those of the motion."""
 
     force: Complex
     """Harmonics F_k of the spring's force, shape (m,) [N]."""
     holomorphic: Complex
     """Derivative dF_k / dP_l, shape (m, m) [N/m]."""
     conjugate: Complex
-    """Derivative by the complex conjugate of P_l, dF_k / dP_l*, shape (m, m) [N/m]."""
+    """Derivative with respect to the complex conjugate of P_l, dF_k / dP_l*, shape (m, m) [N/m]."""
     frequency_slope: Complex
     """Derivative dF_k / domega at constant P, due to rate-dependent forces, shape (m,) [N s]."""
 
@@ -279,7 +279,7 @@ class BalanceProblem:
     def linearise(
         self, unknowns: Vector, omega: float, amplitude_m: float
     ) -> tuple[Vector, Table, Vector, Vector]:
-        """Return the residual, its Jacobian, and its derivatives by omega and by the drive amplitude.
+        """Return the residual and its derivatives: Jacobian, d/domega, and d/d(drive amplitude).
 
         Shapes (n,), (n, n), (n,), (n,). Values are not finite where the force overflows.
         """
@@ -364,7 +364,7 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
 
 
 def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
-    """Solve the balance by Newton's iteration with step halving; return the unknowns, and if it converged."""
+    """Solve the balance by Newton's method with step halving; return unknowns, and whether it converged."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearise(unknowns, omega, amplitude_m)
     error = size_of(residual)

@@ -46,7 +46,7 @@ class ExactFamily:
         return state_scales(self.mapping.specimen, self.reference)
 
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
-        """Return the closure error after a period, its derivative by the state, and a ratio of scales.
+        """Return the closure error after a period, its Jacobian, and a ratio of scales.
 
         The map scales velocities by its own drive, the family by the reference drive; the ratio converts.
         """
@@ -61,7 +61,7 @@ class ExactFamily:
 
 @dataclass(frozen=True, eq=False)
 class OrbitFamily(ExactFamily):
-    """Fixed points of the period map along a drive path; a point of the curve ends with parameter / scale."""
+    """Fixed points of the period map along a drive path; the last coordinate is parameter / scale."""
 
     path: DrivePath
     scale: float
@@ -76,7 +76,7 @@ class OrbitFamily(ExactFamily):
         return point[:-1] * self.scales
 
     def linearise(self, point: Vector) -> tuple[Vector, Table]:
-        """Return the closure error after a period, and its derivatives by state and parameter."""
+        """Return the closure error after a period, and its derivatives d/d(state) and d/d(parameter)."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state = self.drive_at(point), self.state_at(point)
@@ -85,7 +85,7 @@ class OrbitFamily(ExactFamily):
         return gone, np.column_stack([by_state, along])
 
     def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
-        """Return the derivative of the map's final state by the parameter, over scales [1/Hz or 1/m]."""
+        """Return the derivative d(final state) / d(parameter) of the map, over scales [1/Hz or 1/m]."""
         by_frequency, by_amplitude = self.path.slopes(value)
         slope = np.zeros(6)
         if by_frequency != 0.0:
@@ -151,7 +151,7 @@ def periodic_branch_within(
     low, high
         Ends of the range, ascending [Hz, or m].
     steps
-        Step lengths and tolerances. In their units the range is 10 long.
+        Step lengths and tolerances. In scaled units the range has length 10.
     """
     value = parameter_value(path, orbit.drive)
     family, start = _family_at(orbit, path, value, range_scale(low, high, value))

@@ -66,7 +66,7 @@ class PhaseResonanceFamily(ExactFamily):
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
     def linearise(self, point: Vector) -> tuple[Vector, Table]:
-        """Return closure error and phase error, shape (7,), and their derivatives by all unknowns, (7, 8)."""
+        """Return closure error and phase error, shape (7,), and their Jacobian, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state = self.drive_at(point), point[:6] * self.scales
@@ -109,14 +109,14 @@ def phase_resonance_branch(
     Return the branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
     Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its
     stops at this level, the linear motion does not have this phase exactly once in the band, or `of` is not a
-    word of `PhaseReference`.
+    value of `PhaseReference`.
 
     Parameters
     ----------
     specimen
         Specimen with any contact law, and two equal stops or none.
     band_hz
-        Frequencies around one mode [Hz]. The motion without contact must have the phase exactly once in it.
+        Frequencies around one mode [Hz]. Motion without contact must have the phase exactly once there.
     levels_m
         Drive amplitudes, ascending [m]; at the lower level m1 must not reach its stops.
     of, phase_rad

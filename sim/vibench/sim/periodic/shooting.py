@@ -37,7 +37,7 @@ from .harmonic_balance import phasors_of, size_of
 # digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Step of the finite differences for derivatives by the drive parameter, over the parameter's value."""
+"""Step of the finite differences for derivatives with respect to a drive parameter, over its value."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Offsets (in steps) and weights of the fourth-order central difference quotient."""
 
@@ -66,7 +66,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Period map for motions with half the period or mirrored; None if such motions are impossible."""
+        """Period map for mirrored motions or those of half the period; None if these are impossible."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -88,7 +88,7 @@ class PeriodMap:
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
-        """Return the derivative of the final by the initial state, both over their scales, shape (6, 6)."""
+        """Return d(final state) / d(initial state), both states over their scales, shape (6, 6)."""
         if not self._may_start(state):
             return np.full((6, 6), math.nan)
         scales = state_scales(self.specimen, drive)
@@ -98,11 +98,11 @@ class PeriodMap:
         return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the derivative of the final state by ln(frequency), over the scales, shape (6,)."""
+        """Return the derivative d(final state) / d ln(frequency), over the scales, shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, frequency_hz=part * drive.frequency_hz))
 
     def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the derivative of the final state by ln(amplitude), over the scales, shape (6,)."""
+        """Return the derivative d(final state) / d ln(amplitude), over the scales, shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, amplitude_m=part * drive.amplitude_m))
 
     def _slope(self, state: Vector, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Vector:
