@@ -30,7 +30,7 @@ from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 MEMORY = 20
 """Memory of the moving average, in runs: a run that is this many runs old keeps a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Limit on one run's logarithmic deviation from its kind's mean, as its final motion may be unusual."""
+"""Limit on a run's logarithmic deviation from the mean of its kind, as its motion may be unusual."""
 FEWEST = 3
 """Fewest runs of a kind from which the scatter of their computing times is estimated."""
 UNKNOWN_FACTOR = 10.0
@@ -153,7 +153,7 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Return a kind, ``a/b/c``, then the more general kinds ``a/b`` and ``a``."""
+    """Return a kind of run, ``a/b/c``, then the more general kinds ``a/b`` and ``a``."""
     parts = kind.split("/")
     return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
 
@@ -202,7 +202,7 @@ LEARNT_AS: dict[Solver, str] = {
     InBatches(Question.MOTION): "settled in lanes",
     InBatches(Question.ANSWER): "in lanes",
 }
-"""First part of the kind in the ledger, for solvers other than `solve_scene`."""
+"""First part of a run's kind in the ledger, for solvers other than `solve_scene`."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
@@ -223,7 +223,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
-    """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some.
+    """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some of them.
 
     Pilot runs are needed because the time depends on whether the motion depends sensitively on its start,
     which is not known beforehand. An invalid scene counts as zero time.

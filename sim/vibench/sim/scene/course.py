@@ -1,7 +1,7 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
 Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
-`watch` classifies it and returns it if it must be integrated further. `observe` observes the end. Between
+`watch` classifies it, and returns it if it must be followed further. `observe` observes the end. Between
 these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
 """
 
@@ -197,7 +197,7 @@ DRIFT_SHARE = 0.25
 
 
 class SettlingCourse:
-    """Run of a motion until it repeats, or will certainly never repeat; then it is observed.
+    """Run of a motion until it repeats or certainly never will; then it is observed.
 
     A repeating motion is observed over one of its periods, any other motion over a window. Because chaos may
     end, a chaotic motion is integrated further, without a tangent vector, as far as a budget allows.
@@ -211,7 +211,7 @@ class SettlingCourse:
     longest_s
         Longest simulated time [s], at least a window; a motion still unclear then is undecided.
     alone_s
-        Nominal cost for integrating chaos further [s]; zero for not at all.
+        Nominal computing cost for integrating chaos further [s]; zero for no further integration.
     by_itself_s
         Time after which the motion may join a batch [s]; see `StatesAlone`.
     """

@@ -10,7 +10,7 @@ from .followed_run import FollowedRun
 TOLERANCE = 1e-10
 """Integration tolerance of the period map, far below the distance at which a motion counts as settled."""
 RETURNED = 1e-10
-"""Largest change of state over one period, relative to the motion's size, of a periodic motion."""
+"""Largest change of state over one period of a periodic motion, relative to the motion's size."""
 ITERATIONS = 8
 
 
@@ -27,7 +27,7 @@ class FixedPoint:
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
-    """Return the stable periodic motion near a run, with this period in drive periods; None if none."""
+    """Return the stable periodic motion of this period (in drive periods) near a run, or None."""
     try:
         return _fixed_point(near, period)
     except (ValueError, np.linalg.LinAlgError):

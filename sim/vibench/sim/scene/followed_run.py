@@ -41,7 +41,7 @@ STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
-"""Number of steps as which one step with a tangent vector counts in the limit of steps."""
+"""Number of steps that one step with a tangent vector counts for in the limit of steps."""
 
 
 def nominal_cost_s(

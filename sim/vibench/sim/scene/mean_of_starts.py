@@ -14,7 +14,7 @@ from .shares import student_quantile, wilson_share
 from .stated_error import ROUNDING
 
 ALIKE = 1e-2
-"""Largest relative difference of responses of one motion; runs that are still settling cause it."""
+"""Largest relative difference between responses of one motion, due to runs that are still settling."""
 OTHER_DIFFERS = 1.0
 """Assumed relative difference in response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
@@ -74,7 +74,7 @@ def windows_of(starts: Sequence[Start]) -> int:
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return how many starts missed the repeating motion that most starts reached; None without such one."""
+    """Return how many starts missed the repeating motion that most reached; None without such a motion."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None

@@ -129,7 +129,7 @@ FLIGHT_S, PERIOD_S, IMPACT_S, PRESSED_S = 5e-5, 1e-7, 1e-6, 1.2e-2
 """Planned computing time per second and per drive period of motion without contact, per impact, and per
 second of contact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
-"""Planned computing time [s] per second and per drive period of motion, for a force at every p."""
+"""Planned computing time [s] per second and per drive period of motion, for a force that acts at every p."""
 TANGENT = 1.5
 """Additional computing time for a tangent vector, over the time without one."""
 SETTLING_S = 10.0

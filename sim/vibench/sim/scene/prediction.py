@@ -69,7 +69,7 @@ class FoundMotion:
     starts: int
     """Number of starts (initial states) that led to this motion."""
     share: Share
-    """Share of all starts; the 95 % intervals of all motions hold together. They allow for longer runs, in
+    """Share of all starts; the 95 % intervals of all motions hold jointly. They allow for longer runs, in
     which starts that are undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
 
 

@@ -1,6 +1,6 @@
 """Solve a scene to a requested error or within a requested time. SI units.
 
-Ever better results with errors are computed until the target is met. The methods, from cheap to expensive: a
+Ever better results with error estimates are computed until the target is met. Methods, by rising cost: a
 closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated window,
 checked by a stricter run; with sensitive dependence on the start, the mean of these over several starts.
 """
@@ -60,7 +60,7 @@ CLOSE = 3e-3
 KNOWN = 0.03
 """Relative distance from a known periodic motion, below which a run may be approaching that motion."""
 MOST_PUSH = 1000.0
-"""Largest length, over the drive amplitude, that replaces the gap as the size of changes of the start."""
+"""Largest length, over the drive amplitude, to which changes of the start are scaled instead of the gap."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""

@@ -26,9 +26,9 @@ SLOWEST_RATIO = 0.99
 NEARLY = 0.01
 """Relative change of state from one period to the next, below which a motion counts as settling."""
 TINY = 1e-300
-"""Size of a motion at rest, which avoids division by zero."""
+"""Size assumed for a motion at rest, to avoid division by zero."""
 DISTINCT = 20.0
-"""Smallest change, in tolerances, after fewer drive periods than the period. If a change is smaller, the
+"""Smallest change of state, in tolerances, over less than a period. If a change is smaller, the
 motion may still be settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
 """Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
@@ -38,7 +38,7 @@ DRIFT_PARTS = 6
 """Number of consecutive parts of a motion; in a drift, the changes of state in all of them grow, or all
 shrink. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time without growth or decay of a perturbation, in decay times, of quasi-periodic motion."""
+"""Time without growth or decay of a perturbation that shows quasi-periodic motion, in decay times."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Sharpness:
 def repetition(
     section: Floats, omega: float, forgetting_periods: float, sharpness: Sharpness
 ) -> Repetition | None:
-    """Return the shortest period with which a motion ends; None if it does not repeat.
+    """Return the shortest period of a motion at its end; None if it does not repeat.
 
     Two changes over the same number of periods, about a decay time, are compared, because a small change in
     one period may be part of a slow drift. The ratio of the two changes gives the remaining distance.
@@ -177,7 +177,7 @@ def longest_section(forgetting_periods: float) -> int:
 
 
 def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
-    """Return the kind of a motion; undecided if the growth is unclear or was observed too shortly."""
+    """Return the kind of a motion; undecided if the growth is unclear or not observed for long enough."""
     if repeats is not None:
         return MotionKind.PERIODIC
     times = growth.duration_s / fading_s
@@ -197,7 +197,7 @@ def _change(after: Floats, before: Floats) -> float:
 FORGETTING = 8.0
 """Number of decay times (slowest mode) after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""Ratio of the longest run to the longest decay time that is used; longer decay times are cut to it."""
+"""Ratio of the longest run to the longest decay time that is used; longer ones are cut to this time."""
 MOST_STATES = 2_000_000
 """Most drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
@@ -258,7 +258,7 @@ class Pace:
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Return the period of a nearly settled motion, in drive periods; 1 if there is none.
 
-        Lines are taken over this period. What counts as nearly settled is the same at every accuracy level.
+        Spectral lines are taken over it. What counts as nearly settled is the same at every accuracy level.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period

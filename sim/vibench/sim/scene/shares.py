@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Return the argument in 0 to ``high`` at which a decreasing function equals ``value``; bisection."""
+    """Return the argument in 0 to ``high`` at which a decreasing function equals ``value``, by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)
@@ -108,7 +108,7 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     """Return the shares of several outcomes with simultaneous 95 % confidence intervals.
 
     Two outcomes have the ordinary interval. For more outcomes each interval is widened so that all hold
-    together (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome of
+    jointly (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome of
     the trials that have not ended.
     """
     trials = sum(each.trials for each in counts)

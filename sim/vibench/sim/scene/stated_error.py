@@ -31,7 +31,7 @@ accurate than a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Ratio of a window's length to that of the shorter windows with which it is compared; also of leakage."""
+"""Ratio of a window's length to that of the shorter windows it is compared with; also of their leakage."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
@@ -46,7 +46,7 @@ SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 SLOWEST_RATIO = 0.9
 """Largest assumed ratio of successive changes of state, which means the slowest settling."""
 FIRST_LOOK = 16
-"""Number of drive periods before two runs are first compared; then the time doubles each time."""
+"""Number of drive periods before two runs are first compared; this number then doubles each time."""
 PARTED = 0.05
 """Difference over the gap, or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
