@@ -157,9 +157,9 @@ class LoadedShaker:
     """Amplifier, shaker and specimen, driven by the voltage at the amplifier's input.
 
     Coil and table are solved exactly for a voltage and a force that are constant in a time step. The specimen
-    is solved exactly between impacts; impacts are integrated within a step (native/cubic.hpp). Its force on
-    the table is extrapolated and constant in a step, which causes a relative error of (omega h)^2 / 12 in the
-    motion due to this force (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
+    is solved exactly between impacts; impacts are integrated within a step (native/cubic.hpp). The specimen's
+    force on the table is extrapolated and constant in a step. This causes a relative error (omega h)^2 / 12
+    in the motion due to it (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
     """
 
     def __init__(
@@ -252,9 +252,9 @@ class LoadedShaker:
         noise_v
             Voltage that is added at the amplifier's output [V], shape (steps,).
         end_rows
-            Number of first steps for which the state at the end of the step is stored.
+            Number of steps, from the first, whose final states are stored.
         block
-            Number of steps after each of which contacts are counted; 0 for no counts.
+            Number of steps between two counts of the contacts; 0 for no counts.
         """
         drive = np.ascontiguousarray(drive_v, np.float64)
         motion = ShakenMotion.of(len(drive_v), end_rows, block)

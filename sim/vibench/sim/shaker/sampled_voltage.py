@@ -26,7 +26,7 @@ FINEST_STEP_HZ = 5e4
 _PASS_PART = 0.45
 """Upper end of the pass band over the sample rate; a cosine edge to half the sample rate follows."""
 _MARGIN = 2048
-"""Samples on each side of a piece that are filtered with it; impulse responses beyond are below 1e-8."""
+"""Samples on each side of a piece that are filtered with it; beyond, impulse responses are below 1e-8."""
 _PIECE = 1 << 15
 """Number of samples in a piece of the recording; a piece is filtered at once."""
 _BLOCK_S = 0.02
@@ -175,7 +175,7 @@ class _Resampling:
         return known
 
     def _hold_gain(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the coil current under a stepped over that under a continuous voltage: 1 - (w h)^2 / 12."""
+        """Return the ratio of coil currents under a stepped and a continuous voltage: 1 - (w h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s
         turns = self._sample_rate_hz * self._ratio * time_constant_s
