@@ -1,4 +1,4 @@
-"""Drives: the base displacement as a function of time, which starts at zero. SI units."""
+"""Drives: the base displacement as a function of time from zero. SI units."""
 
 import math
 from dataclasses import dataclass

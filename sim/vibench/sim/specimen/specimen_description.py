@@ -329,7 +329,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Return the table of a file without its format version; refuse another version than this one."""
+    """Return the table of a file without its format version; refuse any version but this one."""
     table = toml_table(path)
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
