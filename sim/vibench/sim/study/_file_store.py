@@ -191,7 +191,7 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Store in the file of a study; as a context manager it closes the file.
+    """Store that writes to the file of a study; as a context manager it closes the file.
 
     Raises StudyError when the file is not that of a study, contains another study, or is being written by
     another run.

@@ -62,7 +62,7 @@ COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
 FOUND_MOTION = "found_motion"
 MOST_FOUND = 8
-"""Largest number of motions that are stored of an ensemble, the most frequent first."""
+"""Largest number of motions stored for an ensemble, the most frequent first."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
 """Longest stored text [bytes]; longer text is cut off."""

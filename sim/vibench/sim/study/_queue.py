@@ -60,7 +60,7 @@ class Costs:
     def remaining_s(self, is_missing: NDArray[np.bool_]) -> float:
         """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
 
-        For points without a finished neighbour it is the planned time, times actual over planned time so far.
+        Without a finished neighbour, a point's planned time is multiplied by actual over planned time so far.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
@@ -106,7 +106,7 @@ class PointScheduler:
 
     @property
     def released_points(self) -> int:
-        """Number of released points, also of those with a result."""
+        """Number of released points, including those with a result."""
         return int(np.count_nonzero(self._is_released))
 
     @property
@@ -300,7 +300,7 @@ def run_points(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the wanted points that are missing in the store, until ``cancelled``; as `run_study`."""
+    """Compute the wanted points that are missing in the store, until ``cancelled``, as `run_study` does."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)

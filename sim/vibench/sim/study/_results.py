@@ -195,7 +195,7 @@ class GridResults(Generic[Plan]):
         name
             Name of a numeric column, such as ``"response_i"``.
         **fixed
-            Values of axes, which then are no axes of the result: ``amplitude=5e-6, model="hertz"``.
+            Values of axes that the result then does not have: ``amplitude=5e-6, model="hertz"``.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"

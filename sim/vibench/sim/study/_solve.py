@@ -152,7 +152,7 @@ def solve_study(
 ) -> StudyResults:
     """Compute a study, or the missing points of its file, and return the results.
 
-    Raises StudyError, for example if the file has another study, the disk is full or a cluster is silent.
+    Raises StudyError, for example for a file of another study, a full disk or an unresponsive cluster.
 
     Parameters
     ----------
@@ -161,8 +161,8 @@ def solve_study(
     out
         File for the results, ``NAME.h5``; None to keep them in memory.
     existing
-        Whether to refuse an existing file, or to resume it, which computes its missing points and creates a
-        file that does not exist.
+        Whether to refuse an existing file or to resume it. Resuming computes missing points, or creates the
+        file if it does not exist.
     workers
         Number of threads; None for one per processor.
     cluster

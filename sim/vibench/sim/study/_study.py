@@ -300,7 +300,7 @@ def study_solver(study: Study) -> Solver:
     """Return the solver of a study: in batches, or one by one.
 
     Batches need points that do not continue others, wide processor registers, and enough simulated time per
-    specimen. Even then, stops other than Hertz contacts and the accuracy *reference* are solved one by one.
+    specimen. Even then, points with non-Hertz stops or the accuracy *reference* are solved one by one.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
