@@ -23,7 +23,7 @@ SETTLED = 1e-3
 SAME_MOTION = 1e-5
 """Relative distance of states at the same drive phase, below which two motions count as the same."""
 SIMPLER = 1e-6
-"""Relative distance of states below which a motion repeats after half its period or is symmetric."""
+"""Relative distance of states below which half a period counts as a period, or a motion as symmetric."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
 """Largest abs(p) of random initial states, over the gap on the same side."""

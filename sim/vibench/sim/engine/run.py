@@ -26,7 +26,7 @@ MOST_STEPS = 2_000_000_000
 MOST_IMPACTS = 1 << 26
 """Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
 SPARE_IMPACTS = 100
-"""Impacts allowed in addition to the allowed mean rate, so that short runs may have some."""
+"""Impacts allowed in addition to those at the allowed mean rate, so that short runs may have some."""
 DIRECTIONS = 6
 """Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9

@@ -17,7 +17,7 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Number of Gauss points in phi; the duration has an error of 1e-8, the speed only a rounding error."""
+"""Number of Gauss points in phi; the duration then has an error of 1e-8, the speed a rounding error."""
 TERMS = 8
 """Number of terms of the series for spring forces that vary slowly compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41

@@ -62,7 +62,7 @@ class LinearStructure:
 
 
 def structure_of(specimen: Specimen) -> LinearStructure:
-    """Return the structure without stops: q = (x, y, z), p = y - z, base acting on m0 by k0 and c0."""
+    """Return the structure without stops: q = (x, y, z), p = y - z, base acting on m0 via k0 and c0."""
     return LinearStructure(
         mass=specimen.mass_matrix,
         damping=specimen.damping_matrix,

@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Return the kind of a motion; "chaotic so far" if chaos ended in a run from a start or may not last."""
+    """Return the kind of a motion; "chaotic so far" if chaos ended in any start's run or may not last."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S

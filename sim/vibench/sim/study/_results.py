@@ -1,4 +1,4 @@
-"""Results of a study so far: arrays over its axes, in which unknown numbers are NaN, and states."""
+"""Results of a study so far: point states, and arrays over its axes in which unknown numbers are NaN."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
