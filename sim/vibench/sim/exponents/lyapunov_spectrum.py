@@ -56,7 +56,7 @@ class LyapunovSpectrum:
     impact_rate_hz: float
     """Mean impact rate of m1 in the final motion [1/s]."""
     dimension_standard_error: float
-    """Standard error of `dimension`, from the correlated errors of the exponents; 0 for an integer dimension."""
+    """Standard error of `dimension`, from the correlated errors of the exponents; 0 for whole numbers."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
