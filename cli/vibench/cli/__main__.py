@@ -53,7 +53,7 @@ class Panel(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """Place where a command is defined, and what the command needs to run."""
+    """Place where a command is defined, and the command's requirements."""
 
     panel: Panel
     function: str
@@ -116,7 +116,7 @@ _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
 
 @contextmanager
 def explain_refusals(args: Sequence[str]) -> Iterator[None]:
-    """Inside this context, refuse empty arguments, and name given and allowed values in usage errors."""
+    """Refuse empty arguments inside this context, and state given and allowed values in usage errors."""
     words = ["", *words_of(args)]
     empty = next((before for before, word in pairwise(words) if not word), None)
     try:
@@ -296,7 +296,7 @@ def vibench(
 
 
 def main() -> None:
-    """Run the command line; print an error that the user can fix as a sentence, and exit with 1 or 3."""
+    """Run the command line; on an error that the user can fix, print one sentence and exit with 1 or 3."""
     os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC reads this at import; no log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:

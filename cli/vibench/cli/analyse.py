@@ -140,7 +140,7 @@ def analyse(
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
+    """Analyse complete, interrupted or still growing recordings, and write one HTML report."""
     request = options.request().request
     request = replace(request, segment_s=segment, view=parse_view(quantity, scale))
     if fit and specimen is not None:

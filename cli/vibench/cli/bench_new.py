@@ -61,7 +61,7 @@ class Answers:
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
     def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
-        """Return the answer to a question about the configuration; empty to keep the template's value."""
+        """Return the answer to a question about the configuration; if empty, the template's value is kept."""
         answer = self.given.get(question.key, "")
         if choices:
             console.print(f"found: {', '.join(choices)}")
@@ -69,7 +69,7 @@ class Answers:
         return answer
 
     def connection(self, pair: str) -> str:
-        """Return the answer whether a pair of connectors is wired; empty for no."""
+        """Return the answer to whether a pair of connectors is wired; empty means no."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer

@@ -131,7 +131,7 @@ def _drive(
 def _resonance(
     amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
 ) -> tuple[Sequence[Curve], dict[str, object]]:
-    """Return no measured curves, and the request's fields that follow a phase resonance over amplitude."""
+    """Return no measured curves, and the request's fields for following a phase resonance over amplitude."""
     if amplitude is None or frequency is not None or like is not None:
         raise InvalidRequest(
             f"--resonance {resonance} is followed over the amplitude; also give --amplitude START:STOP, and "

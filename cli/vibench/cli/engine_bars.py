@@ -100,7 +100,7 @@ def engine_bars(on: Console = console) -> Iterator[EngineBars]:
 
 @contextmanager
 def show_status(ask: Callable[[], EngineStatus], engine: Engine) -> Iterator[None]:
-    """Display the newest status, in a separate thread that alone waits for a blocked terminal.
+    """Display the newest status in a separate thread; only this thread waits for a blocked terminal.
 
     After a stop, print on standard error who stopped the engine, and whether its output is off.
     """

@@ -34,7 +34,7 @@ def examples(
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Return a shipped folder's files, also of its subfolders, without the scripts of `vibench figure`."""
+    """Return the files of a shipped folder and its subfolders, without the scripts of `vibench figure`."""
     return sorted(
         path
         for path in folder.rglob("*")
@@ -45,7 +45,7 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def names_of(paths: list[Path]) -> list[str]:
-    """Return each file's name without suffix; if names repeat, precede them with the folder's name."""
+    """Return each file's name without suffix; names that occur twice begin with the folder's name."""
     often = Counter(path.stem for path in paths)
     return [path.stem if often[path.stem] == 1 else f"{path.parent.name}/{path.stem}" for path in paths]
 

@@ -110,7 +110,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print the map's caption and motions; for initial states, also the basin boundary and kick effects."""
+    """Print a map's caption and motions; over initial states, also basin boundary and effects of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")

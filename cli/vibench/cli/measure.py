@@ -78,7 +78,7 @@ def print_estimate(
 
 
 def expected_results(campaign: Campaign, rig: Rig) -> dict[str, tuple["ExpectedResult", ...]]:
-    """Return the expected results of measurements and of noise in sweeps; raise LimitExceeded."""
+    """Return the expected results of measurements and of noise tests in sweeps; may raise LimitExceeded."""
     for point in distinct_drives(campaign.points()):
         require_within_limits(point.measurement, rig)
     swept = distinct_drives(tuple(point for sweep in campaign.sweeps for point in sweep.points()))
@@ -115,7 +115,7 @@ def expected_ends_s(campaign: Campaign, rig: Rig) -> dict[str, tuple[float | Non
 
 
 def duration_s(text: str) -> float:
-    """Return the seconds in a time such as ``30min``, ``1.5 h`` or ``90 s``."""
+    """Return the number of seconds in a duration such as ``30min``, ``1.5 h`` or ``90 s``."""
     try:
         seconds = number_of(text, "s", "min", "h")
     except ValueError:

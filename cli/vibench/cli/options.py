@@ -44,9 +44,9 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""Text about the allowed values, by type of pydantic's error."""
+"""Texts about the allowed values, keyed by the type of pydantic's error."""
 _EXAMPLES = {"error": "; for 1 % give 1%", "confidence": "; for 95 % give 0.95"}
-"""Example of an allowed value, by field."""
+"""Examples of allowed values, keyed by field."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class RequestOptions(Generic[Request]):
     typed: Mapping[str, Any]
 
     def request(self, **others: object) -> Request:
-        """Return the request after the command has set other fields; raise InvalidRequest if forbidden."""
+        """Return the request after setting other fields; raise InvalidRequest if a value is forbidden."""
         return build_request(self.model, {**others, **self.typed})
 
 
 def build_request(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request with these values; raise InvalidRequest that names the first forbidden value."""
+    """Return a request with these values; raise InvalidRequest, which names the first forbidden one."""
     from pydantic import ValidationError
 
     try:
@@ -101,7 +101,7 @@ def option(
     max: int | None = None,  # noqa: A002
     callback: Callable[..., None] | None = None,
 ) -> OptionInfo:
-    """Return an option that is not a model's field; ``name`` if it differs from the parameter's name."""
+    """Return an option that is not a model's field; set ``name`` if it is not the parameter's name."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(
         *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max, callback=callback
@@ -195,7 +195,7 @@ def words_of(args: Sequence[str]) -> list[str]:
 class SectionedCommand(TyperCommand):
     """Command whose help is plain text, with a section for each heading.
 
-    typer would draw boxes, for which it needs rich, which takes 75 ms to load.
+    typer would draw boxes with rich, which takes 75 ms to load.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -225,7 +225,7 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Largest number of characters of a command's line in a list; no line is that long."""
+"""Width limit of a command's line in a list [characters]; no line is that long."""
 
 
 class SectionedGroup(TyperGroup):

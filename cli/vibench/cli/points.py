@@ -16,7 +16,7 @@ SHOWN_FAILURES = 5
 Workers = Annotated[int | None, option("Number of threads; by default one per processor.", "N", min=1)]
 Cluster = Annotated[str | None, option("Compute on the workers of this Dask scheduler.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
-"""The values on the axes of each failed point, and the reason of the failure."""
+"""Axis values of each failed point, and the reason for the failure."""
 
 
 def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:

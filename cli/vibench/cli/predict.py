@@ -180,7 +180,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Describe how the points are solved, in one paragraph per run of points with the same method."""
+    """Describe how points are solved, in one paragraph per group of neighbours with the same method."""
     from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -250,7 +250,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return how many initial conditions lead to the point's motion, as 5/8; "lost" or empty if unknown."""
+    """Return how many starts lead to the motion, such as 5/8; "lost" if it forgets its start, else empty."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"

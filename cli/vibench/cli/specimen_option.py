@@ -35,7 +35,7 @@ def specimen_request(
 ) -> Choice:
     """Return a request with a specimen; warn about implausible amplitudes and gaps.
 
-    ``amplitude`` is the text of the option, checked before. Raises InvalidRequest for other invalid options.
+    ``amplitude`` is the text of the option, already checked. Raises InvalidRequest for other invalid options.
     """
     request = options.request(described=read_specimen(specimen), **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])

@@ -109,6 +109,6 @@ class KeptStudies:
         return results
 
     def complain(self) -> None:
-        """Exit with an error code if any study has failed points; the other points are stored."""
+        """Exit with an error code if a point of any study has failed; all other points are stored."""
         if self._failed > 0:
             raise typer.Exit(ExitCode.FAILED)

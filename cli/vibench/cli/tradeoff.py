@@ -33,7 +33,7 @@ def tradeoff(
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
 ) -> None:
-    """Compare error and computing time of each method, for your scene or the paper's cases at 260 Hz."""
+    """Compare the error and computing time of each method, for your scene or the paper's cases at 260 Hz."""
     given = {"error": error, "time_s": time_limit}
     target = {name: value for name, value in given.items() if value is not None}
     scenes = {"amplitude": amplitude, "frequency": frequency}

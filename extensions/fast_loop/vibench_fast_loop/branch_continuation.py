@@ -14,7 +14,7 @@ from vibench.acquisition.rig import Rig
 _NO_TRIES = 12
 """Maximum number of attempts per point; the motion settles and is measured in each."""
 _BEFORE = 60
-"""Periods before the evaluated perturbations, as lead-in and to find the size of the perturbations."""
+"""Number of periods before the evaluated perturbations: lead-in, and trial to find the size."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -58,10 +58,10 @@ class BranchContinuation(AbstractFeedback):
     record_s: PositiveFloat = 0.5
     """Time for which each point is recorded [s]."""
     perturbation: float = Field(default=0.0, ge=0, le=0.1)
-    """Small changes of the drive that measure the stability of each point: relative rms change of the
-    fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to measure no stability."""
+    """Size of the drive changes that measure the stability of each point: relative rms change of the
+    fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to skip the measurement."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
-    """Number of evaluated periods with small changes at each point; a few more periods find their size."""
+    """Number of evaluated periods with small changes at each point; a few more serve to find the size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -79,7 +79,7 @@ class BranchContinuation(AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of all points, each with the maximum number of attempts [s]."""
+        """Total duration if every point needs the maximum number of attempts [s]."""
         look_s = self.settle_s + self.look_periods / self.low_hz
         perturbed = self.perturbed_periods + _BEFORE if self.perturbation else 0
         return self.most_points * (_NO_TRIES * look_s + self.record_s + perturbed / self.low_hz)

@@ -27,7 +27,7 @@ _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
 """Largest standard errors at the end of a measurement. Those of the base's fundamental and harmonics are
 relative to the tolerance, that of m0 is relative to m0 itself."""
 _ROUGHLY = 0.15
-"""Largest standard error of the base, relative to its distance from the level while this is large."""
+"""Largest standard error of the base, relative to its distance from the level if this distance is large."""
 _DRIFT = 3.0
 """Largest difference between the two halves of the settled blocks, in standard errors."""
 _REMEMBERED = 0.8
@@ -66,7 +66,7 @@ class BranchPlayer:
         self._most_vpp = loop.most_vpp
         self._feedback = fast.feedback
         self._blocks: list[LoopBlock] = []
-        """Blocks of coefficients at the current setting since the motion settled."""
+        """Blocks of coefficients measured at the current setting since the motion settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
         """Sum of squared deviations of blocks in earlier measurements, and its degrees of freedom."""
 
@@ -126,7 +126,7 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Return the second half of the blocks; halve again while their halves still differ."""
+    """Return the second half of the blocks; halve it again as long as its own halves differ."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
         # Differences of neighbours are used, because a drift hardly changes them.

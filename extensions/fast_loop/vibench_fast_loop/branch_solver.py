@@ -10,7 +10,7 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""Smallest change of the unknowns from which the derivative is updated."""
+"""Smallest change of the unknowns that updates the derivative."""
 _DOUBTED = 0.05
 """Assumed standard error of the derivative, for its weight against measurement noise."""
 _REFERENCE_STEP = 0.15
@@ -18,17 +18,17 @@ _REFERENCE_STEP = 0.15
 _RATIO_STEP = 1.0
 """Change of the ratio m0 / base that counts as one step."""
 _RATIO = 2
-"""Number of rows for the ratio m0 / base (real and imaginary part), which follow those of the residual."""
+"""Number of rows for the ratio m0 / base (real and imaginary part), after the rows of the residual."""
 _NEW = 0.3
 """Fraction of a step by which a point must advance to count as a new point."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
-"""Smallest distance of two points that define a direction, in steps (the tolerance moves points by less),
-and in standard errors."""
+"""Smallest distance between two points that define a direction, in steps (the tolerance moves points by
+less) and in standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopSetting:
-    """Setting of a controller; the unknowns of the equations are part of it."""
+    """Controller setting, including the unknowns of the equations."""
 
     frequency_hz: float
     reference_v: Coefficients
@@ -38,13 +38,13 @@ class LoopSetting:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoint:
-    """A setting as unknowns of the equations, and its measured response as residual and ratio."""
+    """Unknowns of the equations at one setting, with residual and ratio of the measured response."""
 
     unknowns: Vector
     residual: Vector
     """Deviation of the base from the required sine, relative to the level."""
     ratio: complex
-    """Fundamental of m0 over fundamental of the base, complex."""
+    """Complex ratio of the fundamentals of m0 and base."""
     noise: Vector
     """Standard errors of the residual, and of real and imaginary part of this ratio."""
 
@@ -68,7 +68,7 @@ class BranchSolver:
     """Newton's method with a derivative that is updated by measurements (Broyden, Math. Comp. 19 (1965) 577).
 
     The equations require the given amplitude of the base's fundamental, and zero for each harmonic. The
-    unknowns are the frequency and the coefficients, one more than equations. The arc length uses frequency
+    unknowns (frequency and coefficients) outnumber the equations by one. The arc length uses frequency
     and ratio m0 / base: at a fold with low damping, the coefficients hardly change while the phase of m0
     turns by 180 degrees.
 
@@ -129,7 +129,7 @@ class BranchSolver:
         )
 
     def learn(self, point: MeasuredPoint) -> None:
-        """Update the derivative by the change from the last measurement to this one."""
+        """Update the derivative from the difference between the last measurement and this one."""
         if self._last is not None:
             moved = point.unknowns - self._last.unknowns
             changed = _outputs(point) - _outputs(self._last)

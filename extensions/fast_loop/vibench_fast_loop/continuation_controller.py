@@ -52,7 +52,7 @@ _NEAR = 0.3
 _SHORTEST_STEP = 1 / 64
 """Shortest step, as a fraction of the step in the plan."""
 _GROWTH, _EASY = 1.5, 3
-"""Factor by which steps grow if the last point needed at most the number of attempts below."""
+"""Factor by which steps grow after an easy point, and largest number of attempts at an easy point."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Variations of the unknowns. Frequency and first coefficient: in steps; harmonics: relative to the level."""
 _BELOW = 5.0
@@ -60,14 +60,14 @@ _BELOW = 5.0
 _ABOVE = 8.0
 """Initial value of the first coefficient above the model's value (about three times as large), in steps."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Largest decrease of the first coefficient per try [steps]; largest base harmonics relative to the level
-for a decrease. Both are small, because a motion with impacts is easily lost."""
+"""Largest decrease of the first coefficient per try [steps], and largest base harmonics, relative to the
+level, that allow it. Both are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Limits of the slope (change of base level per step of the first coefficient) until the level is reached."""
+"""Bounds on the slope (change of base level per step of first coefficient) on the way to the level."""
 _LEAST_CHANGE = 0.01
 """Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Fractions of the tolerance allowed to fundamental and harmonics; small, as folds move with the level."""
+"""Fractions of the tolerance for fundamental and harmonics; small, because folds move with the level."""
 _BEND_HZ = 0.05
 
 
@@ -156,7 +156,7 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
 
 
 def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
-    """Return to the last point, and update the derivative by varying its first unknowns one by one.
+    """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
     The derivatives with respect to frequency and first coefficient change most. Those with respect to
     harmonics follow from joint changes; near a fold they can make the equations unsolvable.
@@ -226,9 +226,9 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 
 
 _EACH = 5
-"""Drive periods per change. Deviations hardly grow in this time, but the upper modes follow the change."""
+"""Drive periods per change. Deviations hardly grow in this time, but the upper modes can follow."""
 _LEAD, _TRIAL = 3, 8
-"""Number of changes before the evaluated changes; also in the trial that finds their size."""
+"""Number of changes before the evaluated ones, and number in the trial that finds their size."""
 _CHANGED = (0, 2)
 """Indices of perturbed coefficients: first and third harmonic, as the specimen drives the table at both."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
@@ -261,7 +261,7 @@ def perturbed_stability(
 
 
 def _changes(count: int, seed: int) -> Coefficients:
-    """Return random changes with parts of either sign, magnitude 1, shape (count, coefficients)."""
+    """Return changes of magnitude 1, with random signs of both parts, shape (count, coefficients)."""
     corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
@@ -289,7 +289,7 @@ def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Sampl
 def _fit(
     phases: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
-    """Return the fitted multiplier; undetermined if samples between phases are missing (a held run)."""
+    """Return the fitted multiplier; NaN if samples between phases are missing (a held run)."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(phases)):
         return OpenLoopMultiplier(nan, nan)
     base, m0 = _join(phases, channels)

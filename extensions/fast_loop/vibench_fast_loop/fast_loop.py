@@ -35,7 +35,7 @@ from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Largest multiplier allowed along a branch; with it, deviations fall to a third within a hundred periods."""
+"""Largest multiplier allowed along a branch; at this value, deviations fall to a third in 100 periods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     """Refuse a branch that the loop would not hold according to the model.
 
     Raises LimitExceeded with the largest multiplier and the range that would be held, or with the reason why
-    they are unknown. Nothing has been played then.
+    they are unknown. Nothing has been played by then.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "it is not known whether the fast loop holds the branch: "
@@ -161,13 +161,13 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Number of motions checked along a branch; also stable motions, as a delayed law may destabilise them."""
+"""Number of motions checked along a branch, stable ones included: a delayed law may destabilise these."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
 """Numbers of periods to try until they contain a whole number of samples, and the tolerance for "whole"."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Points per period at which the slope of the spring force is computed, without and with stops."""
 _PART_S = 1e-6
-"""Longest part of a control step with one slope of the stops' force [s]; a contact has a hundred parts."""
+"""Longest part of a control step with a constant slope of the stops' force [s]; 1 % of a contact."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels relative to the required level, along which a motion with impacts is reached."""
 
@@ -195,13 +195,13 @@ def branch_hold(
     way: Literal["up", "down"] = "up",
     allowed: float = 1.0,
 ) -> BranchHold | None:
-    """Return the stability under a law of the model's branch at one base level, of amplitude ``level_m`` [m].
+    """Return how stable a law makes the model's branch at one base level, of amplitude ``level_m`` [m].
 
     ``plant`` and ``law`` are as known to the host computer; the specimen has no rigid stops. The branch
     starts at ``start_hz`` and stays in ``range_hz``. ``begin`` is the approach to the level: from rest, or
-    from three times the level, which finds motions with impacts; always from rest without stops. The
-    frequency first goes ``way``. A motion counts as held up to the multiplier ``allowed``. Returns None if
-    the model has no motion at the start.
+    from three times the level, which finds motions with impacts. Without stops, it starts at rest. The
+    frequency first changes in the direction ``way``. A motion counts as held up to the multiplier
+    ``allowed``. Returns None if the model has no motion at the start.
     """
     spring = spring_of(plant.specimen)
     if spring.kinks:
@@ -269,7 +269,7 @@ def _last_held(
 def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
     """Return the largest multipliers over a period of the motions at the indices ``points``, shape (points,).
 
-    ``plant`` and ``law`` are as in `loop_multiplier`; the branch is one of the plant's specimen.
+    ``plant`` and ``law`` are as in `loop_multiplier`; the branch belongs to the plant's specimen.
     """
     rate_hz = plant.timing.rate_hz
     courses = [motion_slopes(plant.specimen, branch, point, rate_hz) for point in points]
@@ -281,7 +281,7 @@ def motion_slopes(
 ) -> tuple[Floats, Floats, int, int]:
     """Return the slopes of the spring force along one motion of a branch, including all harmonics.
 
-    The motion is that of the index ``point``. The result is stiffness, damping, number of periods, and parts
+    The motion has the index ``point``. The result is stiffness, damping, number of periods, and parts
     per sample of a controller with the sample rate ``rate_hz``, as for `loop_multiplier`.
     """
     spring = spring_of(specimen)

@@ -138,7 +138,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
 
 
 def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
-    """Return label, points and plot style by measured stability, else by direction of the branch."""
+    """Return label, points and plot style for each stability if measured, else for each branch direction."""
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):
@@ -156,7 +156,7 @@ def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, 
 
 
 def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:
-    """Return the model's branch through the range of the held points; None if it has no motion there."""
+    """Return the model's branch over the range of the held points; None if the model has no motion there."""
     if not found.frequency_hz.size:
         return None
     amplitude_m, first_hz = float(np.median(found.base_m)), float(found.frequency_hz[0])

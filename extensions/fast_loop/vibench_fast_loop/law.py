@@ -33,13 +33,13 @@ class LinearLaw:
     """Voltage u from samples s: u = output @ memory + direct @ s. Then memory = step @ memory + inlet @ s."""
 
     step: Table
-    """Matrix from memory to next memory, shape (n, n)."""
+    """Matrix that maps the memory to its next state, shape (n, n)."""
     inlet: Table
-    """Matrix of shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    """Matrix that maps samples to the next memory, shape (n, 2), per m/s2 of the base and per m/s of m0."""
     output: Table
-    """Matrix from memory to output voltage, shape (1, n) [V]."""
+    """Matrix that maps the memory to the output voltage, shape (1, n) [V]."""
     direct: Table
-    """Matrix of shape (1, 2), volts per m/s2 of the base and per m/s of m0."""
+    """Matrix from samples to output voltage, shape (1, 2), volts per m/s2 of the base and per m/s of m0."""
 
 
 def design_law(plant: SampledPlant) -> LinearLaw:

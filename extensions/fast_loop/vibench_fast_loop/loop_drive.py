@@ -24,7 +24,7 @@ class LoopDrive:
     is_commanded = False
     pause_s = 0.0
     can_hold = False
-    """Whether it can hold its output without requests: no, because the watchdog needs requests."""
+    """Whether the drive can hold its output without requests: no, because the watchdog needs requests."""
 
     def __init__(self, controller: LoopController, measurement: Measurement) -> None:
         self._controller = controller

@@ -29,13 +29,13 @@ class LoopFeedback(FrozenModel):
     """A linear law: u = output m + direct s; then m = step m + inlet s, for input volts s and memory m."""
 
     step: tuple[Row, ...] = Field(max_length=MOST_MEMORY)
-    """Matrix from memory to next memory, shape (n, n), as rows."""
+    """Matrix that maps the memory to its next state, shape (n, n), as rows."""
     inlet: tuple[Row, ...]
-    """Matrix from samples to next memory, shape (n, 2), as rows [per V]."""
+    """Matrix that maps the samples to the next state of the memory, shape (n, 2), as rows [per V]."""
     output: Row
-    """Row from memory to output voltage, shape (n,) [V]."""
+    """Row that maps the memory to the output voltage, shape (n,) [V]."""
     direct: Row
-    """Row from samples to output voltage, shape (2,) [V/V]."""
+    """Row that maps the samples to the output voltage, shape (2,) [V/V]."""
 
     @model_validator(mode="after")
     def _shapes_agree(self) -> Self:
@@ -115,7 +115,7 @@ class LoopFacts(FrozenModel):
     watchdog_s: PositiveFloat
     """Time without a request after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input on which it accepts a proportional-derivative law; None if it accepts any linear law."""
+    """Only input for a proportional-derivative law; None if the controller accepts any linear law."""
 
 
 class LoopRequest(FrozenModel):

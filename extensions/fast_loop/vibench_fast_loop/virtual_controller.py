@@ -175,7 +175,7 @@ class VirtualController:
 
 
 class _LoopEnd(IntEnum):
-    """Result of a native call; `LoopEnd` in native/world.hpp."""
+    """Result of a native call, as defined by `LoopEnd` in native/world.hpp."""
 
     COMPLETE = 0
     NEEDS_ATTENTION = 1

@@ -30,7 +30,7 @@ PACKAGES = {
     "libxcb-xkb": "libxcb-xkb1",
     "libxkbcommon-x11": "libxkbcommon-x11-0",
 }
-"""Debian packages needed for a window on X11, by the name of the missing library."""
+"""Debian packages needed for a window on X11, keyed by the name of the missing library."""
 ON_X11 = " ".join(sorted(PACKAGES.values()))
 ELSEWHERE = "or run without a window: QT_QPA_PLATFORM=offscreen"
 

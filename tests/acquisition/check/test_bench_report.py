@@ -95,7 +95,7 @@ def test_a_heavy_specimen_near_its_resonance_is_not_reported_as_a_fault(
         (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
     ],
 )
-def test_a_bench_fault_fails_its_finding_with_advice(check_rig, rig, tmp_path, fault, name, advice):
+def test_each_bench_fault_gives_a_failed_finding_with_advice(check_rig, rig, tmp_path, fault, name, advice):
     report = check_rig(rig, tmp_path, fault)
     assert name in failed_findings(report)
     assert advice in report[name].advice

@@ -27,7 +27,7 @@ def test_two_cases_of_the_safety_table_meet_their_times_to_silence():
 
 
 @pytest.mark.thorough
-def test_stops_and_kills_end_in_silence_and_saved_cases_are_not_repeated(tmp_path):
+def test_a_stopped_or_killed_run_falls_silent_and_saved_cases_are_not_repeated(tmp_path):
     stops, kills = tmp_path / "stops.jsonl", tmp_path / "kills.jsonl"
     for options in (["--save", stops, "--seed", "3"], ["--save", kills, "--dead-man"]):
         told = run_benchmark(*map(str, options), "--count", "2", name="stops_from_outside.py")

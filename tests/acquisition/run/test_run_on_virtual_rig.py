@@ -38,7 +38,7 @@ def segment(recording, label):
     return recording.read("drive_voltage", found.first_sample, found.last_sample + 1)
 
 
-def test_a_recorded_dwell_has_its_frequency_and_amplitude(virtual_bench, tmp_path):
+def test_a_recorded_dwell_has_the_planned_frequency_and_amplitude(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1)
     with record(virtual_bench, tmp_path, dwell) as recording:
         drive = segment(recording, "dwell")

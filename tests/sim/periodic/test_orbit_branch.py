@@ -68,7 +68,7 @@ def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward_branch
         assert 0.01 * expected < growth < 100.0 * expected
 
 
-def test_a_branch_leaves_the_stops_where_the_linear_motion_grazes():
+def test_a_branch_reaches_the_stops_where_the_linear_motion_grazes_them():
     # A weak drive at 60 Hz is raised until p reaches the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
     orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)

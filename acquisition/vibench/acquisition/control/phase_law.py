@@ -140,7 +140,7 @@ class PhaseLaw:
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Only the level changed before the first look, so assume that the phase error was the same then.
+        # Only the level changed before the first measurement. Assume that the phase error did not change.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN

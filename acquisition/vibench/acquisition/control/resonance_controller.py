@@ -312,8 +312,8 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
-    # Subtract order times base phase from the phase of each harmonic. Then rotate and scale the batches so
-    # that their mean equals ``found.harmonics``.
+    # Subtract the base phase times the order from the phase of each harmonic. Then rotate and scale the
+    # batches so that their mean equals ``found.harmonics``.
     away = np.angle(base * base.mean().conjugate())
     orders = np.arange(1, ORDERS) / plan.subharmonic
     ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]

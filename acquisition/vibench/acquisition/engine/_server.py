@@ -80,7 +80,7 @@ class Admission:
 
     def _run(self) -> None:
         while True:
-            # Reserve a file descriptor for a connection when the process may open no further files.
+            # Keep a file descriptor in reserve, for a connection when the limit of open files is reached.
             if self._reserve is None:
                 with suppress(OSError):
                     self._reserve = os.open(os.devnull, os.O_RDONLY)

@@ -81,7 +81,7 @@ QUESTIONS = (
     Question("vibrometer.range_mm_per_s_per_v", "Range of the vibrometer [mm/s per volt, or with a unit]?"),
     Question("vibrometer.delay_s", "Delay of the vibrometer's output [s]? 0 if not measured"),
     Question("vibrometer.calibrated", "Date of the vibrometer's calibration (YYYY-MM-DD)?"),
-    Question("specimen.gap_m", "Gap of the specimen [m], measured by feeler gauge?"),
+    Question("specimen.gap_m", "Gap of the specimen [m], measured with a feeler gauge"),
 )
 """Questions in the order in which they are asked."""
 

@@ -194,7 +194,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
-    # Equal times were rounded too much to contradict the stated rate.
+    # Times that are all equal were rounded so coarsely that they cannot contradict the stated rate.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
         trouble = "has times that do not rise; sort its rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)

@@ -188,7 +188,7 @@ def _spread_extremes(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
 
 
 # Pictures of bounded width, of any part of a recording. Long parts are drawn from the extremes stored in the
-# file, short parts from the samples. No sample is skipped, so an impact of three samples is in every picture.
+# file, short parts from the samples. No sample is skipped: even an impact of three samples is visible.
 #
 # A thumbnail shows a whole recording in about a hundred columns, for lists of recordings.
 

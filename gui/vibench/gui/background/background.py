@@ -17,7 +17,7 @@ Answer = TypeVar("Answer")
 
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
-    """Call ``step`` in the next pass of the event loop, so that drawing and input are handled first."""
+    """Call ``step`` in the next pass of the event loop, after drawing and input have been handled."""
     # Do not wait 0 ms: Qt would then call two steps before it serves another timer.
     QTimer.singleShot(1, receiver, step)
 
@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Computes only the newest of many requests; a request starts after a short pause without another."""
+    """Computes only the newest of many requests; a request starts if no other follows within a short time."""
 
     def __init__(
         self,

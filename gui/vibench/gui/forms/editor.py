@@ -203,7 +203,7 @@ class ListEditor:
         self._line.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
-        """Text shown last, and its numbers in full precision."""
+        """Last text shown in the field, and its numbers in full precision."""
         self.widget = self._line
 
     @property
@@ -242,7 +242,7 @@ class ListEditor:
 
 
 def unwrap_optional(annotation: Any) -> tuple[Any, bool]:
-    """Return a field's type without ``Annotated`` and ``| None``, and whether it allowed None."""
+    """Return a field's type without ``Annotated`` and ``| None``, and whether the field allows None."""
     while get_origin(annotation) is Annotated:
         annotation = get_args(annotation)[0]
     if get_origin(annotation) in (Union, UnionType):

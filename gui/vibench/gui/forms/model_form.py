@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return the model's complaints by field, without those that are consequences of another complaint."""
+    """Return the model's complaints by field, without those that follow from another complaint."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -187,7 +187,7 @@ class GroupEditor:
 
     @property
     def complaint(self) -> str:
-        """First complaint of a field inside; empty if all can be read."""
+        """First complaint about a field of the inner form; empty if all fields can be read."""
         return next(filter(None, (editor.complaint for editor in self.form.editors.values())), "")
 
     def content(self) -> Any:
@@ -211,9 +211,9 @@ class GroupEditor:
         fresh: Mapping[str, Mapping[str, Any]],
         lines: Mapping[str, tuple[str, str]],
     ) -> None:
-        """Set the initial values of a newly chosen kind, and describe the kinds in the list.
+        """Set the initial values for newly chosen kinds, and describe the kinds in the list.
 
-        ``usual`` fills empty fields of every kind. ``fresh`` has values by kind, which replace those typed
+        ``usual`` fills empty fields of every kind. ``fresh`` has values by kind, which replace values typed
         for another kind. ``lines`` has the heading and the description of each kind.
 
         """
@@ -266,11 +266,11 @@ class OptionalGroupEditor(GroupEditor):
 
     @property
     def complaint(self) -> str:
-        """First complaint of a field inside; empty when absent."""
+        """First complaint about a field of the inner model; empty if the model is absent."""
         return super().complaint if self._there.isChecked() else ""
 
     def content(self) -> Any:
-        """Return the content as stored in a file; None when absent."""
+        """Return the content as stored in a file; None if the model is absent."""
         return super().content() if self._there.isChecked() else None
 
     def show_content(self, content: Any) -> None:
@@ -299,7 +299,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether a field may be left empty, with another meaning than the field's default."""
+    """Return whether a field may be left empty, which then means something other than its default."""
     return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 

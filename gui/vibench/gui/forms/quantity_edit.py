@@ -100,9 +100,9 @@ _DIGITS = 6
 MOST_WHOLE = 1 << 53
 """Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0
-"""Factor of change above which the user must confirm a new value, because the unit is often wrong."""
+"""Factor of change above which the user must confirm a new value, because its unit is often wrong."""
 STEP = 0.05
-"""Relative change of the value per step of the arrow keys; such steps never reach zero."""
+"""Relative change of the value per press of an arrow key; such steps never reach zero."""
 
 
 class QuantityEdit(QAbstractSpinBox):
@@ -121,7 +121,7 @@ class QuantityEdit(QAbstractSpinBox):
         self.complaint = ""
         """Reason why the typed text is not an allowed quantity; empty if it is one."""
         self._value_to_confirm: float | int | None = None
-        """Value that becomes valid when the user presses Return again; None if there is none."""
+        """Value that is accepted when the user presses Return again; None if there is no such value."""
         self._is_confirmed = False
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)

@@ -139,7 +139,7 @@ class AppContext(QObject):
     """Services of every page; pages refer to each other by name only."""
 
     folder_chosen = Signal(object)
-    """Emitted with the folder of new recordings after the user has changed it."""
+    """Emitted with the folder of new recordings after the user has chosen another folder."""
     noticed = Signal(object)
     page_requested = Signal(str)
     """Emitted with the name of the page to show."""
@@ -181,13 +181,13 @@ class AppContext(QObject):
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
-        """Change the displayed units and store the choice; ``chosen`` has the displayed unit by SI unit."""
+        """Change the displayed units and store the choice; ``chosen`` maps SI units to displayed ones."""
         UNITS.choose(chosen)
         self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen_units.values()))
 
     @property
     def patience_s(self) -> float:
-        """Time for which a run far from all limits may continue if the window does not respond [s]."""
+        """Time for which a run far from all limits may continue while the window does not respond [s]."""
         return self.settings.number(
             SettingKey.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
         )

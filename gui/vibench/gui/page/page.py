@@ -81,7 +81,7 @@ class DisplayedResult:
 
 
 class ThemedPart(Protocol):
-    """A part of a page that draws with the theme's colours."""
+    """A part of a page that is drawn in the theme's colours."""
 
     def retheme(self, theme: Theme) -> None:
         """Change the colours to those of a theme."""
@@ -116,7 +116,7 @@ class Page(QWidget):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """Parts that are restyled one after another; restyling the whole page would block the event loop."""
+        """Parts that are restyled one by one, because restyling the whole page would block the event loop."""
         return (self,)
 
     def retheme(self, theme: Theme) -> None:
@@ -143,7 +143,7 @@ class PageParts(QSplitter):
         self.setChildrenCollapsible(False)
 
     def show_parts(self, first: QWidget, second: QWidget, sizes: tuple[int, int] = (0, 0)) -> None:
-        """Add the two parts with the user's last sizes, or with ``sizes``; zeros mean natural sizes."""
+        """Add the two parts with the user's last sizes, or with ``sizes``; zeros mean preferred sizes."""
         self.addWidget(first)
         self.addWidget(second)
         if any(sizes):
@@ -181,7 +181,7 @@ class SideAndPicture(PageParts):
     """
 
     WIDEST_SIDE = 0.55
-    """Largest width of the left part over the page's width, unless the user moves the divider."""
+    """Largest width of the left part relative to the page, unless the user moves the divider."""
 
     def __init__(
         self,
@@ -199,7 +199,7 @@ class SideAndPicture(PageParts):
         self.show_parts(column(title_of(page), (self.side, 1), *feet), pictures)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Give the left part its natural width, unless the user has moved the divider."""
+        """Give the left part its preferred width, unless the user has moved the divider."""
         super().resizeEvent(event)
         self._divide()
 

@@ -1,4 +1,4 @@
-"""Simulations for a page, in a separate process; partial results are shown, and the user can cancel."""
+"""Cancellable simulations for a page, in a separate process; partial results are shown as they arrive."""
 
 from collections.abc import Callable
 

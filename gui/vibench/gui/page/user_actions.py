@@ -1,4 +1,4 @@
-"""Commands of keys, menus and buttons; each is implemented once."""
+"""Commands given by keys, menus and buttons; each command is implemented once."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ LONGEST_NAME = 60
 
 
 class UserActions(QObject):
-    """Commands of the user; a command that is not possible now shows a message with the reason."""
+    """Commands of the user; a command that is not possible at present shows a message with the reason."""
 
     def __init__(self, context: AppContext, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -141,7 +141,7 @@ _NEXT = {
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Return a file name for a test that is not used in the folder, such as ``dwell_003``."""
+    """Return an unused file name in the folder for a test, such as ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
     while any(folder.glob(f"{stem}_{number:03}*")):

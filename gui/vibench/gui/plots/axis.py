@@ -47,7 +47,7 @@ class PlotAxis:
     unit: str = ""
     """SI unit of the values if the user can choose the displayed unit; otherwise the displayed unit."""
     factor: float = 1.0
-    """Displayed over plotted value, for a unit that cannot be chosen: 1e3 shows seconds as ms."""
+    """Ratio of displayed to plotted values, for a unit that cannot be chosen: 1e3 shows seconds as ms."""
     scale: Scale = Scale.LINEAR
     short: str = ""
 
@@ -77,7 +77,7 @@ TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """Smallest distance between numbers on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Special tick spacing by which `tickStrings` recognises ticks without a number."""
+"""Special tick spacing from which `tickStrings` recognises ticks without a number."""
 _WIDE = "2000"
 """Text as wide as the widest number on a logarithmic horizontal axis, with margins."""
 
@@ -128,7 +128,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
-        """Hide numbers and label; the plot below shows them for both plots."""
+        """Hide numbers and label, because the plot below shows them for both plots."""
         self.setStyle(showValues=False)
         self.showLabel(False)
 
@@ -164,7 +164,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         return self.orientation in ("left", "right")
 
     def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
-        """Return the coordinates of the ticks: major ones have a number, minor ones do not."""
+        """Return the coordinates of the ticks: major ticks have a number, minor ticks do not."""
         found = self._ticks(low, high, size)
         self.levels = tuple([each for each in places if low <= each <= high] for _, places in found)
         return found
@@ -201,7 +201,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
 
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Return a larger step and the ticks at its multiples, of which there are at most ``most``.
+    """Return a larger step, and the at most ``most`` ticks at its multiples.
 
     An axis needs two numbers. If fewer are left, return the two outermost ticks of the smaller step.
     """

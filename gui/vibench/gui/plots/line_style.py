@@ -37,7 +37,7 @@ class LineStyle:
 
 
 def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
-    """Return the style of a curve, given by its number in the plot."""
+    """Return the style of the curve with this number in the plot."""
     return LineStyle(lambda theme: theme.traces[number % len(theme.traces)], dash)
 
 

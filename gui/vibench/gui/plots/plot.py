@@ -21,9 +21,9 @@ from .reading import Reading
 from .upright_marks import Rules, Stripes
 
 ROOM = 0.15
-"""Margin at both ends when an axis is fitted to the data, over the range of the data."""
+"""Margin at both ends when an axis is fitted to the data, relative to the range of the data."""
 LEAST_USED = 0.5
-"""Smallest share of an axis that its data may fill before the axis range is reduced."""
+"""Smallest fraction of an axis that the data may fill; below it, the axis range is reduced."""
 
 Range = tuple[float, float]
 
@@ -52,7 +52,7 @@ _VEIL = 0.5
 OUT_OF_DATE = "outdated: inputs have changed"
 _FIRST = -1000
 _RIGHT_EM = 0.6
-"""Right margin, in font heights, which has room for half of the last number."""
+"""Right margin, in font heights, with room for half of the last number."""
 _MARGIN = 4
 """Margin above and below the legend [pixels]."""
 
@@ -101,7 +101,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """
 
     up_em = 5.0
-    """Width of the vertical axis, in font heights; the same in all plots, so that stacked plots align."""
+    """Width of the vertical axis, in font heights; equal in all plots, so that stacked plots align."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
@@ -317,7 +317,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             paint_hint(painter, inside, OUT_OF_DATE, self.theme.text)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Repaint after enabling or disabling; follow a change of the font."""
+        """Repaint the plot when it is enabled or disabled; apply a change of the font."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.EnabledChange:
             self.viewport().update()
@@ -392,14 +392,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _look_for_points(self, *_: object) -> None:
         """If no curve has points, show the hint and hide the numbers of the axes.
 
-        Call this before painting, because a change during painting would cause another painting.
+        Call this before painting, because a change during painting would cause another repaint.
         """
         self._is_empty = bool(self._hint) and not self._holds_points
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _show_units(self) -> None:
-        """Show axis labels and cursor reading in the chosen units, unless the plot is closed."""
+        """Show axis labels and cursor reading in the chosen units, unless the plot has been closed."""
         if self.plotItem is not None:
             self._relegend()
             self.reading.reread()

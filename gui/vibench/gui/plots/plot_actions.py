@@ -1,4 +1,4 @@
-"""Actions of a plot, by key and context menu; saving as picture or numbers."""
+"""Actions of a plot, by key or context menu, which include saving it as a picture or as numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,7 +81,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
 
 
 def numbers_of(plot: "Plot", separator: str) -> str:
-    """Return the curves as lines of name, x and y, in the displayed units."""
+    """Return the curves as text lines with name, x and y, in the displayed units."""
     across, up = plot.across.axis, plot.up.axis
     rows = [separator.join(("Curve", across.text, up.text))]
     for number, (name, item) in enumerate(plot.named_curves):

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 class Reading:
-    """Crosshair at the pointer, with a text that states its values and the nearest curve.
+    """Crosshair at the pointer, with a text that states the pointer's values and the nearest curve.
 
-    If a mark is set, the differences from it are stated too; on a logarithmic vertical axis, the ratio in dB.
+    If a mark is set, the text also states the differences from it, or dB on a logarithmic vertical axis.
     """
 
     def __init__(self, plot: "Plot") -> None:
         self._plot = plot
         self._lines: tuple[pg.InfiniteLine, ...] = ()
-        """Two lines of the crosshair, then two lines of the mark; created when first needed."""
+        """Two lines of the crosshair, then two lines of the mark; all are created when first needed."""
         self._label: QLabel | None = None
         self._at = QPointF()
         self._marked: tuple[float, float] | None = None
@@ -116,7 +116,7 @@ class Reading:
                 line.hide()
 
     def forget(self) -> None:
-        """Hide the reading, and forget the crosshair lines that the plot has deleted."""
+        """Hide the reading, and drop the crosshair lines that the plot has deleted."""
         self.hide()
         self._lines, self._marked = (), None
 

@@ -1,4 +1,4 @@
-"""Vertical stripes and lines of a plot; a single item draws all marks of one kind."""
+"""Vertical stripes and lines of a plot; one graphics item draws all marks of one kind."""
 
 from collections.abc import Callable, Iterable
 
@@ -67,7 +67,7 @@ class Stripes(_UprightMarks):
 
 
 class Rules(_UprightMarks):
-    """Vertical lines of a plot; if the lines would be too close together, none is drawn."""
+    """Vertical lines of a plot; if the lines are too close together, none is drawn."""
 
     def __init__(self, across: Callable[[float], float]) -> None:
         super().__init__(across)

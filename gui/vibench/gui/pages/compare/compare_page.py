@@ -46,7 +46,7 @@ class AnalysisPanel(QGroupBox):
     """Box with the analysis options, the button that applies them, and the progress bar."""
 
     wanted = Signal()
-    """Request to analyse all recordings again with the current options."""
+    """Emitted to analyse all recordings again with the current options."""
     cancelled = Signal()
 
     def __init__(self) -> None:

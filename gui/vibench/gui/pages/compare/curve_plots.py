@@ -170,9 +170,9 @@ _DASHES = {
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
-"""Dash patterns by origin of a curve, in the order: transmissibility or Response I, then Response II."""
+"""Dash patterns by origin of a curve: first for transmissibility or Response I, then for Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Kinds of curves that are visible at first; Response II is not, as it equals I without contact."""
+"""Kinds of curves visible at first; not Response II, which equals Response I without contact."""
 _SWATCH = (28, 12)
 
 
@@ -325,7 +325,7 @@ class PairBox(QGroupBox):
         return self._summary.text()
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
-        """Offer these curves for the choice; keep the selected ones if possible."""
+        """Offer these curves for selection; keep the selected ones if possible."""
         self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):

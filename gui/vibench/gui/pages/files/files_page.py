@@ -38,7 +38,7 @@ from .spectrogram_view import Pictures
 
 EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
-"""Interval between two checks whether files were deleted [s]."""
+"""Interval between checks for deleted files [s]."""
 CHECK_WAIT_MS = 250
 """Delay from opening a recording to checking its samples against the seal [ms]."""
 PAINTED_MS = 50

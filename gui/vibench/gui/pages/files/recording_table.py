@@ -61,7 +61,7 @@ class ListedRecording:
 
     @property
     def name(self) -> str:
-        """Path relative to the folder, without suffix; unique, also between attempts of a measurement."""
+        """Path relative to the folder, without suffix; unique, even among attempts at a measurement."""
         return self.catalogue_entry.path.removesuffix(".part").removesuffix(".h5")
 
     @property
@@ -209,7 +209,7 @@ def whole_check(path: Path) -> VerifiedRecording:
 
 
 def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
-    """Return a line about a recording; ``found`` is the result of `whole_check`, None if not yet known."""
+    """Return a line about a recording; ``found`` is the result of `whole_check`, None until it is known."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
@@ -251,7 +251,7 @@ class CampaignChoice(Choice):
         self.hide()
 
     def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
-        """Offer these campaigns for the choice, and keep the selected one."""
+        """Offer these campaigns for selection, and keep the selected one."""
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
@@ -276,7 +276,7 @@ _THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.S
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
 _MEASURED_ROWS = 24
-"""Number of rows from which column widths are computed: more than fit on a screen, but quick to measure."""
+"""Number of rows that determine the column widths: more than fit on a screen, but quick to measure."""
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
@@ -296,7 +296,7 @@ class RecordingModel(QAbstractTableModel):
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """Replace the list of recordings, keeping thumbnails of files in both; do nothing if it is equal."""
+        """Replace the list of recordings and keep thumbnails of files in both lists; ignore an equal list."""
         if entries == self.entries:
             return
         self.beginResetModel()

@@ -70,7 +70,7 @@ class _RangePicture(QWidget, Generic[Request, Found]):
 
     @property
     def displayed_results(self) -> DisplayedResult:
-        """The plot, with visible range and options as inputs."""
+        """The plot, with the visible range and the options as its inputs."""
         return DisplayedResult(self.plot, self._of, self._request)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
@@ -115,7 +115,7 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         self._erase(hint)
 
     def _request_for(self, recording: Recording, low_s: float, high_s: float) -> Request | str:
-        """Return the request to compute a time range [s], or a text why it cannot be computed."""
+        """Return the request to compute a time range [s], or the reason why it cannot be computed."""
         raise NotImplementedError
 
     def _draw(self, found: Found) -> None:
@@ -195,7 +195,7 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Spacings of spectral lines that users can choose [Hz]; None: chosen from the visible time range."""
+"""Spacings of spectral lines that users can choose [Hz]; None derives it from the visible time range."""
 _BAR_EM = 4
 """Width of the colour scale with its label, in font heights."""
 _SHOWN_DB = 80.0
@@ -239,7 +239,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         return self._images[self._spacing]
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Show another recording, or none, and list its channels for the choice."""
+        """Show another recording, or none, and list its channels for selection."""
         super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):

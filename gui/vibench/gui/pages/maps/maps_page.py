@@ -213,7 +213,7 @@ class MapsPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether a map is complete."""
+        """Whether there is a complete map."""
         return self.picture is not None and not self.simulator.is_busy
 
     @property
@@ -360,4 +360,4 @@ def _legend_entry(name: str, colour: str) -> str:
 
 
 def _ignore(_error: BaseException) -> None:
-    """Ignore that a file has no level over frequency (noise, dwell); Compare reports unreadable files."""
+    """Ignore files without a level over frequency (noise, dwell); Compare reports unreadable files."""

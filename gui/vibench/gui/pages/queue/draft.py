@@ -26,7 +26,7 @@ USUAL_NAME = "queue"
 
 
 def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Campaign:
-    """Return the campaign with a test added at the end, under a name that is not used yet."""
+    """Return the campaign with a test added at the end, under an unused name."""
     if campaign is None:
         return Campaign(name=USUAL_NAME, measurements=(measurement,))
     taken = {name.lower() for name in campaign.recording_names()}
@@ -145,7 +145,7 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
 def point_rows(
     preview: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
 ) -> list[tuple[str, str, str, str]]:
-    """Return a row per recording with its state, known from the engine or from files in the folder."""
+    """Return a row per recording with its state, as reported by the engine or found in the folder."""
     levels: Mapping[str, str] = {} if preview is None else preview.levels
     known = {row.name for row in rows}
     if state in DRIVING or state is EngineState.ARMED or (levels and set(levels) == known):
@@ -173,7 +173,7 @@ class CampaignPreview:
     levels: Mapping[str, str]
     """Drive level of each recording, as text."""
     complete: frozenset[str]
-    """Names of the recordings that already exist, complete, in the folder."""
+    """Names of the recordings that are already complete in the folder."""
     duration_s: float
     size_bytes: float | None
     """Size of the files [bytes]; None without a rig, which defines the sample rate."""

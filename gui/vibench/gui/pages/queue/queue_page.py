@@ -58,7 +58,7 @@ _AXES = {
 
 
 class SweepForm(QGroupBox):
-    """Form that adds a sweep of the test on the Test page."""
+    """Form that adds a sweep, which repeats the test of the Test page."""
 
     wanted = Signal(object, object)
     """`SweepAxis` and `Range` of the requested sweep."""
@@ -202,7 +202,7 @@ class QueuePage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Summary and table of the campaign, with campaign and rig as inputs."""
+        """Summary and table of the campaign, with the campaign and the rig as their inputs."""
         wanted = (self.context.selection.campaign, self.context.selection.rig)
         return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
 

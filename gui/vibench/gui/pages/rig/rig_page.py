@@ -80,7 +80,7 @@ class RigChoice(QWidget):
 
     @property
     def rig(self) -> Rig | None:
-        """The selected rig; a simulated one runs at the selected pace."""
+        """The selected rig; a simulated rig runs at the selected speed."""
         if self._rig is None or self._rig.virtual is None:
             return self._rig
         pace = list(PACES)[self.pace.currentIndex()]
@@ -123,7 +123,7 @@ class RigChoice(QWidget):
 
 
 class KnobSheetForm(QGroupBox):
-    """Form with a check box per knob, which the user must confirm, and the name of the operator."""
+    """Form with the operator's name, and a check box for each knob that the user must confirm."""
 
     changed = Signal()
 
@@ -190,7 +190,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Return a finding's expected value, with advice what to do if the measured value differs."""
+    """Return a finding's expected value, with advice for the case that the measured value differs."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 
@@ -271,7 +271,7 @@ class RigPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens hardware configurations, or shows a message while a bench is open."""
+        """Function that opens hardware configurations; while a bench is open, it shows a message instead."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:

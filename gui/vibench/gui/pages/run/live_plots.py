@@ -36,7 +36,7 @@ def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
 
 
 class SweepPlot(QWidget):
-    """Responses during a dwell, steps or a sweep, over the drive frequency at that time."""
+    """Responses during a dwell, steps or a sweep, over the drive frequency at the time of measurement."""
 
     def __init__(self, tab: str, plot: Plot) -> None:
         super().__init__()
@@ -48,7 +48,7 @@ class SweepPlot(QWidget):
         fill_box(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
-        """Draw all measured responses so far, in the order of time."""
+        """Draw all responses measured so far, in the order of measurement."""
         history = view.history()
         if len(history.time_s) == self._shown:
             return
@@ -57,7 +57,7 @@ class SweepPlot(QWidget):
             curve.setData(history.frequency_hz, getattr(history, name))
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
-        """Draw a prediction with its frequency ranges of collisions behind the points; None clears it."""
+        """Draw a prediction and its frequency ranges with collisions behind the points; None clears both."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         show_predicted(self.predicted, seen)
 
@@ -120,14 +120,14 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 AGO = PlotAxis("Time before now", "s")
 """Common time axis; it stands still, because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Smallest and largest number of columns in which a signal is drawn; one per pixel leaves no gap."""
+"""Smallest and largest number of columns in which a signal is drawn; a column per pixel leaves no gap."""
 UP_EM = 4.0
 USUAL_SPAN_S = 2.0
 """Time range shown when the window opens [s]."""
 
 
 class TimeHistoryPlots(PlotStack):
-    """Plots over a common time axis, rebuilt when the channels change."""
+    """Plots with a common time axis, rebuilt when the channels change."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)
@@ -331,7 +331,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Number of shades of the forecast curve; the faintest one marks an error of a quarter of the gap."""
+"""Number of shades of the forecast curve; the faintest marks an error of a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."

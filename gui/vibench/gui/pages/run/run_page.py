@@ -88,7 +88,7 @@ KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
     },
     {},
 )
-"""Live plots by family of excitation; the second table has the kinds that differ from their family."""
+"""Live plots by family of excitation; the second table lists the kinds that differ from their family."""
 
 _ROW = 1.9
 """Height of the meter of one channel, in font heights."""
@@ -123,7 +123,7 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size for the number of channels, at least four."""
+        """Return the size that fits the number of channels, or four if there are fewer."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
@@ -194,7 +194,7 @@ class WatchCard(QGroupBox):
         )
         self._begun = 0
         self.averages = QLabel("–")
-        self.averages.setToolTip("Averages of a noise test: started and planned")
+        self.averages.setToolTip("Averages of a noise test: number started, number planned")
         self.reject_button = push_button(
             "Reject this one", "Exclude the current average from all results", self.reject_requested.emit
         )
@@ -295,7 +295,7 @@ class ArmCard(QGroupBox):
         self._armed: tuple[str, ...] = ()
         """Description of the armed plan; empty if nothing is armed."""
         self._read: tuple[str, ...] = ()
-        """Description that the user has scrolled to its end, and so may have read."""
+        """Description that the user has scrolled to its end, and therefore may have read."""
 
     @property
     def is_read(self) -> bool:
@@ -347,7 +347,7 @@ class ArmCard(QGroupBox):
 
 
 LAYOUT_ROUNDS = 4
-"""Number of layout passes that Qt needs until the scroll bar fits the wrapped text."""
+"""Number of layout passes that Qt needs until the scroll range fits the wrapped text."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
@@ -424,7 +424,7 @@ class RunPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Plots and numbers, with the displayed run as input; none while the plots are frozen or hidden."""
+        """Plots and numbers, with the displayed run as input; empty while the plots are frozen or hidden."""
         if self.watch_card.freeze.isChecked() or not self.isVisible():
             return ()
         return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)
@@ -523,7 +523,7 @@ class RunPage(Page):
             self.right_tabs.setCurrentWidget(self.hidden_motion)
 
     def _is_armed_read(self) -> bool:
-        """Return whether the description was read; first finish the layout of a new description."""
+        """Return whether the description was read, after finishing the layout of a new description."""
         self.refresh()
         for _ in range(LAYOUT_ROUNDS):
             QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)

@@ -45,7 +45,7 @@ class AnswerPicture(Protocol[Shown_contra]):
 
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
-    """Description of one kind of tab: type of its request, and functions that describe the result."""
+    """Description of one kind of tab: type of the request, and functions that describe the result."""
 
     name: str
     request: type[Request]
@@ -67,7 +67,7 @@ class _Course:
 
 
 class DynamicsView(QWidget, Generic[Request, Answer]):
-    """Form on the left; on the right the plots, with computing time and error below."""
+    """Form on the left; plots on the right, with computing time and error below the plots."""
 
     def __init__(
         self, context: AppContext, kind: DynamicsKind[Request, Answer], picture: AnswerPicture[Answer]

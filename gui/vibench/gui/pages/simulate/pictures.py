@@ -32,7 +32,7 @@ DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
 _FIRST_SPECIAL_COLOUR = 1
-"""Colour number of the first kind of event in `_SPECIAL`; 0 is for motions with the drive's period."""
+"""Colour number of the first event kind in `_SPECIAL`; 0 is for motions with the drive's period."""
 
 
 class _PairPicture:
@@ -146,9 +146,9 @@ _GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
 """Lowest drawn transmissibility; smaller ones are drawn at this value."""
 _MOST_TRACES = 32
-"""Largest number of cells whose motion is drawn; in longer chains, evenly spaced cells."""
+"""Largest number of cells whose motion is drawn; in longer chains, evenly spaced cells are drawn."""
 _HEIGHT = 0.45
-"""Drawn height of the largest motion, over the drawn distance of two cells."""
+"""Ratio of the drawn height of the largest motion to the drawn distance between two cells."""
 
 
 class ChainPicture:
@@ -257,7 +257,7 @@ class AnswerPlots(QWidget):
             step()
 
     def steps(self, progress: SimulationProgress | None) -> list[Callable[[], None]]:
-        """Return one drawing function per plot, because drawing all of them takes longer than a frame."""
+        """Return one drawing function per plot, because drawing all plots takes longer than a frame."""
         draws = (self._responses, self._motion, self._exponents, self._likeness)
         return [
             partial(_draw_anew, plot, draw, progress) for plot, draw in zip(self.plots, draws, strict=True)

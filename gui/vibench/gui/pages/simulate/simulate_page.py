@@ -1,4 +1,4 @@
-"""The Simulate page: a form for the scene, its computing time, and curves drawn while computed."""
+"""The Simulate page: a form for the scene, its computing time, and curves drawn as they are computed."""
 
 import json
 import os
@@ -92,7 +92,7 @@ class SimulatePage(Page):
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:
-        """The tabs, which are styled one by one because each has as many widgets as a page."""
+        """The tabs, which are restyled one by one because each has as many widgets as a page."""
         return (self._parts, *self._views)
 
     def begin(self) -> None:
@@ -112,7 +112,7 @@ class SimulatePage(Page):
         self.simulator.begin(request)
 
     def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
-        """Set the form to frequencies around a drive frequency [Hz], at which the time signal is shown."""
+        """Set the form to frequencies around a drive frequency [Hz], for which the time signal is shown."""
         content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
         content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
         content["step_hz"] = 0.01 * frequency_hz

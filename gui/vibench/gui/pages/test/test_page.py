@@ -111,7 +111,7 @@ class TestForm(ValidatedForm[Measurement]):
         choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
 
     def _rename(self, kind: str) -> None:
-        """Rename the test after a change of kind, because the old name was that of the former kind."""
+        """Rename the test after a change of kind, because the old name contains the former kind."""
         self.form.editors["name"].show_content(kind)
         self.form.changed.emit()
 
@@ -192,15 +192,15 @@ class PredictionPlot(Plot):
 
 
 _FLOOR = 1e-5
-"""Ratio to the strongest spectral line below which a spectral line is only rounding error."""
+"""Ratio to the strongest spectral line below which a line is only rounding error."""
 _LEAST_HZ = 1.0
 """Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
-"""Smallest useful height of a plot, measured in lines of text."""
+"""Smallest useful height of a plot, in lines of text."""
 
 
 class PreviewPlots(QWidget):
-    """Two plots of the signal side by side, over time and frequency; zooming in time shows samples."""
+    """Two plots of the signal side by side, over time and over frequency; zooming in time shows samples."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -232,7 +232,7 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
 class LimitTable(ReadTable):
-    """Table with one row per limit of the rig; a bar shows which share of the limit the test uses."""
+    """Table with one row per limit of the rig; a bar shows what fraction of the limit the test reaches."""
 
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
@@ -323,7 +323,7 @@ LOOK_MS, PREDICT_MS = 200, 900
 
 
 class TestPage(Page):
-    """Page that edits the next test; its Arm button arms this test."""
+    """Page that edits the next test; its Arm button arms the test."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -363,7 +363,7 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether the test is valid, within all limits, and feedback control can stabilise its motion."""
+        """Whether the test is valid and within all limits, and feedback control can stabilise its motion."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
@@ -378,7 +378,7 @@ class TestPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Table of loads, plots and prediction, each with test and rig as inputs."""
+        """Table of loads, plots and prediction, each with the test and the rig as inputs."""
         wanted = self._inputs
         return (
             DisplayedResult(self.summary, self._summary_of, wanted),

@@ -32,7 +32,7 @@ class TestPrediction:
     motion: "MeasurementPrediction"
     expected: tuple["ExpectedResult", ...]
     recorded_s: float | None
-    """Predicted recording time of a test with `until` [s]; None if unknown, or without `until`."""
+    """Predicted recording time of a test with `until` [s]; None if unknown, or if `until` is not set."""
     refusal: str
     """Why feedback control on this rig cannot stabilise the motion; empty if it can."""
 
