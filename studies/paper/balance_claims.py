@@ -12,7 +12,7 @@ from .reading import CONTINUOUS, STRONG_M, WEAK_M, Reading, Values
 from .responses import Reals
 
 _AGREES = 0.1
-"""Relative difference that counts as agreement; the paper's criterion of similarity (its eq. 6) is looser."""
+"""Largest relative difference that counts as agreement; the paper's similarity criterion, eq. 6, is wider."""
 _MOST, _MAJORITY = 0.8, 0.5
 _SMOOTH_PROMINENCE = 1.1
 """Smallest prominence of a peak in a curve without chaos."""
@@ -123,7 +123,7 @@ def _lowest(r: Reading, amplitude_m: float) -> Reals:
 
 
 def _agreement(r: Reading, amplitude_m: float) -> Values:
-    """Return the share of frequencies at which a first-order solution is within 10 % of each response."""
+    """Return the fraction of frequencies at which a first-order solution is within 10 % of each response."""
     curve, solutions = r.level(amplitude_m, CONTINUOUS), _solutions(r, amplitude_m)
     return tuple(
         np.mean(

@@ -1,4 +1,4 @@
-"""A case: one value for each option that the paper leaves open, and the alternatives to test."""
+"""A case: one value for each option that the paper leaves open; and alternative values to test."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Initial states other than rest: largest displacement over the gap, and frequency for velocities [Hz]."""
+"""Initial states other than rest: largest displacement relative to gap; frequency for the velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -78,7 +78,7 @@ class Case(FigureOptions):
             raise InvalidRequest(f"the model n = 3+5+7 cannot be {self.sum_model}: {error}") from error
 
     def model_name(self, model: str) -> str:
-        """Return a model's name, with the indentation of the fit if this case changes it."""
+        """Return a model's name, with the indentation of the fit if this case changes that indentation."""
         return model if self.fit_m == FIT_M or not model.startswith("power:") else f"{model}:{self.fit_m:g}"
 
     def specimen(self, contact: str = "hertz") -> Specimen:
@@ -109,7 +109,7 @@ class Case(FigureOptions):
 
 @dataclass(frozen=True)
 class Alternative:
-    """A named change of options."""
+    """A named change of a case's options."""
 
     name: str
     changes: Mapping[str, Any]
@@ -123,7 +123,7 @@ class Alternative:
 
 
 def together(*alternatives: Alternative) -> Alternative:
-    """Return an alternative that combines the options of several."""
+    """Return an alternative that combines the options of several alternatives."""
     changes = {key: value for each in alternatives for key, value in each.changes.items()}
     return Alternative(", ".join(each.name for each in alternatives), changes)
 
@@ -232,11 +232,11 @@ def parse_option(text: str) -> Alternative:
 
 
 SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
-"""Values of c_i / k_i [s]: 1e-5 s is the paper's value read in mm, g and ms; larger values end chaos."""
+"""Values of c_i / k_i [s]: 1e-5 s is the paper's value read in mm, g and ms; larger values prevent chaos."""
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)
-"""Damping values to test, in this order, for a claim that depends on damping."""
+"""Damping values to test for a claim that depends on damping, in this order."""
 NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)

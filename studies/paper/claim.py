@@ -16,7 +16,7 @@ from .reading import Evidence, Reading, Values
 
 @dataclass(frozen=True)
 class Expectation:
-    """Inclusive bounds of a measured number for which a claim holds."""
+    """Inclusive bounds between which a measured number must lie if the claim is to hold."""
 
     name: str
     unit: str
@@ -50,22 +50,22 @@ class Expectation:
 
 
 def about(name: str, unit: str, value: float, within: float) -> Expectation:
-    """Return the requirement of a value within a tolerance, both in ``unit``."""
+    """Return the requirement that a number equals a value within a tolerance, both in ``unit``."""
     return Expectation(name, unit, value - within, value + within)
 
 
 def at_least(name: str, unit: str, low: float) -> Expectation:
-    """Return the requirement of a lower bound."""
+    """Return the requirement that a number is at least a lower bound."""
     return Expectation(name, unit, low, math.inf)
 
 
 def at_most(name: str, unit: str, high: float) -> Expectation:
-    """Return the requirement of an upper bound."""
+    """Return the requirement that a number is at most an upper bound."""
     return Expectation(name, unit, -math.inf, high)
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Return one requirement per wanted peak: its frequency is right within ``within_hz``."""
+    """Return one requirement per expected peak: its frequency must be correct within ``within_hz``."""
     return tuple(about(f"{each:g} Hz peak", "Hz", each, within_hz) for each in wanted_hz)
 
 
@@ -94,7 +94,7 @@ class Claim:
     """Whether the claim is also measured at every damping of the score."""
 
     def is_met_by(self, values: Values) -> bool:
-        """Return whether every number lies within its bounds; NaN does not."""
+        """Return whether every number lies within its bounds; NaN lies outside."""
         return all(each.low <= value <= each.high for each, value in zip(self.limits, values, strict=True))
 
 
@@ -128,14 +128,14 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """With the defaults, the claim holds for some initial states only; which of them is chance."""
+    """With the defaults, the claim holds only for some initial states, which chance determines."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Numbers of a claim with the options of one case, for every initial state; rest comes first."""
+    """Numbers of a claim with the options of one case, for every initial state, beginning with rest."""
 
     case: Case
     draws: tuple[tuple[float, ...], ...]
@@ -158,7 +158,7 @@ class Finding:
         return 0 < self.met_draws < len(self.draws)
 
     def spread(self, number: int) -> tuple[float, float]:
-        """Return smallest and largest value of one number over the initial states; NaN if one is missing."""
+        """Return smallest and largest value of one number over the initial states; NaN if any is missing."""
         values = [draw[number] for draw in self.draws]
         return float(np.min(values)), float(np.max(values))
 
@@ -188,7 +188,7 @@ class Judgement:
 def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim with the options of one case, from every initial state.
 
-    An alternative that fails from rest is measured from rest only.
+    With alternative options, a claim that fails for the motion from rest is not measured from other states.
     Raises InvalidRequest when the number of measured values differs from the number of requirements.
     """
     draws = [_measure(claim, evidence, case)]
@@ -208,7 +208,7 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim with a case's options; if it fails, try its alternatives until one of them holds."""
+    """Measure a claim with a case's options; if it fails, try its alternatives until it holds with one."""
     findings = [finding(claim, evidence, case)]
     for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

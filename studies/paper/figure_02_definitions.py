@@ -1,4 +1,4 @@
-"""Fig. 2: definition of Responses I and II: a time signal at 200 Hz, its spectrum, and the curves."""
+"""Fig. 2: definition of Responses I and II, with a time signal at 200 Hz, its spectrum, and the curves."""
 
 from vibench.analysis import report
 from vibench.sim import Harmonic

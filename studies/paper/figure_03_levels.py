@@ -19,7 +19,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 
 
 def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
-    """Draw the four levels, colliding frequencies shaded."""
+    """Draw the four levels, with colliding frequencies shaded."""
     specimen = options.specimen()
 
     def background(axes: "Axes", curve: Responses, _amplitude_m: float) -> None:

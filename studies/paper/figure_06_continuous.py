@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _MODEL = "power:5"
 _PLACES = 60
-"""Number of frequencies at which closed-form first-order solutions start a branch."""
+"""Number of frequencies at which closed-form first-order solutions are used to start branches."""
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:

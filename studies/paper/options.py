@@ -15,7 +15,7 @@ LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
 """Largest damping time, more than fifteen times critical damping in the paper's third mode."""
 _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
-"""Limits of the gap [m]: a thousandth of the smallest drive amplitude, and 200 times the largest."""
+"""Limits of the gap [m]: a thousandth of the smallest drive amplitude, and 200 times the largest one."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 
@@ -54,7 +54,7 @@ class FigureOptions:
     window_s: float = 5.0
     """Observed window as in the paper: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
-    """Time for runs from further initial states; zero, because each point of the paper is one run."""
+    """Time for runs from further initial states: zero, because each point in the paper is from one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:

@@ -54,7 +54,7 @@ class Reproduction:
 
     @property
     def sentence(self) -> str:
-        """The numbers of claims by verdict, in words."""
+        """The number of claims with each verdict, in words."""
         return (
             f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
             f"{self.count(Verdict.HOLDS_FOR_SHARE)} under the defaults for some starts only, "
@@ -66,7 +66,7 @@ class Reproduction:
 def reproduction(
     sections: Mapping[str, tuple[Claim, ...]], evidence: Evidence, case: Case, on_step: Callable[[str], None]
 ) -> Reproduction:
-    """Measure every claim under a case, its alternatives, every damping and every setting."""
+    """Measure every claim under a case, under its alternatives, at every damping and with every setting."""
     judgements = {}
     for heading, claims in sections.items():
         found = []
@@ -84,7 +84,7 @@ def reproduction(
 
 
 def _origin_text(evidence: Evidence) -> str:
-    """Return the number of computed points, processor time and version, from the study files."""
+    """Return the number of computed points, the processor time and the version, from the study files."""
     studies = evidence.studies
     points = sum(each.study.grid.size for each in studies)
     minutes = sum(float(np.nansum(each.values("taken"))) for each in studies) / 60.0
@@ -158,7 +158,7 @@ def target_text(claim: Claim) -> str:
 
 
 def _difference(result: Judgement) -> str:
-    """Return our numbers, the requirements, and the options under which the claim holds."""
+    """Return the measured numbers, the requirements, and the options under which the claim holds."""
     found = _values(result.claim, result.findings[0])
     return f"We find {found}; required {target_text(result.claim)}. {_upholding_options(result)}".strip()
 
@@ -177,7 +177,7 @@ def _upholding_options(result: Judgement) -> str:
 
 
 def _except(result: Judgement) -> str:
-    """Return the options under which a claim holds for some starts only."""
+    """Return the options under which a claim holds only for some initial states."""
     return "".join(
         f"; with {each.case.name} it holds for {each.met_draws} of {len(each.draws)} starts"
         for each in result.findings
@@ -191,7 +191,7 @@ def _values(claim: Claim, found: Finding) -> str:
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
-    """Return one number, with its range over several initial states."""
+    """Return one number as text, with its range over several initial states."""
     value = f"{wanted.name}: {wanted.number_text(found.values[number])}"
     low, high = (wanted.number_text(each, "") for each in found.spread(number))
     return value if low == high else f"{value} ({low} to {high})"

@@ -10,7 +10,7 @@ from .responses import Reals, linear_transmissibility
 LEAST_PROMINENCE = 2.0
 """Smallest ratio of a peak to the minimum beside it; chaos scatters Response I by some per cent."""
 _FINE_POINTS = 60_000
-"""Number of frequencies, 0.01 Hz apart, at which peaks without contact are searched."""
+"""Number of frequencies, 0.01 Hz apart, at which peaks without contact are sought."""
 
 
 def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
@@ -38,7 +38,7 @@ def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
-    """Return the two highest peaks in ascending order [Hz], and the ratio of the third to the second."""
+    """Return the two highest peaks in ascending order [Hz], and the height ratio of third to second peak."""
     found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
     if found.size < 2:
         return np.nan, np.nan, np.nan
@@ -49,7 +49,7 @@ def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, flo
 
 
 def nearest(found: Reals, wanted_hz: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the peak nearest to each frequency; NaN without any peak."""
+    """Return the peak nearest to each frequency; NaN if there is no peak."""
     if found.size == 0:
         return tuple(np.nan for _ in wanted_hz)
     return tuple(float(found[np.argmin(np.abs(found - wanted))]) for wanted in wanted_hz)

@@ -28,7 +28,7 @@ class Evidence:
     """Cache of studies and other results, which computes missing results; shared by all claims."""
 
     solve: Callable[[Study], StudyResults]
-    """Function that solves a study or reads its file; raises an error if the study is incomplete."""
+    """Function that solves a study or reads the study's file; raises an error if the study is incomplete."""
     _remembered: dict[object, object] = field(default_factory=dict)
 
     def study(self, study: Study) -> StudyResults:
@@ -81,7 +81,7 @@ class Reading:
         return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
 
     def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
-        """Return the exponents by the method of the case; exact exponents where the masses do not collide."""
+        """Return the exponents by the method of the case, or exact ones where the masses do not collide."""
         if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
             return curve.exponent_per_s
         specimen, settle_s = self.specimen(model), self.case.window_s

@@ -61,7 +61,7 @@ def stretches(flags: Flags) -> NDArray[np.intp]:
 
 
 def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
-    """Shade the flagged frequencies, each halfway to its neighbours."""
+    """Shade the flagged frequencies, each to the midpoints between it and its neighbours."""
     between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
     for first, end in stretches(flags):

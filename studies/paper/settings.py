@@ -38,7 +38,7 @@ def holds_from_rest(claim: Claim, evidence: Evidence, case: Case) -> bool:
 
 
 def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[DampingScore, ...]:
-    """Measure every scored claim at every damping, with all other options of the case."""
+    """Measure every scored claim at every damping; all other options are those of the case."""
     found = []
     for damping_time_s in SCORED_S:
         at = damping(damping_time_s).of(case)
@@ -113,7 +113,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
 
 
 def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -> report.ReportTable:
-    """Return the claims that hold from rest with each setting, without claims that hold with all settings."""
+    """Return the claims that hold from rest with each setting, except those that hold with all settings."""
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
     for claim in claims:

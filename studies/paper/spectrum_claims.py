@@ -16,7 +16,7 @@ _HALF_BAND_HZ = 10.0
 _LOOKED_HZ = ((150.0, 245.0), (350.0, 500.0))
 """Search ranges of the two broad peaks: around each terminal resonance, away from the drive."""
 _ABSENT, _PRESENT = 0.01, 0.1
-"""Largest level of an absent spectral line, smallest of a present one, over the level at the drive."""
+"""Largest level of an absent spectral line and smallest level of a present one, relative to the drive's."""
 _NEAR_HZ = 20.0
 """Tolerance of the broad peaks, close enough to exclude the linear resonances."""
 _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")
@@ -92,7 +92,7 @@ def _signal(r: Reading, amplitude_m: float) -> TimeSignal:
 
 
 def _band(signal: TimeSignal, middle_hz: float) -> float:
-    """Return the root sum of squares of the spectral lines around a frequency, over A0."""
+    """Return the root sum of squares of the spectral lines around a frequency, relative to A0."""
     inside = np.abs(signal.frequency_hz - middle_hz) <= _HALF_BAND_HZ
     return float(np.sqrt(np.sum(signal.amplitude[inside] ** 2)))
 

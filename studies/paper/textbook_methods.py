@@ -3,7 +3,7 @@
 The equations share nothing with the engine: they use no modes, no special unknowns in contact, and no
 polynomial instead of a sine. The methods do not detect contacts.
 Their steps cross a contact at arbitrary points; the error changes the energy of every impact, and the
-exponent of chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
+exponents in chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
 MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
 """
 
@@ -21,7 +21,7 @@ from vibench.sim import Harmonic, NoContact, PowerLaw, RigidStops, Specimen
 from .responses import Reals
 
 APART_M = 1e-11
-"""Distance of the neighbour for an exponent [m]; far below any indentation, far above rounding errors."""
+"""Distance of the neighbouring motion for an exponent [m]; far below indentations, above rounding errors."""
 READING_S = 1e-3
 """Interval at which the distance of the neighbour is measured and reset [s]."""
 LOST_M = 1.0
@@ -41,7 +41,7 @@ class Place(IntEnum):
 
 
 class Law(NamedTuple):
-    """Contact law: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d, and powers of p at every p."""
+    """Contact law: (k d^exponent + beside d) (1 + loss dd/dt) at a depth d, plus powers of p at every p."""
 
     lower: float
     upper: float
@@ -171,7 +171,7 @@ def _scales(drives: Sequence[Harmonic]) -> Reals:
 
 
 def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
-    """Return the largest change of any component, relative to the larger of two states."""
+    """Return the largest change of any component, relative to the larger of its two values."""
     beside = np.maximum(np.maximum(np.abs(one), np.abs(other)), floor)
     return np.asarray(np.max(np.abs(change) / beside, axis=0))
 

@@ -23,7 +23,7 @@ _DECADES = 5.0
 
 @dataclass(frozen=True, eq=False)
 class TimeSignal:
-    """Motion of m0 under a sine, over the drive amplitude."""
+    """Motion of m0 under a sine, relative to the drive amplitude."""
 
     time_s: Reals
     """Middle of each outline section, shape (sections,)."""
@@ -31,7 +31,7 @@ class TimeSignal:
     upper: Reals
     frequency_hz: Reals
     amplitude: Reals
-    """Amplitude of each spectral line of the window, over A0; shape (lines,)."""
+    """Amplitude of each spectral line of the window, relative to A0; shape (lines,)."""
 
     def spectrum_table(self, name: str) -> report.Table:
         """Return the spectrum as a table."""

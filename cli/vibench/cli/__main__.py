@@ -64,7 +64,7 @@ class Place:
     advice: str = ""
     """Advice to the user if the command cannot run."""
     help: str = ""
-    """Help text of a group of commands; single commands use the docstring of their function."""
+    """Help text of a group of commands; a single command uses the docstring of its function."""
 
     def load(self) -> typer.Typer:
         """Import the command; return it as an application with this one command."""
@@ -78,7 +78,7 @@ class Place:
 
     @property
     def summary(self) -> str:
-        """First line of the function's docstring, read from its source because importing is slow."""
+        """First line of the function's docstring, read from the source code because importing is slow."""
         module, name = self.function.split(":")
         source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
@@ -233,7 +233,7 @@ def print_version(is_requested: bool) -> None:
 
 
 class LogLevel(StrEnum):
-    """Amount of log messages on standard error."""
+    """How many log messages are written to standard error."""
 
     WARNING = "warning"
     INFO = "info"

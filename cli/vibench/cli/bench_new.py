@@ -56,7 +56,7 @@ class Answers:
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """Return the usual questions, plus one for each other configuration value in the answer file."""
+        """Return the usual questions, and one more for each other configuration value in the answer file."""
         usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 

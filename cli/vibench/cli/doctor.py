@@ -78,7 +78,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version or, if it is missing, with the extra that installs it."""
+    """Yield each library with its version or, if missing, with the extra that installs the library."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]

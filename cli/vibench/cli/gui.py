@@ -13,7 +13,7 @@ from .options import option
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
-"""Package to run in a new process; importing it here would make all commands need Qt."""
+"""Package to run in a new process; if it were imported here, all commands would need Qt."""
 
 
 def gui(

@@ -60,7 +60,7 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 def room_for_folder(path: Path) -> None:
     """Check, before computing, that a folder exists or can be created, and can be written to.
 
-    Raises ConfigurationError when a file is in the way, or writing is not permitted.
+    Raises ConfigurationError when a file has the folder's name, or writing is not permitted.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:

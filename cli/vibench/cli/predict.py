@@ -194,7 +194,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on neighbouring points with one method; details are from the point of largest p.
+    """Return a paragraph on neighbouring points with one method; details are for the point of largest p.
 
     Each entry has frequency [Hz], plan and computing time [s]; the time is NaN if it includes the start of
     the process.
@@ -286,7 +286,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return a text on points that depend sensitively on initial conditions, and their extra runs."""
+    """Return a text on points that depend sensitively on initial conditions, and on their additional runs."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

@@ -19,7 +19,7 @@ _EXAMPLES = {
         3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
     },
 }
-"""Allowed forms of the text in words, keyed by parameter and number of parts."""
+"""Allowed forms of the text, in words; keyed by parameter and number of parts."""
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,9 @@ POLL_S = 0.01
 IDLE_S = 0.2
 """Interval between two polls of the engine if there is no run [s]."""
 PIECE_S = 0.1
-"""Duration of the samples that are processed and reported at once [s]."""
+"""Duration of the samples that are processed and reported together [s]."""
 LATEST_S = 3.0
-"""Largest delay of the twin behind the measurement [s]; beyond it, the twin skips samples."""
+"""Largest delay of the twin behind the measurement [s]; if it is exceeded, the twin skips samples."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25

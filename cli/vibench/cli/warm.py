@@ -1,4 +1,4 @@
-"""`vibench warm`: does nothing; it is kept because existing scripts may call it."""
+"""`vibench warm`: does nothing; the command is kept because existing scripts may call it."""
 
 from .output import console
 

@@ -32,7 +32,7 @@ Pid = Annotated[int | None, option("Process id; by default the only engine.", "N
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
-    """Watch an engine from any terminal of the same user; Ctrl-C ends only the watching."""
+    """Watch an engine from any terminal of the same user; Ctrl-C ends the watching, not the run."""
     if as_json:
         engines = [each for each in announced_engines() if pid in (None, each.pid)]
         others = [each for each in programs_without_engine() if pid in (None, each.pid)]

@@ -95,7 +95,7 @@ class LegendLine(QLabel):
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
-    """Plot with one pair of axes. Curves get plain values; for a logarithmic axis the plot takes logarithms.
+    """Plot with one pair of axes. Curves get plain values, which the plot converts for logarithmic axes.
 
     `add_actions` defines keys and context menu. A disabled plot is dimmed and marked as outdated.
     """
@@ -166,7 +166,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self
 
     def keep_numbers(self) -> "Plot":
-        """Show numbers on the horizontal axis even if the plot is empty, because a plot above shares it."""
+        """Show numbers on the horizontal axis even of an empty plot, because a plot above shares the axis."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
         return self

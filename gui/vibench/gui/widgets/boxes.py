@@ -34,7 +34,7 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""Widget or layout, alone or with its stretch factor; a number alone is empty space that stretches."""
+"""Widget or layout, with or without a stretch factor; a number alone is empty space that stretches."""
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
@@ -62,14 +62,14 @@ def row(*parts: Part) -> QHBoxLayout:
 
 
 def column(*parts: Part) -> QWidget:
-    """Return a widget with the parts below one another, without a margin."""
+    """Return a widget with the parts one above the other, without a margin."""
     whole = QWidget()
     fill_box(QVBoxLayout(whole), *parts, margin=0)
     return whole
 
 
 def titled_box(title: str, *parts: Part) -> QGroupBox:
-    """Return a titled frame with the parts below one another."""
+    """Return a titled frame with the parts one above the other."""
     frame = QGroupBox(title)
     fill_box(QVBoxLayout(frame), *parts)
     return frame
@@ -148,7 +148,7 @@ def splitter(
     sizes: tuple[int, int],
     orientation: Qt.Orientation = Qt.Orientation.Vertical,
 ) -> QSplitter:
-    """Return two parts with a movable divider, by default below each other."""
+    """Return two parts with a movable divider, by default one above the other."""
     parts = QSplitter(orientation)
     parts.setAccessibleName(name)
     parts.addWidget(first)
@@ -165,14 +165,14 @@ def keep_space(widget: QWidget) -> None:
 
 
 def set_tone(widget: QWidget, tone: str) -> None:
-    """Give a widget the colours of a `Tone`; an empty text removes them."""
+    """Give a widget the colours of a `Tone`; an empty text removes these colours."""
     if (widget.property("tone") or "") != tone:
         widget.setProperty("tone", tone)
         widget.style().polish(widget)
 
 
 def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
-    """Ask for the path of a new file; if it has no suffix, add that of the selected filter."""
+    """Ask for the path of a new file; if the path has no suffix, add that of the selected filter."""
     options = QFileDialog.Option.DontConfirmOverwrite
     given, kind = QFileDialog.getSaveFileName(parent, title, str(wish), filters, options=options)
     if not given:
@@ -182,7 +182,7 @@ def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | No
 
 
 _WIDEST = 0.8
-"""Largest width of a hint's text, over the width of the empty area."""
+"""Largest width of a hint's text, relative to the empty area."""
 
 
 def hint_in_list(view: QAbstractItemView, text: str) -> None:
@@ -211,7 +211,7 @@ def plain_tip(text: str) -> str:
 
 
 class ElidedLabel(QLabel):
-    """Label of one line, which is cut off with dots if space is missing; the tooltip shows all."""
+    """Label of one line; text that does not fit ends in dots, and the tooltip shows all of it."""
 
     LETTERS = 3
 
@@ -252,11 +252,11 @@ class ElidedLabel(QLabel):
 
 
 LEAST_S = 1.0
-"""Elapsed time after which a progress bar begins to estimate the remaining time [s]."""
+"""Elapsed time at which a progress bar begins to estimate the remaining time [s]."""
 
 
 class ProgressBar(QProgressBar):
-    """Progress bar whose text is cut off with dots if space is missing; the tooltip shows all."""
+    """Progress bar with a text; text that does not fit ends in dots, and the tooltip shows all of it."""
 
     def __init__(self, name: str, text: str = "") -> None:
         super().__init__()
@@ -265,7 +265,7 @@ class ProgressBar(QProgressBar):
         self.show_share(0.0, text)
 
     def show_share(self, share: float, text: str) -> None:
-        """Show the finished share of the work, 0 to 1 (larger values count as 1), with a text."""
+        """Show the finished fraction of the work, 0 to 1 (larger values count as 1), with a text."""
         self.setValue(round(1000 * min(1.0, share)))
         self.setFormat(text)
 
@@ -293,7 +293,7 @@ class TimedBar(ProgressBar):
         self._begun_s = monotonic()
 
     def show_done(self, done: int, total: int) -> None:
-        """Show the number of finished pieces; ``total`` is 0 if nothing was started."""
+        """Show the number of finished pieces; ``total`` is 0 if no work was started."""
         if total and not self._total:
             self.begin()
         self._total = total

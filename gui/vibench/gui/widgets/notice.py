@@ -32,14 +32,14 @@ class Notice:
 
     @property
     def text(self) -> str:
-        """The whole message, for the clipboard and for a log."""
+        """The whole message as text, for the clipboard and for a log."""
         code = f"[{self.code}] " if self.code else ""
         parts = (f"{self.kind.value.upper()}: {code}{self.what}", self.done, self.next_step, self.details)
         return "\n".join(part for part in parts if part)
 
 
 def notice_of(error: BaseException, next_step: str = "") -> Notice:
-    """Return an error as a notice; the error's message already contains all parts."""
+    """Return an error as a notice; the error's message already contains all parts of it."""
     return Notice(
         NoticeKind.FAULT,
         printable(str(error)) or type(error).__name__,

@@ -77,7 +77,7 @@ class ReadTable(QTableWidget):
     hint
         Text shown while the table is empty.
     wide
-        Number of the column that takes the remaining width; by default the last one.
+        Index of the column that takes the remaining width; by default the last column.
     """
 
     def __init__(

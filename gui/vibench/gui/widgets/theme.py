@@ -97,7 +97,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Return the palette of a theme for Qt's widgets; works on every desktop, unlike a colour scheme."""
+    """Return the palette of a theme for Qt's widgets; unlike a colour scheme, it works on every desktop."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (
@@ -123,7 +123,7 @@ def palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Return the style rules beyond the palette: panels, navigation bar, banner; sizes follow the font.
+    """Return style rules that a palette cannot express: panels, navigation bar, banner; sizes follow fonts.
 
     A table with focus has a coloured frame, because a shaded cell would be harder to read.
     """

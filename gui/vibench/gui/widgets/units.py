@@ -1,4 +1,4 @@
-"""Displayed units: one choice per quantity for axes, fields, tables and sentences.
+"""Displayed units: one choice per quantity, for axes, fields, tables and sentences.
 
 Values are in SI units; sentences from other packages use the paper's units (µm, m/s²). Only this module
 converts to the units that the user has chosen. Files and reports are not affected.
@@ -21,7 +21,7 @@ from .boxes import plain_lines, plain_tip
 STANDARD_GRAVITY = 9.80665
 """Standard gravity [m/s²]; ISO 80000-3."""
 AUTOMATIC = "automatic"
-"""Name of the choice that shows displacements in µm on axes, and elsewhere with a suitable prefix."""
+"""Name of the choice that shows displacements in µm on axes, and with a suitable prefix elsewhere."""
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "m": (AUTOMATIC, "µm", "mm", "m"),
     "m/s": ("mm/s", "m/s"),
@@ -32,7 +32,7 @@ POWERS = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3
 """Powers of ten by unit prefix; three different characters stand for "micro"."""
 _FITTED = ("p", "n", "µ", "m", "", "k", "M")
 PREFIXED = frozenset({"m", "V", "Vpp", "s", "A", "N", "Hz", "W"})
-"""Units that get a prefix for small and large values."""
+"""Units that take a prefix for small and large values."""
 _PLAIN_FROM, _PLAIN_TO = 0.1, 1e5
 _SPELLED = {"m s-1": "m/s", "m s-2": "m/s²", "m/s2": "m/s²", "um": "µm"}
 """Other spellings of units in files and sentences."""
@@ -121,7 +121,7 @@ class DisplayUnits:
         return prefixed_unit(unit, value) if name == AUTOMATIC else _unit_of(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Return the unit in which a number typed without unit into an empty field is read."""
+        """Return the unit of a number that is typed without a unit into an empty field."""
         return self.on_axis(unit).name
 
     def convert(self, sentence: str) -> str:

@@ -91,7 +91,7 @@ class StateIndicator:
     word: str
     tone: Tone
     detail: str = ""
-    """Text that changes during the state, such as elapsed time and drive level."""
+    """Text that changes while the state lasts, such as elapsed time and drive level."""
     is_ramping: bool = False
     """Whether the drive is already ramping down, so that STOP can only shorten the ramp."""
 
@@ -104,7 +104,7 @@ class Banner(QFrame):
     """Banner with state and STOP; a change of state is announced to screen readers."""
 
     stop_requested = Signal()
-    """Request to ramp down as planned; during the ramp, a second press requests the fastest ramp."""
+    """Emitted to ramp down as planned; a second press, during the ramp, requests the fastest ramp."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -197,7 +197,7 @@ ORDERED = "Limits, folder and instruments are being checked"
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a state
-    """Return the indicator for the engine's state; ``is_ordering`` is True while a command is running."""
+    """Return the indicator of the engine's state; ``is_ordering`` is True while a command is running."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
@@ -274,7 +274,7 @@ _DETAIL_LINES = 14
 class MessageStrip(QFrame):
     """Strip with the newest message: what happened, what was done, what to do next.
 
-    Its height is constant, so that nothing below it moves. If there is no message, it shows the next step.
+    Its height is constant, so that nothing below it moves. Without a message, it shows the next step.
     The Details button opens the list of all messages over the page.
     """
 
@@ -308,7 +308,7 @@ class MessageStrip(QFrame):
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """All messages that Details lists, the newest last."""
+        """All messages in the list of Details, the newest last."""
         return tuple(self._notices)
 
     def say(self, notice: Notice) -> None:

@@ -26,7 +26,7 @@ class Wait:
     """A delay of the event loop."""
 
     own_s: float
-    """Delay [s], without the time of waiting for a processor if the operating system reports that."""
+    """Delay [s], without the time spent waiting for a processor if the operating system reports this time."""
     busy_s: float
     """Processor time of this thread during the delay [s], which does not depend on other programs."""
     at: datetime
@@ -36,8 +36,8 @@ class Wait:
 class EventLoopMonitor(QObject):
     """Timer that measures its own delays.
 
-    Work, file access, locks and other Python threads delay the timer. The time of waiting for a processor is
-    subtracted, so that other programs on the computer do not count.
+    Work, file access, locks and other Python threads delay the timer. The time spent waiting for a processor
+    is subtracted, so that other programs on the computer do not count.
     """
 
     def __init__(self, about: Callable[[], str], parent: QObject | None = None) -> None:
@@ -53,7 +53,7 @@ class EventLoopMonitor(QObject):
 
     @property
     def longest_s(self) -> float:
-        """Longest delay in the last `SPAN_S`, without waiting for a processor [s]."""
+        """Longest delay in the last `SPAN_S`, without the time spent waiting for a processor [s]."""
         self._forget()
         return max((own_s for _, own_s, _ in self._waits), default=0.0)
 
@@ -87,7 +87,7 @@ class EventLoopMonitor(QObject):
 
     @property
     def text(self) -> str:
-        """Longest delay, and the logged delays with the newest first, as text."""
+        """The longest delay and the logged delays, newest first, as text."""
         lines = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
         lines += [
             f"{each.at:%H:%M:%S}  {each.about}: {1e3 * each.own_s:.0f} ms" for each in reversed(self._noted)
@@ -104,7 +104,7 @@ class EventLoopMonitor(QObject):
             self._noted.append(Wait(own_s, busy_s, datetime.now().astimezone(), self._about()))
 
     def _clocks(self) -> tuple[float, float, float]:
-        """Return clock time, and this thread's processor time and time of waiting for a processor [s]."""
+        """Return clock time, and this thread's processor time and time spent waiting for a processor [s]."""
         return monotonic(), thread_time(), self._delays.read_s()
 
     def _forget(self) -> None:
@@ -114,7 +114,7 @@ class EventLoopMonitor(QObject):
 
 
 class _Delays:
-    """Reads for how long this thread waited for a processor; zero if the operating system does not say."""
+    """Reader of the time that this thread waited for a processor; zero if the system does not report it."""
 
     def __init__(self) -> None:
         try:
@@ -129,7 +129,7 @@ class _Delays:
         return 1e-9 * int(read_at(self._file, 100, 0).split()[1])
 
     def close(self) -> None:
-        """Close the operating system's file with the waiting time."""
+        """Close the operating system's file that contains the waiting time."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

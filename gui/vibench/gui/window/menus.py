@@ -58,7 +58,7 @@ class Preferences(FrozenModel):
     accelerations_in: Literal["m/s²", "g"]
     """Unit of accelerations; g is 9.80665 m/s²."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
-    """How long a test far from all limits may continue if the window does not respond."""
+    """How long a test far from all limits may continue while the window does not respond."""
     recordings_folder: Annotated[str, AfterValidator(whole_path)]
     """Folder of new recordings."""
 
@@ -120,7 +120,7 @@ LONGEST_S = 60
 
 
 class Reader(QDialog):
-    """Window with a text, which does not block the main window; Ctrl+C copies the selection."""
+    """Window that shows a text and does not block the main window; Ctrl+C copies the selection."""
 
     def __init__(self, title: str, parent: QWidget) -> None:
         super().__init__(parent)
@@ -138,7 +138,7 @@ class Reader(QDialog):
         self.resize(50 * em, 38 * em)
 
     def _fit(self, *_: object) -> None:
-        """Wrap also the lines of code, so that the manual needs no horizontal scrolling."""
+        """Wrap lines of code as well, so that the manual needs no horizontal scrolling."""
         block = self.browser.document().begin()
         while block.isValid():
             wrapped = block.blockFormat()
@@ -148,7 +148,7 @@ class Reader(QDialog):
 
 
 def show_manual(parent: QWidget) -> Reader:
-    """Show the page of the manual about the window; its links lead to other pages."""
+    """Show the manual's page about the window; its links lead to the other pages."""
     reader = Reader("Manual", parent)
     try:
         page = shipped_folder("docs") / "gui.md"
@@ -217,7 +217,7 @@ class AbortKey(QObject):
         return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
-        """Return whether an event is a new key press; Qt delivers the same press several times."""
+        """Return whether an event is a new key press, because Qt delivers the same press several times."""
         seen = (event.timestamp(), event.key())
         is_new = seen != self._last_seen
         self._last_seen = seen

@@ -35,7 +35,7 @@ def application(arguments: list[str]) -> QApplication:
 
 
 def _font() -> QFont:
-    """Return DejaVu Sans, which has all characters that are needed and is installed with matplotlib."""
+    """Return DejaVu Sans, which has all required characters and is installed with matplotlib."""
     folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
     for name in FONT_FILES:
         QFontDatabase.addApplicationFont(str(folder / name))
@@ -43,7 +43,7 @@ def _font() -> QFont:
 
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
-    """Show the window until it is closed; return the exit code. ``starting``, a label, is then closed."""
+    """Show the window in place of the label ``starting`` until it is closed; return the exit code."""
     app = application(["vibench"])
     stored = Settings(settings or default_settings_path())
     context = AppContext(stored)

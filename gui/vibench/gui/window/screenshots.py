@@ -32,9 +32,9 @@ from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
-"""Smallest supported and a common window size [pixels]; pictures of each size have a folder."""
+"""Smallest supported and a common window size [pixels]; pictures of each size have their own folder."""
 PATIENCE_S = 3600.0
-"""Longest wait for the window to be ready [s]; long, because the computer may be busy."""
+"""Longest wait for the window to become ready [s]; it is long, because the computer may be busy."""
 STILL_MS = 1200
 """Waiting time after which the frame rate in the status line is steady [ms]."""
 _SMALLEST_FILE = 0
@@ -59,7 +59,7 @@ MAP = {"columns": 61, "rows": 41}
 MOTION = (300.0, 20e-6)
 """Frequency [Hz] and amplitude [m] of the motion shown beside the map."""
 BRANCHES = {"start": 88.0, "stop": 101.0, "places": 3}
-"""Frequency range [Hz] of the search for branches, and its number of frequencies."""
+"""Frequency range [Hz] and number of frequencies of the search for branches."""
 CHAIN = {"start_hz": 200.0, "stop_hz": 220.0, "step_hz": 10.0, "duration_s": 1.0, "settle_s": 1.0}
 
 

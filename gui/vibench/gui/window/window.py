@@ -96,7 +96,7 @@ class NavigationBar(QListWidget):
         return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
 
     def choose(self, name: str) -> None:
-        """Select the page ``name`` in the list, because the window already shows it."""
+        """Select the page ``name`` in the list; the window already shows this page."""
         self.setCurrentRow(self._names.index(name))
 
     def show_done(self, done: dict[str, bool]) -> None:
@@ -134,9 +134,9 @@ class NavigationBar(QListWidget):
 SPAN_S = 1.0
 """Averaging time of the frame rate [s]."""
 MOST_DROPPED = 20
-"""Largest number of files that are opened when dropped together."""
+"""Largest number of files that are opened when they are dropped together."""
 TICK_MS = 50
-"""Interval between updates of the window [ms]; shorter would use a whole core, longer looks jerky."""
+"""Interval between updates of the window [ms]; a shorter one uses a whole core, a longer one looks jerky."""
 
 
 class Window(QMainWindow):
@@ -338,7 +338,7 @@ class Window(QMainWindow):
         self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Apply a change of the font; parts with a style sheet need a new style sheet for this."""
+        """Apply a change of the font; parts with a style sheet need a new one for this."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)
@@ -352,7 +352,7 @@ class Window(QMainWindow):
         self.page.edits.redo()
 
     def open_path(self, path: Path) -> None:
-        """Open a file or folder on the page that opens this kind of file."""
+        """Open a file or folder on the page for files of its kind."""
         try:
             kind = file_kind(path)
         except ConfigurationError as error:
@@ -364,7 +364,7 @@ class Window(QMainWindow):
         act(path)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Accept a drag onto the window if it contains files."""
+        """Accept a drag onto the window if the drag contains files."""
         if event.mimeData().hasUrls():
             event.acceptProposedAction()
 
