@@ -1,4 +1,4 @@
-"""A case: one value for each option that the paper leaves open; and alternative values to test."""
+"""A case: one value for each option that the paper leaves open, with alternatives to test."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,7 @@
 """Limit the threads of linear algebra and the memory that processes keep, unless the user has set limits.
 
 Imported before numpy. One thread is best: the matrices are small, and OpenBLAS threads wait for each other in
-busy loops. Tests of the bench check take 9 s of processor time with one thread, and 11 s with two.
+busy loops. The tests of the bench check take 9 s of processor time with one thread, 11 s with two.
 
 Arrays of a recording take tens of megabytes. Linux's C library keeps such memory after it is freed. With this
 threshold [bytes], background processes return larger blocks to the operating system at once.

@@ -161,7 +161,7 @@ def _shows_m0(status: EngineStatus) -> bool:
 
 
 def _useful_forecast(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the forecast and its errors while they are small enough to display; empty if none is."""
+    """Return the forecast and its errors up to the first error that is too large to display."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error

@@ -22,7 +22,7 @@ class BranchContinuation(AbstractFeedback):
 
     A real-time controller damps the motion between m1 and m2 and plays a Fourier series. Pseudo-arclength
     continuation uses the frequency and the first coefficient. The other coefficients make the base move as a
-    sine, so the specimen moves as under this sine, unaffected by the control (Sieber and
+    sine, so the specimen moves as under a sine without control (Sieber and
     Krauskopf, Nonlinear Dyn. 51 (2008) 365; Renson and others, J. Sound Vib. 367 (2016) 145).
     """
 
@@ -56,7 +56,7 @@ class BranchContinuation(AbstractFeedback):
     look_periods: int = Field(default=20, ge=10, le=1000)
     """Number of periods in one measurement."""
     record_s: PositiveFloat = 0.5
-    """Time for which each point is recorded [s]."""
+    """Recording time of each point [s]."""
     perturbation: float = Field(default=0.0, ge=0, le=0.1)
     """Size of the drive changes that measure the stability of each point: relative rms change of the
     fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to skip the measurement."""

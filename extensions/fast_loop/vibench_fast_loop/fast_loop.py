@@ -169,7 +169,7 @@ _WAVE, _WAVE_OF_STOPS = 512, 8192
 _PART_S = 1e-6
 """Longest part of a control step with a constant slope of the stops' force [s]; 1 % of a contact."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
-"""Decreasing levels relative to the required level, along which a motion with impacts is reached."""
+"""Decreasing levels, relative to the required level, through which a motion with impacts is reached."""
 
 
 @dataclass(frozen=True)

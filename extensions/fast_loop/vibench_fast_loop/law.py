@@ -19,7 +19,7 @@ from .plant import SampledPlant
 
 # Weights of the design: expected sizes of motion, voltage and noise.
 RELATIVE_M = 3e-5
-"""Displacement p that has the same cost in the law's design as a control voltage of 0.1 V [m]."""
+"""Displacement p [m] that costs as much in the design of the law as a control voltage of 0.1 V."""
 PUSH_N = 3e-3
 """Unknown force between m1 and m2 that the filter assumes, rms over a step [N]."""
 VOLT = 1e-2

@@ -16,7 +16,7 @@ _PART = 0.01
 """Largest relative deviation of the controller's rate, limit and watchdog time from the configuration."""
 _LEAVING_S = 0.1
 _LONGEST_LINE = 1_000_000
-"""Longest answer that is read [bytes]; a faulty controller may never end its line."""
+"""Longest answer that is read [bytes], because a faulty controller may never end its line."""
 Answer = TypeVar("Answer", bound=BaseModel)
 
 

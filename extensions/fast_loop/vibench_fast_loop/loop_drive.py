@@ -57,10 +57,10 @@ class LoopDrive:
         """Do nothing; the controller is already silent."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Do nothing, because nothing is prepared in advance."""
+        """Do nothing, because no signal is prepared in advance."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase with regular requests; yield the reading time before each request [s]."""
+        """Play a phase with regular requests; yield the time for reading samples before each request [s]."""
         self._blocks = []
         if phase.state is RunState.RAMPING_DOWN:
             self._silence(phase.duration_s)

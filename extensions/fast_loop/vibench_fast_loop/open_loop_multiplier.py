@@ -58,7 +58,7 @@ class PerturbedMotion:
     period: float
     """Period of the drive [samples]."""
     first: int
-    """Index of the first sample of the changes; before it, the last changes of the second half are played."""
+    """Index of the first sample with changes; before it, the last changes of the second half are played."""
     periods: int
     """Number of periods with changes; the same number follows with opposite sign."""
 

@@ -77,7 +77,7 @@ class VirtualController:
 
     @contextmanager
     def hold_state(self) -> Iterator[Structure]:
-        """Yield the state with which samples are processed; the host cannot change it meanwhile.
+        """Yield the state with which samples are processed; the host cannot change the state meanwhile.
 
         The state is a `Controller` of native/structures.hpp.
         """

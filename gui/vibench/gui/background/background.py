@@ -32,7 +32,7 @@ class Background(Pool, QObject):
         self._timer.timeout.connect(self.poll)
 
     def prepare(self) -> None:
-        """Start all worker processes now, because starting them during a run would delay the display."""
+        """Start all worker processes now; if they started during a run, they would delay the display."""
         super().prepare()
         for beside in self.findChildren(Background):
             beside.prepare()

@@ -41,7 +41,7 @@ from ..background.background import in_next_pass
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Frequency band of plots if this window does not know the plan, because another window armed it."""
+"""Frequency band of the plots if this window does not know the plan because another window armed it."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
@@ -305,7 +305,7 @@ class Bridge(QObject):
 
     @property
     def may_leave(self) -> bool:
-        """Whether the run was armed to continue without a window."""
+        """Whether the plan was armed so that the run continues without a window."""
         return self.is_driving and self._attendance is Supervision.UNATTENDED
 
     def close(self, how: Urgency = Urgency.END) -> None:

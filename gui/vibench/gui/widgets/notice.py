@@ -39,7 +39,7 @@ class Notice:
 
 
 def notice_of(error: BaseException, next_step: str = "") -> Notice:
-    """Return an error as a notice; the error's message already contains all parts of it."""
+    """Return an error as a notice; the error's message already contains all parts of the notice."""
     return Notice(
         NoticeKind.FAULT,
         printable(str(error)) or type(error).__name__,

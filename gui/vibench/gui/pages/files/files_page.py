@@ -79,7 +79,7 @@ class FilesPage(Page):
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The plots, with the recording named above them as their input."""
+        """The plots; their input is the recording named above them."""
         wanted = None if self._opened is None else self._opened.path
         inside = self.pictures.spectrogram.displayed_results, self.pictures.hidden_motion.displayed_results
         return DisplayedResult(self.pictures, self._pictured_path, wanted), *inside

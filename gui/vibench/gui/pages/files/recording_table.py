@@ -144,7 +144,7 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the plan's notes, then the notes added later, oldest first; an error text if unreadable."""
+    """Return the plan's notes, then later notes, oldest first; an error text if they cannot be read."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     try:
@@ -176,7 +176,7 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 
 def state_text(state: str) -> str:
-    """Return symbol and word for a recording's state, which can be read without colour."""
+    """Return symbol and word for a recording's state, which are readable without colour."""
     return f"{_symbol(state)} {state}"
 
 

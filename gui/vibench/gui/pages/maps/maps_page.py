@@ -182,7 +182,7 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Height of the map in thousandths of the page's height; the motion's plots get the remaining height."""
+"""Height of the map in thousandths of the page's height; the plots of the motion get the rest."""
 DIGITS = 5
 """Significant digits of the parameter ranges that a zoom writes into the form."""
 
