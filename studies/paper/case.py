@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Initial states other than rest: largest displacement relative to gap; frequency for the velocities [Hz]."""
+"""Initial states except rest: largest displacement relative to the gap; frequency for velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -54,7 +54,7 @@ class Case(FigureOptions):
     changed: tuple[str, ...] = ()
     """Options that differ from the program's defaults."""
     draw: int = 0
-    """Number of the initial state: 0 is rest; other states are a millionth of the gap away."""
+    """Number of the initial state: 0 is rest; each other state is a millionth of the gap away from it."""
 
     def __post_init__(self) -> None:
         for what, value in (("a base amplitude", self.sweep_amplitude_m), ("an indentation", self.fit_m)):

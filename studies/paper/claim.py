@@ -87,7 +87,7 @@ class Claim:
     tried: tuple[Alternative, ...]
     """Alternatives to test in this order if the claim fails under the defaults."""
     remark: str
-    """Comment on a failed claim, without numbers, because the page gives the measured ones."""
+    """Comment on a failed claim, without numbers, because the page gives the measured numbers."""
     draws: int
     """Number of initial states: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool
@@ -110,7 +110,7 @@ def claim(
     remark: str = "",
     is_scored: bool = True,
 ) -> Callable[[Measure], Claim]:
-    """Return a decorator for a measuring function; its docstring is the paper's statement."""
+    """Return a decorator for a measuring function, whose docstring is the paper's statement."""
 
     def make_claim(measure: Measure) -> Claim:
         key, says = measure.__name__.replace("_", "-"), " ".join((measure.__doc__ or "").split())

@@ -1,4 +1,4 @@
-"""Options for choices that the paper leaves open in its figures; they are stored with each figure."""
+"""Options for choices that the paper leaves open; the options are stored with each figure."""
 
 import math
 from dataclasses import dataclass

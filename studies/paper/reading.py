@@ -59,7 +59,7 @@ class Reading:
         return self.case.specimen(model)
 
     def curve(self, amplitude_m: float, model: str = PIECE_WISE, **replaced: Any) -> Responses:
-        """Return the curve at any amplitude; fields of its study may be replaced."""
+        """Return the curve at any amplitude; fields of the curve's study may be replaced."""
         return responses(self.evidence.study(self.case.study((model,), (amplitude_m,), **replaced)))
 
     def level(self, amplitude_m: float, model: str = PIECE_WISE) -> Responses:

@@ -242,7 +242,7 @@ def _analyse(
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
-    """Write one more report for each channel that measures another motion."""
+    """Write a further report for each channel that measures another motion."""
     from vibench.analysis.report import write_report
 
     for role, results in others.items():

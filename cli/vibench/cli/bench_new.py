@@ -1,4 +1,4 @@
-"""`vibench bench new`: set up and check a new bench, and write a report about it."""
+"""`vibench bench new`: set up a new bench, check it, and write a report about the bench."""
 
 import signal
 import sys

@@ -42,7 +42,7 @@ SECRET = frozenset({TOKEN_VARIABLE})
 
 
 def doctor(as_json: AsJson = False) -> None:
-    """Report versions, folders, libraries and instruments of this installation, without changing it."""
+    """Report versions, folders, libraries and instruments of this installation; nothing is changed."""
     sections = {
         "vibench": installation(),
         "libraries": dict(libraries()),

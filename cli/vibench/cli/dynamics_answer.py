@@ -35,7 +35,7 @@ def room_for(file: str, out: Path | None) -> None:
 def compute_parts(
     parts: Iterator[Part], tell: Callable[[int, Part], None]
 ) -> tuple[tuple[Part, ...], float, bool]:
-    """Compute all parts of a result, report each finished part, and stop after the current one at Ctrl-C.
+    """Compute all parts of a result and report each finished part; at Ctrl-C, stop after the current part.
 
     Return the parts, the elapsed time [s], and whether all parts were computed.
     """

@@ -79,7 +79,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
-    """Return the function that draws figures of measurements; it analyses the recordings only once."""
+    """Return the function that draws figures of measurements; the recordings are analysed only once."""
     if not wanted:
         return lambda _: iter(())
     if folder is None:

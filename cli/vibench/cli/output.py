@@ -94,6 +94,6 @@ def leave_output_to_json() -> None:
 
 
 def print_json(document: Mapping[str, object]) -> None:
-    """Print one JSON document on standard output."""
+    """Print a single JSON document on standard output."""
     json.dump(document, sys.stdout, indent=2, allow_nan=False)
     sys.stdout.write("\n")

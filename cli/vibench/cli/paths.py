@@ -92,9 +92,9 @@ SUFFIXES = frozenset(
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Return the path of a new file: ``out`` or, if that is a folder, the usual name in it.
+    """Return the path of a new file: ``out`` or, if this is a folder, the usual name in the folder.
 
-    If ``out`` has no suffix, it becomes a folder. Raises ConfigurationError when the file exists, or for
+    An ``out`` without a suffix becomes a folder. Raises ConfigurationError when the file exists, or for
     another format's suffix.
     """
     if out is not None and not out.suffix and not out.exists():

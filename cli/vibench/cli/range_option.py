@@ -32,9 +32,9 @@ class Range:
 
 
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
-    """Read ``260``, ``50:600`` or ``50:600:1``; ``parts`` are the allowed numbers of parts.
+    """Read ``260``, ``50:600`` or ``50:600:1``; ``parts`` lists the allowed numbers of parts.
 
-    ``option`` is the name of the option, if it is not that of the parameter.
+    ``option`` is the name of the option if it differs from the parameter's name.
     Raises InvalidRequest for other text.
     """
     try:

@@ -14,5 +14,5 @@ def schema(
         str, typer.Argument(metavar="KIND", help="Kind: campaign, rig, study, map, mapping or specimen.")
     ],
 ) -> None:
-    """Print the JSON Schema (draft 4) of one kind of TOML file; editors use it to check such files."""
+    """Print the JSON Schema (draft 4) of one kind of TOML file; editors use schemas to check files."""
     print_json(json_schema(kind))

@@ -13,7 +13,7 @@ from .output import print_warnings
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
 """Fields that are options of every command with a specimen."""
 AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
-"""Study axes that have a single value in these commands, each with its field of `SpecimenChoice`."""
+"""Study axes with a single value in these commands, each with the field of `SpecimenChoice` for it."""
 SpecimenOption = Annotated[
     str | None, option("Specimen file, or a name listed by `vibench specimen`.", "NAME|FILE.toml")
 ]

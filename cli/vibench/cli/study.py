@@ -88,7 +88,7 @@ class KeptStudies:
         self._failed = 0
 
     def __call__(self, study: Study) -> StudyResults:
-        """Solve the points of a study that its file does not contain; return the results of all points."""
+        """Solve the points that are missing in a study's file; return the results of all points."""
         self._folder.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
         with watch_interrupt() as is_stopped, study_bar(study.grid.size) as observer:

@@ -1,4 +1,4 @@
-"""Player of settings on a fast loop; it measures base and m0 until their standard errors are small."""
+"""Player of settings on a fast loop, which measures base and m0 until their standard errors are small."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ _GLIDE_S = 0.1
 _HIGHEST = 9
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
-"""Largest standard errors at the end of a measurement. Those of the base's fundamental and harmonics are
-relative to the tolerance, that of m0 is relative to m0 itself."""
+"""Largest standard errors at the end of a measurement. For the base's fundamental and harmonics, they are
+relative to the tolerance; for m0, to m0 itself."""
 _ROUGHLY = 0.15
 """Largest standard error of the base, relative to its distance from the level if this distance is large."""
 _DRIFT = 3.0
@@ -68,7 +68,7 @@ class BranchPlayer:
         self._blocks: list[LoopBlock] = []
         """Blocks of coefficients measured at the current setting since the motion settled."""
         self._squares, self._degrees = np.zeros(1), 0.0
-        """Sum of squared deviations of blocks in earlier measurements, and its degrees of freedom."""
+        """Sum of squared deviations of blocks in earlier measurements, and the sum's degrees of freedom."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
         """Return a setting as a program of the controller."""

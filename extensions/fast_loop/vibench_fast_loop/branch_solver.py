@@ -12,7 +12,7 @@ Coefficients = NDArray[np.complex128]
 _LEARNT = 1e-4
 """Smallest change of the unknowns that updates the derivative."""
 _DOUBTED = 0.05
-"""Assumed standard error of the derivative, for its weight against measurement noise."""
+"""Assumed standard error of the derivative, which sets the derivative's weight against measurement noise."""
 _REFERENCE_STEP = 0.15
 """Relative change of the first coefficient that counts as one step along the branch."""
 _RATIO_STEP = 1.0
@@ -188,7 +188,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
 
 
 def _reference(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
-    """Return the newest point far enough from the last point to define a direction, else the first point."""
+    """Return the newest point that is far enough from the last one to define a direction, else the first."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

@@ -129,7 +129,7 @@ def _follow(loop: SineLoop, player: BranchPlayer, solver: BranchSolver) -> Contr
 
 
 def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[MeasuredPoint, int] | None]:
-    """Change the drive until the base has its level; return the first motion and the number of attempts."""
+    """Change the drive until the base has the required level; return first motion and number of attempts."""
     predicted = solver.first()
     unknowns = predicted.unknowns.copy()
     above = player.plan.begin_from == "above"
@@ -220,7 +220,7 @@ def _record(
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:
-    """Return whether the base moves as a sine of its level, accurately enough for a point of the branch."""
+    """Return whether the base moves as a sine of the required level, accurately enough for a branch point."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
 
@@ -241,9 +241,9 @@ _NEVER = 1e-9
 def perturbed_stability(
     player: BranchPlayer, channels: FeedbackChannels, setting: LoopSetting, number: int, before: LoopLook
 ) -> Controller[BranchStabilityNote]:
-    """Play small changes of the drive, then the same with opposite sign; return the note on stability.
+    """Play small changes of the drive, then repeat them with opposite sign; return the note on stability.
 
-    A trial finds the size at which base or m0 changes by the limit of the plan.
+    A trial finds the size of the changes at which base or m0 changes as much as the plan requires.
     """
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz

@@ -65,7 +65,7 @@ class FastLoop:
     def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
         """Return displacements of base and m0 from the first harmonic on [m], shapes (blocks, orders).
 
-        A sample is the mean since the previous sample. This delays it by half a step and attenuates it
+        A sample is the mean since the previous sample, which delays it by half a step and attenuates it
         slightly; both effects are corrected.
         """
         orders, rate_hz = np.arange(1, len(blocks[0].base)), self.plant.timing.rate_hz
@@ -93,7 +93,7 @@ def fast_loop(rig: Rig) -> FastLoop:
 
 
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
-    """Refuse a branch that the loop would not hold according to the model.
+    """Refuse a branch that, according to the model, the loop would not hold.
 
     Raises LimitExceeded with the largest multiplier and the range that would be held, or with the reason why
     they are unknown. Nothing has been played by then.
@@ -165,7 +165,7 @@ _POINTS = 25
 _PERIODS, _WHOLE = range(1, 41), 2e-5
 """Numbers of periods to try until they contain a whole number of samples, and the tolerance for "whole"."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Points per period at which the slope of the spring force is computed, without and with stops."""
+"""Number of points per period for the slope of the spring force, without stops and with stops."""
 _PART_S = 1e-6
 """Longest part of a control step with a constant slope of the stops' force [s]; 1 % of a contact."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)

@@ -138,7 +138,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
 
 
 def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
-    """Return label, points and plot style for each stability if measured, else for each branch direction."""
+    """Return label, points and plot style by stability if it was measured, else by branch direction."""
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):

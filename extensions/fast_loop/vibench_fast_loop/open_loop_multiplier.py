@@ -115,7 +115,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
 
 
 def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
-    """Return the largest multiplier; its error follows from residuals of blocks of periods (delta method)."""
+    """Return the largest multiplier, with an error from residuals of blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]

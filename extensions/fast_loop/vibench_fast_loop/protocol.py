@@ -52,7 +52,7 @@ class LoopFeedback(FrozenModel):
 class LoopProgram(FrozenModel):
     """What a controller plays: a Fourier series plus the output of a feedback law.
 
-    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, where theta is the phase of the controller; it is
+    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, where the controller's phase theta is
     continuous from program to program.
     """
 

@@ -106,7 +106,7 @@ class _Call:
 class EngineLine:
     """Thread without Qt that starts an engine and sends requests; `drain` delivers the answers.
 
-    It sends only requests that the window has just made, so the engine notices if the window freezes.
+    It only sends requests that the window has just made, so the engine notices if the window freezes.
     """
 
     def __init__(self, start: Starter = start_engine) -> None:
@@ -183,10 +183,10 @@ def _ignore(_: object) -> None:
 
 
 CATCH_UP_S = 2.0
-"""Longest stretch of samples fetched from the engine after a pause [s]; older ones are in the file."""
+"""Longest stretch of samples fetched from the engine after a pause [s]; older samples are in the file."""
 
 PIECE_S = 0.2
-"""Duration of samples processed in one pass [s]: four times what arrives between two frames."""
+"""Duration of samples processed in one pass [s]: four times as much as arrives between two frames."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -242,7 +242,7 @@ class Bridge(QObject):
 
     @property
     def engine_pid(self) -> int | None:
-        """Process id of the engine; None without one."""
+        """Process id of the engine; None without an engine."""
         return None if self._line is None else self._line.pid
 
     def tick(self) -> None:

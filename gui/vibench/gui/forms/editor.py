@@ -40,7 +40,7 @@ _LEFT_OPEN = "default"
 
 
 class Choice(QComboBox):
-    """Combo box that ignores the space bar, and the mouse wheel unless it has the focus.
+    """Combo box that ignores the space bar and, unless it has the focus, the mouse wheel.
 
     The space bar freezes the plots of the Run page. F4 and Alt+Down open the list. The width does not depend
     on the longest entry.
@@ -76,7 +76,7 @@ class Choice(QComboBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel without focus, so that scrolling the page changes no value."""
+        """Ignore the mouse wheel unless the box has focus, so that scrolling the page changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:

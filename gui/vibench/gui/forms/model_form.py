@@ -95,7 +95,7 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show complaints at their fields, also in inner models; return all of them with field names.
+        """Show complaints at their fields, inner models included; return all complaints with field names.
 
         A complaint about several fields together is shown with the name of the field changed last.
         """
@@ -143,7 +143,7 @@ class ModelForm(QWidget):
         self._rows[name].explain()
 
     def _explain(self) -> None:
-        """Show values and explanations in the chosen units; text that cannot be read stays as it is."""
+        """Show values and explanations in the chosen units; unreadable text stays as it is."""
         for row in self._rows.values():
             row.explain()
             if row.facts.unit in CHOICES and not row.editor.complaint:

@@ -62,7 +62,7 @@ def unit_of(text: str, unit: str) -> str:
 def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
     """Return the SI value of a text; a comma is a decimal point, and a unit may have a prefix.
 
-    A number without a unit is read in the unit ``shown`` or, if that is empty, in the unit of an empty field.
+    A number without a unit has the unit ``shown`` or, if ``shown`` is empty, the unit of an empty field.
     Raises ConfigurationError when the text is not a number or has another unit.
     """
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
@@ -106,7 +106,7 @@ STEP = 0.05
 
 
 class QuantityEdit(QAbstractSpinBox):
-    """Field for a number in full precision; it may be empty if that is allowed.
+    """Field for a number in full precision; some fields may be empty.
 
     The value changes when typing is finished, not with every key.
     """
@@ -177,7 +177,7 @@ class QuantityEdit(QAbstractSpinBox):
         draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel without focus, so that scrolling the page changes no value."""
+        """Ignore the mouse wheel unless the field has focus, so that scrolling the page changes no value."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:

@@ -45,14 +45,14 @@ class Simulator(QObject):
         return self._job is not None and not self._job.is_over
 
     def begin(self, request: Asked) -> None:
-        """Start a request; an earlier one is cancelled."""
+        """Start a request, and cancel an earlier one."""
         self._drop()
         self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
         self.cancel_button.setEnabled(True)
         self._said("Computing; the first result appears once the program is loaded…")
 
     def cancel(self) -> None:
-        """Cancel the request; results so far stay on the page."""
+        """Cancel the request; the results obtained so far stay on the page."""
         self._drop()
         self._said("Cancelled; the results so far are shown.")
 

@@ -53,7 +53,7 @@ class UserActions(QObject):
         existing: ExistingRecordings = ExistingRecordings.REFUSE,
         attendance: Supervision | None = None,
     ) -> None:
-        """Arm the campaign of the Queue page; recordings go into a folder with its name."""
+        """Arm the campaign of the Queue page; recordings go into a folder named after the campaign."""
         campaign = self._context.selection.campaign
         if campaign is None:
             self._context.warn("There is no campaign.", next_step="Open a campaign on the Queue page.")

@@ -89,7 +89,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         super().__init__(orientation)
         self._blankness = Blankness.WRITTEN
         self.levels: tuple[list[float], ...] = ()
-        """Coordinates of the ticks painted last, those with numbers first."""
+        """Coordinates of the ticks painted last; ticks with numbers come first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._axis = axis

@@ -29,7 +29,7 @@ Range = tuple[float, float]
 
 
 def steady_range(shown: Range, data: Range) -> Range | None:
-    """Return a new range for an axis; None if the data are inside and fill enough of the current one."""
+    """Return a new range for an axis; None if the data are inside the current range and fill enough of it."""
     low, high = data
     size = high - low
     is_inside = shown[0] <= low and high <= shown[1]
@@ -90,7 +90,7 @@ class LegendLine(QLabel):
             self.setAccessibleName("Legend: " + ", ".join(names))
 
     def height_for(self, width: int) -> int:
-        """Return the height of the entries; zero without entries."""
+        """Return the height of all entries; zero if there are none."""
         return self.heightForWidth(width) + 2 * _MARGIN if self.text() else 0
 
 
@@ -301,7 +301,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self._place_legend()
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
-        """Draw the hint on an empty plot, or dim a disabled one."""
+        """Draw the hint on an empty plot, or dim a disabled plot."""
         super().drawForeground(painter, rect)
         # Clearing a curve emits no signal, so look for points again.
         self._look_for_points()

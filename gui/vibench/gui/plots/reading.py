@@ -103,7 +103,7 @@ class Reading:
         self._place_marks()
 
     def rescale(self) -> None:
-        """Draw the mark at its values again, after the axis has changed between linear and logarithmic."""
+        """Redraw the mark at its values after the axis has changed between linear and logarithmic."""
         self.hide()
         self._place_marks()
 

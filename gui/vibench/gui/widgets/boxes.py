@@ -38,7 +38,7 @@ Part = Content | tuple[Content, int] | int
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
-    """Add parts to a box, in order; ``margin`` in pixels, by default that of the style."""
+    """Add parts to a box, in order; ``margin`` is in pixels, by default the style's margin."""
     if margin is not None:
         box.setContentsMargins(margin, margin, margin, margin)
     for part in parts:
@@ -200,7 +200,7 @@ def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) 
 
 
 def plain_lines(text: str) -> str:
-    """Return the text without control characters; line breaks are kept."""
+    """Return the text without control characters other than line breaks."""
     return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 

@@ -137,7 +137,7 @@ class Banner(QFrame):
             self._fit()
 
     def _fit(self) -> None:
-        """Give STOP the width of its longest text, so that it does not move under the pointer."""
+        """Give STOP the width of its longest text, so that the button does not move under the pointer."""
         shown, widths = self._stop.text(), []
         for text in (STOP_TEXT, AT_ONCE_TEXT):
             self._stop.setText(text)

@@ -68,6 +68,6 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
 
 
 def load_ahead() -> None:
-    """Import the modules for the first prediction and its curves, after the window was painted."""
+    """Import the modules for the first prediction and its curves, after the window has been painted."""
     import_module("scipy.signal")
     getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009

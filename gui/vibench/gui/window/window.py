@@ -205,7 +205,7 @@ class Window(QMainWindow):
         self.navigation.show_done({name: page.is_done for name, page in self.pages.items()})
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask before closing during a run; then end the engine and store the layout."""
+        """Ask the user before closing during a run; on closing, end the engine and store the layout."""
         how = self._how_to_close()
         if how is None:
             event.ignore()

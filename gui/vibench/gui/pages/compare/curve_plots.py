@@ -303,7 +303,7 @@ _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """Two lists to choose a curve and its reference; by default the second and the first visible curve."""
+    """Two lists to choose a curve and its reference; by default, the second visible curve and the first."""
 
     changed = Signal()
 

@@ -42,7 +42,7 @@ LOOK_S = 2.0
 CHECK_WAIT_MS = 250
 """Delay from opening a recording to checking its samples against the seal [ms]."""
 PAINTED_MS = 50
-"""Delay before the facts of a recording are shown, so that its plots are painted first [ms]."""
+"""Delay before the facts of a recording are shown, so that the plots are painted first [ms]."""
 
 
 class FilesPage(Page):
@@ -123,7 +123,7 @@ class FilesPage(Page):
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording, even if it is already open; a newly selected row of the table opens its file."""
+        """Open a recording, even if it is already open; selecting a row of the table opens the row's file."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:

@@ -173,7 +173,7 @@ class RecordingTimeHistories(PlotStack):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Delete plots that this recording does not use, if more are kept than allowed."""
+        """Delete plots that this recording does not use if more plots are kept than allowed."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]

@@ -1,4 +1,4 @@
-"""The Maps page: the request on the left; on the right the map, and below it the motion at one point."""
+"""The Maps page: the request on the left; on the right, the map above the motion at one point."""
 
 from collections.abc import Callable
 from functools import partial
@@ -44,7 +44,7 @@ ON_TOP = LineStyle(lambda _theme: "#101010")
 HINT = "Kinds of motion over frequency and amplitude, drawn while computed. Click a point to see its motion."
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
-"""Quantile of the values at which the colour scale ends; the scale begins at one minus this quantile."""
+"""Upper end of the colour scale, as a quantile of the values; the lower end is one minus this quantile."""
 
 
 class MapPlot(QWidget):
@@ -188,7 +188,7 @@ DIGITS = 5
 
 
 class MapsPage(Page):
-    """Page that computes one map at a time; starting another one cancels it."""
+    """Page that computes one map at a time; starting another map cancels the first."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)

@@ -59,7 +59,7 @@ def with_sweep(
 
 
 def remove_entry(campaign: Campaign, number: int) -> Campaign | None:
-    """Return the campaign without one test or sweep; None if none is left."""
+    """Return the campaign without one test or sweep; None if no other is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]

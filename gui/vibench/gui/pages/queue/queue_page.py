@@ -124,7 +124,7 @@ LOOK_MS = 50
 
 
 class QueuePage(Page):
-    """Page that edits the next campaign and shows the one that runs."""
+    """Page that edits the next campaign and shows the running one."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)

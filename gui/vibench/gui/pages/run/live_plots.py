@@ -118,7 +118,7 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""Common time axis; it stands still, because a scrolling axis would be repainted in every frame."""
+"""Common time axis, which stands still because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Smallest and largest number of columns in which a signal is drawn; a column per pixel leaves no gap."""
 UP_EM = 4.0

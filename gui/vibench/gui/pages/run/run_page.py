@@ -215,7 +215,7 @@ class WatchCard(QGroupBox):
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
-        """Show the state of the run; ``averages`` is the planned number in a noise test, else 0."""
+        """Show the state of the run; ``averages`` is the number planned in a noise test, else 0."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
@@ -276,7 +276,7 @@ class ArmCard(QGroupBox):
     cancel_wanted = Signal()
     hold_wanted = Signal()
     news = Signal()
-    """Emitted when another plan was armed; its description must then be shown from the beginning."""
+    """Emitted when another plan was armed, whose description must be shown from the beginning."""
 
     def __init__(self) -> None:
         super().__init__("What will happen")

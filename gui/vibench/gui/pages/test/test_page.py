@@ -557,7 +557,7 @@ class TestPage(Page):
 
 
 def _stored_test(text: str) -> Measurement | None:
-    """Return the test from the settings' text; None if this version does not allow it."""
+    """Return the test from the settings' text; None if this version does not allow the test."""
     try:
         return validate(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):
