@@ -12,11 +12,11 @@ LONGEST_PERIOD = 32
 _TABLE = 2
 """Number of dimensions of an array of Poincaré points: drive periods by coordinates."""
 STEADY = 2e-3
-"""Allowed scatter of a steady motion's points, relative to the orbit; real drives fluctuate by as much."""
+"""Scatter allowed in a steady motion's points, relative to the orbit; real drives fluctuate by this much."""
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25
-"""For periods above one: largest variance of points of equal phase over the variance of all points."""
+"""Largest ratio of the variance at equal phase to the variance of all points, for periods above one."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""
@@ -32,7 +32,7 @@ class Points(Tabular):
     value: Reals
     """Displacement and velocity, each divided by the size of the orbit, shape (periods, 2)."""
     noise: Reals
-    """Standard deviation of the noise of displacement and velocity, divided likewise, shape (2,)."""
+    """Standard deviation of the noise of displacement and velocity, divided by the same sizes, shape (2,)."""
 
     def __post_init__(self) -> None:
         """Raise InvalidRequest for wrong shapes or invalid noise, UnusableData for non-finite points."""
@@ -115,7 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the points' scatter about their mean changes by a tenth or more, even if it is small."""
+    """Return whether the points' scatter about their mean changes by a tenth or more, however small it is."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

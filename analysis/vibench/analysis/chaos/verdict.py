@@ -1,6 +1,6 @@
 """Verdict on a recorded motion: periodic, quasi-periodic, chaotic or undecided.
 
-A chaotic transient may end during a dwell; the part of the record with the last motion is found first.
+A chaotic transient may end during a dwell, so the part of the record with the last motion is found first.
 """
 
 import math
@@ -34,7 +34,7 @@ _EXPLAINED = 0.02
 """Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Largest RMS distance of points from a closed curve, over their spread, even if noise explains more."""
+"""Largest RMS distance of points from a closed curve, relative to their spread, even if noise is larger."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -133,12 +133,12 @@ SLOW = 0.5
 _FEWEST_TURNS = 3.0
 """Minimum number of turns of a closed curve in a record; fewer count as a slow change."""
 _LARGEST_HUM = 0.1
-"""Largest mains hum relative to the orbit; more may be motion at the mains frequency."""
+"""Largest mains hum relative to the orbit; a larger hum may be motion at the mains frequency."""
 _LOW_PERIOD = 4
-"""Longest period that counts as low; mains hum at half the drive frequency causes such periods."""
+"""Longest period that counts as short; mains hum at half the drive frequency causes such periods."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Required distance below the surrogates' mean [standard deviations]; a rank test alone fails once in 40."""
+"""Required distance below the surrogates' mean [standard deviations]; a rank test alone errs once in 40."""
 _ASYMMETRIC = 2.5
 """Minimum `margin` of the time symmetry; noise exceeds it in 4 % of cases (better of two coordinates)."""
 _SURELY = 3.0
@@ -392,7 +392,7 @@ def _verdict(
 
 
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
-    """Return the verdict if linear noise explains the points: periodic if it is small, else undecided."""
+    """Return the verdict if linear noise explains the points: periodic if noise is small, else undecided."""
     if evidence.spread > SMALL:
         return _no_verdict(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (

@@ -86,9 +86,9 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Distance of neighbours over the typical distance, above which the attractor's size limits its growth."""
+"""Ratio of neighbours' distance to the typical one above which the attractor's size limits the growth."""
 _ABOVE_NOISE = 3.0
-"""Minimum ratio of the neighbours' distances in the line fit to the noise."""
+"""Minimum ratio of the neighbours' distance to the noise for a point of the line fit."""
 _SHORTEST_FIT = 3
 """Minimum number of steps for fitting a line to the divergence."""
 _BLOCKS = 10
@@ -278,7 +278,7 @@ class SurrogateTest:
 
     @property
     def p(self) -> float:
-        """Probability that linear noise has a statistic as small as the series (one-sided rank test)."""
+        """Probability that linear noise has as small a statistic as the series (one-sided rank test)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 
@@ -377,7 +377,7 @@ def normal_scores(series: Reals) -> Reals:
 
 
 def _with_matching_ends(series: Reals) -> Reals:
-    """Cut off values so that both ends match; a jump between ends would act like noise in the spectrum."""
+    """Trim a series so that its ends match; a jump between the ends would act like noise in the spectrum."""
     most = max(1, series.size // 10)
     heads = series[:most]
     tails = series[series.size - most :]

@@ -107,7 +107,7 @@ class Curve(Tabular):
 
 
 def sorted_curve(curve: Curve) -> Curve:
-    """Return the curve sorted by frequency, each frequency once (downward sweeps, repeated points)."""
+    """Return the curve sorted by frequency, each frequency once, for downward sweeps and repeated points."""
     frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
         curve,
@@ -146,7 +146,7 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
 
 @dataclass(frozen=True)
 class Reading:
-    """Values of one curve at the markers of frequencies."""
+    """Values of one curve at the frequency markers."""
 
     name: str
     magnitudes: tuple[float, ...]
@@ -171,7 +171,7 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Minimum height of a peak in standard deviations; a thousand points of noise span 6.5 of them."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance in half widths): so near a mode there are at most n peaks, its own included."""
+"""Pairs (n, distance in half widths): within that distance of a mode lie at most n peaks with its own."""
 _CROWD_RISE = 0.3
 """Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01

@@ -65,7 +65,7 @@ class BranchLine(Tabular):
     """Bound on the distance to the true motion, relative to the fundamental of p, shape (n,)."""
     events: tuple[LineEvent, ...]
     periods: int
-    """Drive periods per period of the motion."""
+    """Number of drive periods in one period of the motion."""
     shape: str
     """``"mirrored"`` if the motion is its own mirror image after half its period, else ``"repeated"``."""
     has_twin: bool
@@ -226,7 +226,7 @@ class BranchDiagram(Tabular):
 
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """Flags of the motions on each branch that the bench can hold; None without a bench."""
+        """Flags, for each branch, of the motions that the bench can hold; None without a bench."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 
@@ -253,7 +253,7 @@ class BranchDiagram(Tabular):
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of m0, stable and unstable separately; empty along amplitude."""
+        """Return curves of Response I and II of m0, stable and unstable ones apart; empty along amplitude."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []

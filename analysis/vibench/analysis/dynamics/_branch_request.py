@@ -61,13 +61,13 @@ class BranchRequest(SpecimenChoice):
     """Error of every motion relative to the fundamental of p, 0.01 or "1 %"; 1e-4 by default. Shooting always
     reaches 1e-8; harmonic balance uses as many harmonics as needed."""
     time_s: TargetTime | None = None
-    """Time limit of the search, 20 or "20 s"; the result has the branches found by then."""
+    """Time limit of the search, 20 or "20 s"; the result contains the branches found by then."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of the harmonic balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
     """Number of values in the range at which motions are searched."""
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
-    """Random initial states at each value; more find more isolated branches."""
+    """Number of random initial states at each value; a larger number finds more isolated branches."""
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
     """Longest period to search, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
@@ -77,7 +77,7 @@ class BranchRequest(SpecimenChoice):
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """For a phase resonance: the quantity of m0 that lags the base by a quarter of a period."""
     loop_time_s: PositiveFloat | None = None
-    """Latency of a bench's feedback loop, to report which motions it can hold [s]."""
+    """Latency of the bench's feedback loop [s], to report which motions the bench can hold."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
     """Pairs of frequency [Hz] and base amplitude [m] of a recorded level, instead of one amplitude."""
 

@@ -68,7 +68,7 @@ class ChainRun(Tabular):
     transmission_error: Reals
     """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
     largest_m: Reals
-    """Largest |p| = |y - z| of every cell while observed, shape (cells,)."""
+    """Largest |p| = |y - z| of every cell during the observation, shape (cells,)."""
     impacts: NDArray[np.int64]
     """Number of contacts while observed, shape (cells,)."""
     observed_s: float
@@ -202,7 +202,7 @@ STRETCHES = 400
 """Maximum number of equal parts of a whole run whose RMS is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, it is at most this share of the time simulated before."""
+time was requested, at most this share of the time simulated before."""
 SWEEP_PARTS = 120
 """Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12

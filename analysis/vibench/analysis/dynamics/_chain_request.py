@@ -57,7 +57,7 @@ class ChainRequest(SpecimenChoice):
     exponent_s: NonNegativeFloat = 0.0
     """Averaging time of the largest Lyapunov exponent under a steady sine; 0 for none."""
     accuracy: Accuracy = Accuracy.STANDARD
-    """Accuracy of contacts; flight is exact at every level."""
+    """Accuracy of contacts; flight is exact at every accuracy."""
     error: TargetError | None = None
     """Requested relative error of transmissions under a steady sine, 0.01 or "1 %"; sets accuracy and
     times."""
@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """If an error or time is requested, refuse options that it determines, and all but steady drives."""
+        """Refuse options that a requested error or time determines, and then all but steady drives."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:
@@ -102,7 +102,7 @@ class ChainRequest(SpecimenChoice):
 
     @cached_property
     def unit(self) -> Chain:
-        """Smallest chain that is repeated: the specimen and any `others`."""
+        """Smallest repeating part of the chain: the specimen and any `others`."""
         changed = self.model.strip() or None, self.damping_time_s, self.gap_m
         return Chain((self.chosen_specimen, *(each.specimen(*changed) for each in self.others)))
 

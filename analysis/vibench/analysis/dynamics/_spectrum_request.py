@@ -26,7 +26,7 @@ from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
 LONGEST_S = 1e5
-"""Longest averaging time [s]; longer times would need more than some hundreds of megabytes."""
+"""Longest averaging time [s]; longer times would need more than a few hundred megabytes."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
 """Elastic contact laws, for which the sum of the exponents follows from the dampers."""
 

@@ -62,11 +62,11 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative distance of irregular intervals from multiples of the usual one; their share in coarse times."""
+"""Smallest relative distance of irregular intervals from multiples of the usual one; allowed share."""
 _SINGLE = 0.2
-"""Quantile of the intervals that is one sample interval, even if two in five samples were lost."""
+"""Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 10
-"""Minimum number of differing intervals to recognize rounding; fewer could be regularly lost samples."""
+"""Minimum number of differing intervals to recognize rounding; fewer could be due to regular losses."""
 _ROUNDED_SPREAD = 1.05
 """Largest range of the deviations of rounded times from a line, in units of the last digit."""
 _COARSE_SPREAD = 1.25
@@ -76,7 +76,7 @@ _RISING = 0.9
 _BIN = 512
 """Number of time stamps in a group; only the smallest and the largest deviation of each group are kept."""
 _LEAST_RISING = 64
-"""Minimum number of evenly rising values for a channel not named time to count as times."""
+"""Minimum number of evenly rising values at which a channel not named time counts as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
@@ -92,7 +92,7 @@ _LONGEST_PAUSE = 10
 def stated_times(
     facts: Iterable[tuple[str, Any]], elsewhere: Iterable[tuple[str, Any]] = ()
 ) -> dict[str, Any]:
-    """Return the time fields of a `SourceChannel` from facts in a file: the channel's own facts come first.
+    """Return the time fields of a `SourceChannel` from facts in a file; the channel's own facts prevail.
 
     A fact is a sample rate, an interval, a start, or a unit of these. A name may end with the unit:
     ``"dt_ms"``, ``"Sample rate [kHz]"``. If no fact states a rate, rates stated elsewhere in the file apply.
@@ -155,7 +155,7 @@ def _are_several(value: Any) -> bool:
 
 
 def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return the stated time of a channel's first sample [s]; the channel's own facts come first.
+    """Return the stated time of a channel's first sample [s]; the channel's own facts take precedence.
 
     If the file states a date and an offset, as in NI waveforms, their sum is returned.
     """
@@ -481,7 +481,7 @@ class Alignment:
     remarks: tuple[str, ...]
     """Remarks on the times in the file, and on times that the mapping replaces."""
     is_contradicted: bool
-    """Whether the file's times, replaced by the mapping, show another sample rate or lost samples."""
+    """Whether the file's times, which the mapping replaces, show another sample rate or lost samples."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:

@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Advance to the reading of a date (day or month first) nearest to the last one; False if invalid."""
+        """Read a date in the order (day or month first) nearest to the last date; return False if invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)

@@ -1,4 +1,4 @@
-"""Part of a recording to export, and its metadata for formats without a place for them."""
+"""Part of a recording to export, and its metadata for formats that cannot store them."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -108,7 +108,7 @@ def excerpt(
 
 
 def _sample(place: float) -> int:
-    """Return the index of the nearest sample; -1, outside every recording, for times that are not finite."""
+    """Return the index of the nearest sample; for times that are not finite, -1 (outside every recording)."""
     return round(place) if isfinite(place) else -1
 
 

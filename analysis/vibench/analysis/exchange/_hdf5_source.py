@@ -35,7 +35,7 @@ def open_hdf5_source(path: Path) -> Iterator[Source]:
     CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Files that refer to data in other
     files (external links and storage, virtual datasets) are refused unless external data are allowed.
 
-    Raises UnusableData when it is not HDF5.
+    Raises UnusableData when the file is not HDF5.
     """
     try:
         file = open_hdf5(path, locking=False)

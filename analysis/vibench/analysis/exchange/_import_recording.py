@@ -117,9 +117,9 @@ def _stated_times(mapping: ImportMapping, planned: Sequence[_PlannedPart]) -> It
 FARTHEST = 2.0**62
 """Sample number beyond the end of any file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e30
-"""Allowed range of a channel's largest value; larger values have another byte order than the file states."""
+"""Allowed range of a channel's largest value; values outside it suggest a wrongly stated byte order."""
 NEAR_FULL_SCALE = 0.95
-"""Share of full scale from which a sample counts as overloaded, as during acquisition."""
+"""Share of full scale at and above which a sample counts as overloaded, as during acquisition."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,8 +65,8 @@ def xarray_dataset(
     """Return channels in physical units over ``time`` [s since the first sample], in memory.
 
     Lost samples are NaN. ``segment`` is the segment number of each sample, -1 between segments; the attribute
-    ``segments_json`` describes the segments. Open a finished file that is larger than memory directly:
-    ``xarray.open_dataset(path, engine="h5netcdf")``.
+    ``segments_json`` describes the segments. A finished file that is larger than memory can be opened
+    directly: ``xarray.open_dataset(path, engine="h5netcdf")``.
 
     Raises InvalidRequest when xarray is not installed, or the stretch is outside the recording; UnusableData
     when the recording was changed after it was sealed.

@@ -216,7 +216,7 @@ def open_mat(path: Path) -> Iterator[Source]:
 
 
 def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the values of a struct and of all structs in it, with their names."""
+    """Yield the values of a struct, and of all structs inside the struct, with their names."""
     for name, value in struct.items():
         yield from _all_facts(value) if isinstance(value, dict) else ((name, value),)
 

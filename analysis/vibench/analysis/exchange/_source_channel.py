@@ -30,7 +30,7 @@ SECONDS = {
     **dict.fromkeys(("h", "hour", "hours", "stunden"), 3600.0),
     **dict.fromkeys(("d", "day", "days", "tage"), 86400.0),
 }
-"""Length in seconds of each unit of time; upper and lower case are equal."""
+"""Length in seconds of each unit of time; case is ignored."""
 
 
 def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, float] | None:
@@ -61,7 +61,7 @@ _SCALE = re.compile(
 
 
 MOST_CHANNELS = 64
-"""Maximum number of values of one fact for the channels of a table; larger arrays are samples."""
+"""Maximum number of values of a fact, one per channel of a table; larger arrays are samples."""
 _COUNT_SCALE = re.compile(
     rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
 )
@@ -70,7 +70,7 @@ _COUNT_SCALE = re.compile(
 def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = "") -> str:
     """Return the stated unit, or the unit at ``place`` in a list of units; empty if not stated.
 
-    ``LABEL_unit`` is only the unit of the channel with that label. Several units are joined by "or".
+    ``LABEL_unit`` is the unit of the channel with that label only. Several units are joined by "or".
     """
     own = re.compile(rf"{re.escape(label)}[ _.-]?units?", re.I)
     named = [(name, value) for name, value in facts if label and own.fullmatch(name)]
@@ -104,7 +104,7 @@ def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -
 
 
 def exact_step(dtype: np.dtype[Any]) -> float | None:
-    """Return the step of integers that can be stored exactly; None for other numbers."""
+    """Return the step between integers that can be stored exactly; None for other numbers."""
     return 1.0 if dtype.itemsize <= EXACT_KINDS.get(dtype.kind, 0) else None
 
 
@@ -127,9 +127,9 @@ class SourceChannel:
     origin: Origin | None = None
     """Whether the channel was measured or simulated; None if unknown."""
     full_scale: float | None = None
-    """Largest value of the file format, if it is the range of the converter."""
+    """Largest value of the file format, if this is also the range of the converter."""
     rate_bounds_hz: tuple[float, float] | None = None
-    """Bounds of the sample rate, if the times have few digits [Hz]."""
+    """Bounds of the sample rate [Hz], if the times have few digits."""
     start_s: float | None = None
     """Time of the first sample on the common clock of the file [s]."""
     start_error_s: float = 0.0
@@ -175,7 +175,7 @@ class Source:
 
     readers: Mapping[SourceChannel, Read]
     are_in_order: bool = True
-    """Whether channels have the order of the file; HDF5 sorts them by name."""
+    """Whether the channels are in the order of the file; HDF5 sorts them by name."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:

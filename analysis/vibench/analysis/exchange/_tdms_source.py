@@ -31,7 +31,7 @@ START_ERROR_S = 1e-6
 def open_tdms(path: Path) -> Iterator[Source]:
     """Open a TDMS file; channels are named ``"group/channel"`` and scaled as the file states.
 
-    Raises InvalidRequest when npTDMS is not installed, and UnusableData when it is not TDMS.
+    Raises InvalidRequest when npTDMS is not installed, and UnusableData when the file is not TDMS.
     """
     try:
         import nptdms.log  # noqa: PLC0415 - an optional extra
@@ -52,7 +52,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep the properties stated in each segment, by sample; npTDMS keeps only the last ones."""
+            """Keep each segment's properties, keyed by sample; npTDMS keeps only the last ones."""
 
             def _update_object_metadata(self, segment: Any) -> None:
                 self._before = {path: each.num_values for path, each in self.object_metadata.items()}

@@ -1,8 +1,8 @@
 """Universal File Format: samples as dataset 58 in binary form, with units as dataset 164.
 
 Layout: SDRC universal dataset 58, "Function at Nodal DOF", and its binary variant 58b (Structural Dynamics
-Research Laboratory, University of Cincinnati). Its time increment has five decimals, an error of 0.5 ms after
-200 s at 51.2 kHz. ID line 5 therefore contains the exact rate.
+Research Laboratory, University of Cincinnati). The time increment has five decimals, which means an error of
+0.5 ms after 200 s at 51.2 kHz. ID line 5 therefore contains the exact rate.
 
 The reader takes time responses from datasets 58, text or binary, such as those of Polytec's software. The
 mapping must give the sample rate. The number of binary samples is taken from the header, because the end of a
@@ -81,7 +81,7 @@ SI_UNITS = (
 ).replace("E+", "D+")
 """Dataset 164: units code 1 (SI), absolute temperature, factors to SI and offset of the Celsius scale."""
 SCALAR = 0
-"""Direction of the response: none, because recordings do not contain it."""
+"""Direction of the response: none, because recordings do not state one."""
 
 
 def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
@@ -134,7 +134,7 @@ def date_line(started_utc: str) -> str:
 HEADER_LINES = 11
 UNITS = "164"
 LENGTHS = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "in"}
-"""Unit of length, keyed by the number of these units per metre (dataset 164)."""
+"""Unit of length, keyed by the number of units per metre (dataset 164)."""
 MOTIONS = {8: "m", 11: "m/s", 12: "m/s2"}
 """Units of displacement, velocity and acceleration, keyed by data type."""
 LEAST_TEXT = 2
@@ -159,7 +159,7 @@ class _Body:
     count: int
     kind: int
     order: str
-    """``"<"`` or ``">"`` for binary numbers, empty for text."""
+    """Byte order ``"<"`` or ``">"`` of binary numbers; empty for text."""
 
     def reader(self, path: Path, name: str) -> Read:
         """Return the function that reads the numbers; text is parsed once and kept in memory."""
@@ -466,7 +466,7 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 
 
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
-    """Return a first frequency and a spacing that divides it, with six digits; zeros if none is found.
+    """Return a first frequency and a spacing that divides it, with six digits; zeros if there are none.
 
     pyEMA and sdypy-EMA compute the number of lines below the first; a rounding error would add a line.
     """
@@ -486,7 +486,7 @@ def _last_digit(value: float) -> float:
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
-    """Return the lines of record 12; unevenly spaced ones include their frequencies."""
+    """Return the lines of record 12; with uneven spacing, they include the frequencies."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     columns = [[f"{value:20.11E}" for value in part] for part in parts]
     if frequency_hz is not None:

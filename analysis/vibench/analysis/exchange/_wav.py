@@ -66,7 +66,7 @@ ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """Byte orders of the sizes; RF64 files above 4 GiB store sizes elsewhere and are not read."""
 FIRST_CHUNK = 12
 FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
-"""Sizes of a format chunk, and of one that states how many bits of a sample are used."""
+"""Size of a format chunk, and of a format chunk that states how many bits of a sample are used."""
 UNKNOWN_SIZE = 2**32 - 1
 """Size field of a streamed file, whose size was unknown when it was written."""
 
@@ -75,7 +75,7 @@ UNKNOWN_SIZE = 2**32 - 1
 def open_wav(path: Path) -> Iterator[Source]:
     """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped except for 24 bits.
 
-    Raises ValueError when it is not WAV, compressed or truncated.
+    Raises ValueError when the file is not WAV, or is compressed or truncated.
     """
     bits = _valid_bits(path)
     rate, data = _read(path)

@@ -24,7 +24,7 @@ from .stepped_sine import tracked_caption
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
-"""Margin around the points relative to their range, so that no point is on the frame."""
+"""Margin around the points, relative to their range, so that no point lies on the frame."""
 _MOST_MARKS = 5
 """Maximum number of tick intervals on the backbone's frequency axis; labels such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
@@ -140,7 +140,7 @@ def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> Non
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
 ) -> Reals | None:
-    """Return m0's simulated amplitude at each level; None unless it can be assigned to every level."""
+    """Return m0's simulated amplitude at each level; None unless every level has one."""
     if overlay is None or overlay.response.left_out or analysis.response.left_out:
         return None
     if not levels[0].is_fundamental:

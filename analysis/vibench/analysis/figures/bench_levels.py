@@ -41,7 +41,7 @@ def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
 
 
 def bench_levels_caption(facts: RecordingFacts) -> str:
-    """Return the caption with the peak of each channel, also relative to the input range."""
+    """Return the caption with the peak of each channel, in its unit and relative to the input range."""
     parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
     return f"Extremes of every channel, including ramps and waits. Peaks: {', '.join(parts)}."
 

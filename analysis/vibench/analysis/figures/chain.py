@@ -13,9 +13,9 @@ from ..tables import Table, table
 from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
-"""Height of the figure without runs, and with runs [in]."""
+"""Height [in] of the figure without runs and with runs."""
 _SMALLEST = 1e-8
-"""Smallest drawn transmission; smaller values are drawn at this value."""
+"""Smallest transmission drawn; smaller values are drawn at this value."""
 _DECADES = 4.0
 """Number of decades shown below the largest motion."""
 _NOTHING = 1e-300

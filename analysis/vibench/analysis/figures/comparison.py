@@ -26,7 +26,7 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
 }
 """Line styles by origin: the first for transmission and Response I, the second for Response II."""
 _LONE = 1
-"""Maximum number of points of a curve that is drawn as a marker."""
+"""Maximum number of points of a curve that is drawn with markers."""
 _SINGLE_BAND = 0.2
 
 

@@ -48,7 +48,7 @@ def map_figure(
     results
         Results of a map, which may still be incomplete.
     shown
-        Quantity of `SHOWN` to draw below the kinds of motion. By default Response I; for a basin map, the
+        Quantity of `SHOWN` to draw below the kinds of motion. The default is Response I; for a basin map, the
         simulated time from each initial state.
     diagram
         Branches to draw into a diagram along one quantity.

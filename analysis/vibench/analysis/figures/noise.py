@@ -113,7 +113,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
 
 
 def _percent(share: float) -> str:
-    """Return a percentage with two digits, without powers of ten; in chaos it often exceeds 100 %."""
+    """Return a percentage with two digits, without powers of ten; in chaos, it often exceeds 100 %."""
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 
@@ -190,7 +190,7 @@ _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
 """Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""The frequency axis contains all spectral lines above this share of the largest (-14 dB)."""
+"""Share of the largest spectral line above which the frequency axis contains all lines (-14 dB)."""
 _EXCITATION_COLUMNS = 2000
 
 

@@ -50,15 +50,15 @@ LINEAR_CURVE: Mapping[str, Any] = {
 }
 
 WIDTH_IN = 7.2
-"""Width of figures that fits A4 text and a column of a report [in]."""
+"""Width of figures [in] that fits the text of an A4 page and a column of a report."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Relative margin at both ends of a frequency axis; measured frequencies are a few ppm off round numbers."""
+"""Relative margin at both ends of a frequency axis; measured frequencies miss round values by ppm."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratios of the ends of a frequency axis: below the first, linear; below the second, ticks at 3 and 7."""
+"""Ratios of the ends of a frequency axis: linear below the first, with ticks at 3 and 7 below the second."""
 _FEW_DECADES = (1.5, 0.5)
-"""Axes of fewer decades than these have labels at some, or all, ticks between powers of ten."""
+"""Numbers of decades below which some, or all, ticks between powers of ten have labels."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -100,7 +100,7 @@ def figure_style() -> Iterator[None]:
 
 
 def plain_label(name: str) -> str:
-    """Return a text, escaped so that Matplotlib shows it unchanged even with dollar signs."""
+    """Escape a text so that Matplotlib shows it unchanged, even with dollar signs."""
     return printable(name).replace("$", r"\$")
 
 

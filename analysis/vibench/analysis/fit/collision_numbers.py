@@ -38,7 +38,7 @@ _JUDGED = (
     Hidden.EXPONENT,
     Hidden.LOSS,
 )
-"""Parameters whose described values are checked against the collisions."""
+"""Parameters whose described values are checked against values from the collisions."""
 _SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
 
 
@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Parameters that differ from the described value by more than their bounds' width, worst first."""
+        """Parameters that differ from the described value by more than their bounds are wide, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.determined

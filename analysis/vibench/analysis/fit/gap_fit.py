@@ -21,9 +21,9 @@ from .specimen_fit import SpecimenFit
 _M0, _RELATIVE = 0, 3
 """Columns of m0 and p in `base_transmissibility`."""
 _MOST_APART = 0.03
-"""Largest logarithmic ratio of measured to linear motion of m0; smooth motion with contact differs more."""
+"""Largest |ln| of the ratio of measured to linear motion of m0; smooth motion with contact differs more."""
 _STEP_HZ = 0.02
-"""Frequency step for the curvature of the transmissibility, 1 % of the narrowest resonance [Hz]."""
+"""Frequency step [Hz] for the curvature of the transmissibility: 1 % of the narrowest resonance."""
 _STEP = 1e-4
 """Logarithmic step for derivatives of the relative motion with respect to the linear parameters."""
 _EDGE_POINTS = 41
@@ -65,7 +65,7 @@ def fit_gap(sweeps: Sequence[SweepAnalysis], linear: Specimen, fit: SpecimenFit 
     sweeps
         Measured sweeps; the onset is the edge at which a sweep enters its first colliding region.
     linear
-        Specimen for the linear motion; its own gap is only the nominal value of the result.
+        Specimen for the linear motion; its own gap serves only as the nominal value of the result.
     fit
         Fit of the linear specimen, for its covariance.
     """
@@ -142,7 +142,7 @@ def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate
 _SAME_HZ = 0.5
 """Dwells closer than this [Hz] have the same frequency."""
 _OVERSHOOT = 1.5
-"""Largest p in the staircase of a ramp, relative to steady motion; usually below 1.2."""
+"""Largest p during the steps of a ramp, relative to steady motion; usually below 1.2."""
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
@@ -162,10 +162,10 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
     """Yield the onset at every frequency that has dwells with and without collisions.
 
-    The lower bound is the largest relative motion without collisions, where m0 moves as predicted: masses may
-    also collide smoothly. The upper bound is the smallest linear motion with collisions, that cannot persist
-    from a higher level or another frequency. As collisions disturb the base, this linear motion is scaled
-    from the largest dwell without collisions, in proportion to the generator amplitude.
+    The lower bound is the largest relative motion without collisions at which m0 moves as predicted, as
+    masses may also collide smoothly. The upper bound is the smallest linear motion with collisions that
+    cannot persist from a higher level or another frequency. As collisions disturb the base, this linear
+    motion is scaled from the largest dwell without collisions, in proportion to the generator amplitude.
     """
     rest = list(dwells)
     while rest:

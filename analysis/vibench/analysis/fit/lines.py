@@ -17,12 +17,12 @@ from ..signals.window import line_correlation
 from .parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
-"""Smallest relative scatter assumed for a spectral line; calibrations and clocks are not more exact."""
+"""Smallest relative scatter assumed for a spectral line; calibrations and clocks are no more accurate."""
 _LEAST_CLEAR = 10.0
-"""Smallest ratio of a line's magnitude to the median scatter nearby, for a normal ln(magnitude).
+"""Smallest ratio of a line's magnitude to the median scatter nearby, so that ln(magnitude) is normal.
 
-The line's own scatter is estimated from few averages. It would select lines whose scatter is small by chance,
-so that a correct model would be refused.
+The line's own scatter is estimated from few averages. Using it would select lines whose scatter is small by
+chance, and refuse a correct model.
 """
 _NEIGHBOURS = 31
 """Number of neighbouring spectral lines for the median scatter."""
@@ -41,7 +41,7 @@ _STEP = 1e-6
 _HOPELESS = 5.0
 """Multiple of the chi square limit above which no weighting of lines can make a fit valid."""
 _MOST_STEPS = 60
-"""Maximum number of evaluations of a fit; if the data show no further mode, its fit has no optimum."""
+"""Maximum number of evaluations of a fit; the fit of a further mode that the data lack has no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""
@@ -90,7 +90,7 @@ class LineFit:
     covariance: Reals
     """Covariance of the parameters' logarithms, for a correct model."""
     freedoms: Reals
-    """Degrees of freedom of the uncertainty of each parameter; few if few lines determine this parameter."""
+    """Degrees of freedom of each parameter's uncertainty; few if only few lines determine the parameter."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -98,7 +98,7 @@ class LineFit:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines, and settings of a fit that determines parameters (logarithms), channel phases, and a scale."""
+    """Lines and settings of a fit for parameters (as logarithms), channel phases and a scale."""
 
     frequency_hz: Reals
     measured: Complexes
@@ -162,7 +162,7 @@ class Lines:
         return np.asarray(magnitudes**2 + phases**2)
 
     def students(self, residuals: Reals) -> Reals:
-        """Return residuals whose squares follow chi square although the scatter is estimated."""
+        """Return residuals whose squares follow chi square even though the scatter is estimated."""
         count, squared = 2 * self.frequency_hz.size, self.misfit(residuals)
         factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
         return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])

@@ -50,7 +50,7 @@ class SpecimenFit(Tabular):
     """Assumptions whose change would explain a misfit, the most likely first."""
     confidence: float
     phase_rad: tuple[float, float]
-    """Phases of the channels at 100 Hz: of a high pass (proportional to 1 / f) and of a delay (to f)."""
+    """Channel phases at 100 Hz due to a high pass (proportional to 1 / f) and a delay (proportional to f)."""
 
     @property
     def fits(self) -> bool:
@@ -87,13 +87,13 @@ def fit_specimen(
     square exceeds the value that a correct model exceeds once in a thousand times. A refused fit has no
     values but a ranking of assumptions that may be wrong.
 
-    Raises InvalidRequest when nothing is free, or for parameters that no linear transmission determines
+    Raises InvalidRequest when no parameter is free, or for parameters that no linear transmission determines
     (gap, more than one mass), and NotEnoughData for too few significant lines.
 
     Parameters
     ----------
     frequency_response
-        Displacement over displacement, delays removed.
+        Ratio of displacements, with delays removed.
     nominal
         Start of the search, and values of all parameters that are not free.
     free
@@ -142,7 +142,7 @@ def not_linear(nominal: Specimen, sentence: str) -> SpecimenFit:
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance due to the clock's error, which scales all frequencies, and times inversely."""
+    """Return the covariance due to the clock error, which scales frequencies, and times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

@@ -35,7 +35,7 @@ _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
 """Number of principal components of the statistics in which the observed statistics are checked."""
 _FAR = 1.05
-"""Largest distance of the observed statistics, relative to the furthest run, at which the model fits.
+"""Largest distance of the observed statistics, relative to the furthest run, for a model that fits.
 
 A correct model exceeds the furthest of n runs at most once in n + 1 times. The margin allows for small
 differences between rig and recording.
@@ -55,7 +55,7 @@ class Posterior:
     draws: Reals
     """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics from the furthest run; infinite with bounds outside of a range."""
+    """Distance of the observed statistics relative to the furthest run; infinite if bounds leave a range."""
 
     @property
     def fits(self) -> bool:
@@ -130,7 +130,7 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     """Return the distance of the observed statistics from the model, relative to the furthest run.
 
     The effect of the fitted parameters is removed. The remainder is measured along its largest components and
-    outside of them. Each run is compared only with the other runs; including itself would shorten its
+    outside of them. Each run is compared only with the other runs; including the run itself would shorten its
     distance.
 
     Parameters
@@ -170,7 +170,7 @@ def _distances(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals)
 _SEGMENT_S = 0.1
 _LOWEST_HZ, _HIGHEST_HZ = 40.0, 12_000.0
 _HIGHEST_PART = 0.4
-"""Highest evaluated frequency as a share of the sample rate, within the converter's pass band."""
+"""Highest evaluated frequency as a share of the sample rate; it is within the converter's pass band."""
 _BANDS = 18
 _ABOVE_NOISE = 4.0
 _COHERENT_HZ = 1_000.0
@@ -183,8 +183,8 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     """Return statistics of a stretch of irregular motion, shape (statistics,).
 
     Statistics are the logarithmic band powers of base acceleration and m0's velocity, and their coherence per
-    band. Others are spread, skewness and tails of m0's velocity and displacement, and for a sine drive the
-    harmonics. Even harmonics distinguish the two stops.
+    band. Further statistics are spread, skewness and tails of m0's velocity and displacement, and for a sine
+    drive the harmonics. Even harmonics distinguish the two stops.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
 """Search range as factors; the gaps are expressed by geometric mean and sqrt(upper / lower)."""
 _WIDEST = 0.5
-"""Width of bounds relative to the search range; with wider bounds a parameter is undetermined."""
+"""Largest width of bounds relative to the search range; wider bounds leave a parameter undetermined."""
 _LIKELY = 2.0
 """Largest allowed ratio between the rms base accelerations of the recording and of the first run."""
 _LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0

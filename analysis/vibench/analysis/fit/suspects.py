@@ -1,4 +1,4 @@
-"""Find wrong assumptions of a model that does not fit, by a fit without each assumption in turn."""
+"""Find wrong assumptions of a model that does not fit, by dropping each assumption in turn."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _MODE_START = (float(np.log(0.02)), float(np.log(0.01)))
 
 
 class Assumption(StrEnum):
-    """Assumption of the model on specimen, sensors or rig."""
+    """Assumption of the model about specimen, sensors or rig."""
 
     M0 = "m0"
     M1 = "m1"

@@ -29,7 +29,7 @@ from .specimen_fit import SpecimenFit, fit_specimen, not_linear
 from .suspects import Assumption, Suspect
 
 _SURELY = 3.3
-"""Number of standard deviations that one correct description in a thousand exceeds."""
+"""Deviation [standard deviations] that one correct description in a thousand exceeds."""
 _LARGEST_SCATTER = 100.0
 """Largest ratio of variance about a linear response to variance in silence; light collisions exceed 1000."""
 _WEAKER = "so masses may collide or rub; measure weaker noise"
@@ -126,13 +126,13 @@ class UpdatedSpecimen(Tabular):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Assumptions that recordings contradict; the most likely first for each source."""
+        """Assumptions that recordings contradict; for each source, the most likely first."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit; remove its values if its overlay in ``results`` disagrees with the fitted noise."""
+        """Return the fit, without values if its overlay in ``results`` disagrees with the fitted noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]

@@ -37,7 +37,7 @@ class Distortion(Tabular):
 
 
 def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
-    """Return noise and distortion of a periodic transmission.
+    """Return noise and distortion of a transmission from periodic noise.
 
     Undriven lines also show the nonlinearity of amplifier and shaker, not only that of the specimen.
     """

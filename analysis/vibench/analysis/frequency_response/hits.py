@@ -17,7 +17,7 @@ _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
 """Usual length [s] and minimum number of the pieces of the drive whose energies are compared."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""Hits have at least 0.9 of the drive's energy in the strongest 0.05 of the time; Gaussian noise has 0.06."""
+"""Hits have at least 0.9 of the energy in the strongest 0.05 of the time; Gaussian noise has 0.06 of it."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
@@ -29,7 +29,7 @@ _PARTS = 20
 _NOTHING = 1e-300
 EXPONENTIAL = "exponential"
 _ASSUMED_SD = 0.01
-"""Scatter assumed for weights of a single hit's lines, relative to each line and to the largest line."""
+"""Scatter assumed to weight the lines of a single hit, relative to each line and to the largest line."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ def find_hits(
 ) -> Hits | None:
     """Return the segments of the hits in the drive; None if the drive does not consist of hits.
 
-    Pulses within a period of the lowest frequency count as one hit. By default, the segment length is chosen
-    to keep the most recorded time from at least two hits.
+    Pulses within a period of the lowest frequency count as one hit. The default segment length keeps as much
+    recorded time as possible from at least two hits.
 
     Raises NotEnoughData when no hit has a segment of the given length.
 
@@ -174,7 +174,7 @@ def hit_spectra(
 
 
 def with_assumed_scatter(response: FrequencyResponse) -> FrequencyResponse:
-    """Return the response to a single hit with an assumed scatter, for a fit without bounds."""
+    """Return a single hit's response with an assumed scatter, for a fit without bounds."""
     # Assume equal noise on all lines of the velocity, and in addition an equal relative error.
     size = response.magnitude / response.frequency_hz
     assumed = _ASSUMED_SD * np.hypot(1.0, np.max(size) / np.maximum(size, _NOTHING))

@@ -91,7 +91,7 @@ _PROXY_SAMPLES = 1024
 _FAR_LINES = 12
 """Distance in spectral lines beyond which errors under cosine windows are uncorrelated."""
 _NEAR = 0.05
-"""|q| of an integral of exp(q t), below which a series is more accurate than the closed form."""
+"""Value of |q| below which a series for integrals of exp(q t) is more accurate than the closed form."""
 _LEAST_NOISE = 0.02
 """Minimum share of sensor noise in a line's variance, since ringing alone may give a singular matrix."""
 
@@ -226,12 +226,12 @@ _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
 """Maximum number of steps of a fit."""
 _STEADY_AVERAGES = 49.0
-"""Equivalent number of averages of a scatter smoothed over neighbouring spectral lines."""
+"""Equivalent number of averages of a scatter that is smoothed over neighbouring spectral lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
-"""Distance in half-power bandwidths below which the bounds of two modes allow for a third between them."""
+"""Distance [half-power bandwidths] below which the bounds of two modes allow for a third between the two."""
 _EDGE = 1e-3
-"""Distance to a bound, relative to the reach, below which a fit has found no minimum."""
+"""Distance from a bound, relative to the search reach, below which a fit has found no minimum."""
 
 
 class Lines:
@@ -341,7 +341,7 @@ class ModalFit:
 
 
 class _Sums:
-    """Linear fit of modes and a background to lines, with real factors, for given poles."""
+    """Linear fit of modes and a background to spectral lines, for given poles and with real factors."""
 
     def __init__(self, lines: Lines, background: Background) -> None:
         self._lines = lines
@@ -365,7 +365,7 @@ class _Sums:
         return self._lines.independent(_rates(self._lines.modes, poles, factors))
 
     def misfit(self, poles: Reals) -> Reals:
-        """Return the residual of the best factors for these poles."""
+        """Return the residual with the best factors for these poles."""
         return self.factors(poles)[1]
 
     def misfit_rates(self, poles: Reals) -> Reals:

@@ -36,14 +36,14 @@ from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
-"""Two results: the transmission, and a slower function that returns all results, such as resonances."""
+"""Pair of the transmission and a slower function that returns all results, such as resonances."""
 _BLOCK = 1 << 19
 """Number of samples read at once."""
 _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Median difference of two estimators that counts as bias, in standard deviations of the median."""
+"""Median difference of two estimators above which it counts as bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
 """Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
 
@@ -60,7 +60,7 @@ class NoiseResponse(Tabular):
     )
 
     frequency_response: FrequencyResponse
-    """Requested estimate of the transmission; the default, referenced to the drive, is unbiased."""
+    """Requested estimate of the transmission; the default is referenced to the drive and unbiased."""
     h1: FrequencyResponse
     h2: FrequencyResponse
     resonances: tuple[Resonance, ...]
@@ -72,7 +72,7 @@ class NoiseResponse(Tabular):
     used_s: float
     """Total duration of the averaged data [s]."""
     left_out: int
-    """Number of realisations or segments that are incomplete or have lost or overloaded samples."""
+    """Number of realisations or segments that are incomplete or contain lost or overloaded samples."""
     lost_samples: int
     """Number of samples lost during the noise."""
     overloaded_samples: int
@@ -109,8 +109,8 @@ def repeated_response(
     channels, noise, request
         Record, excitation and request.
     repetitions
-        Period of every realisation, if known from the same drive; measured by default. If given, as for
-        simulated records, the scatter of resonances among realisations is not computed.
+        Period of every realisation, if known from the same drive; measured by default. With given periods, as
+        for simulated records, the scatter of resonances among realisations is not computed.
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -404,7 +404,7 @@ _QUIET_BLOCKS = 200
 
 
 def scatter_over_silence(channels: Channels, noise: Noise, found: NoiseResponse) -> float:
-    """Return the variance about the linear response, relative to that in silence, as the median of the lines.
+    """Return the variance about the linear response, relative to silence, as the median over the lines.
 
     NaN for hits. Chaos scatters equally between periods and between realisations, so only silence reveals it.
     Recordings start or end in silence (no drive); without silence, the ratio is too small.

@@ -51,7 +51,7 @@ class Repetition:
 def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetition:
     """Measure the true period of a recorded drive from the phase advance of its lines per period.
 
-    Weighted least squares of the phases of driven lines over the periods, repeated until it converges. The
+    Weighted least squares of the phases of driven lines over the periods, repeated until convergence. The
     first pass uses only low lines, whose phase changes by less than a quarter turn at 200 ppm. Raises
     NotEnoughData for fewer than two periods, and UnusableData when the drive is silent or does not repeat.
     """
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Largest deviation of a line for a drift over that of the median line; applies if above `_SMALL`."""
+"""Largest ratio of a line's deviation to the median for use in a drift; applies above `_SMALL` only."""
 
 
 class Scatter(StrEnum):
@@ -321,7 +321,7 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Minimum share of the scatter that changes common to all spectral lines must explain."""
+"""Minimum share of the scatter that must be explained by changes common to all spectral lines."""
 _BEYOND_CHANCE = 1.25
 """Minimum ratio of the explained share to the largest share expected for independent spectral lines."""
 

@@ -22,7 +22,7 @@ from .modal_fit import (
 from .results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
-"""Distance from the peak, in half-power bandwidths, of the spectral lines used in its fit."""
+"""Largest distance from a peak [half-power bandwidths] at which spectral lines are used in its fit."""
 _LEAST_LINES = 8
 """Minimum number of lines for a fit: 8 complex values determine 2 pole and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
@@ -39,7 +39,7 @@ _REACH_DAMPING = 4.0
 _USUAL_HZ = 300.0
 """Reference frequency that scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""Accept an unresolved peak only if its line or damping is known to 10 %; otherwise it may be a ripple."""
+"""Largest relative uncertainty of the line or damping of an unresolved peak; others may be ripples."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Degrees of the background, tried in turn; near broad peaks a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE

@@ -94,7 +94,7 @@ class FrequencyResponse(Tabular):
     coherence_significance: float
     """Coherence that independent noises exceed with probability 1 - ``settings.confidence``."""
     resolution_hz: float
-    """Noise bandwidth of a line, which smears finer features; zero for exactly periodic drive."""
+    """Noise bandwidth of a line, which smears finer features; zero for an exactly periodic drive."""
     segments_used: int
     segments_excluded: int
     settings: FrequencyResponseSettings

@@ -14,7 +14,7 @@ from ..signals.confidence import magnitude_bounds, phase_half_width
 from .noise_response import NoiseAnalysis
 
 _SAME = 0.03
-"""Relative difference of frequencies up to which resonances at two points are the same."""
+"""Relative frequency difference up to which resonances at two points count as the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Scan:
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """Node number of each point; its position in the scan if an imported recording has no number."""
+        """Node number of each point, or the position in the scan if an imported recording has no number."""
         return tuple(each.node or place for place, each in enumerate(self.points, start=1))
 
     @property

@@ -21,7 +21,7 @@ _FEWEST_FREEDOM = 4.0
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
-"""Minimum variance or shape relative to the mean of its neighbours."""
+"""Minimum of a variance or a shape, relative to the mean of its neighbours."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
@@ -155,7 +155,7 @@ def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: f
     """Return the relative standard deviation of the drive-referenced estimate.
 
     Var(H) = S_vv S_rr / (n |S_rx|^2) with the residual v = y - H x (instrumental variables; Wellstead 1981,
-    Automatica 17, 669-673). ln(magnitude) and phase have half of it each.
+    Automatica 17, 669-673). ln(magnitude) and phase each have half of this variance.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def transmissibility(
     Raises
     ------
     InvalidRequest
-        For an unknown name, hv without its noise ratio, or drive without its reference.
+        For an unknown name, ``"hv"`` without ``noise_ratio``, or ``"drive"`` without ``reference``.
     NotEnoughData
         For fewer than two valid segments.
     UnusableData

@@ -29,7 +29,7 @@ from ._tracking import acquire
 from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m, step_tables
 
 _WANDER = 0.02
-"""Random walk of parameters per block over their prior sd; prevents overconfidence of the filter."""
+"""Random walk of parameters per block, relative to their prior sd; avoids overconfidence of the filter."""
 REBUILT_S = 0.05
 """Interval after which the tables are updated to the current parameters [s]."""
 _LOST = (

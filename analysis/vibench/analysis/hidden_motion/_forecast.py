@@ -21,7 +21,7 @@ _YIELDING = (X, VX, W)
 _BIN_S = 1e-3
 _WITHIN = 0.68
 _FEWEST, _MOST = 5, 40
-"""Smallest and largest number of newest forecasts from which the forecast error is found."""
+"""Smallest and largest number of recent forecasts from which the forecast error is found."""
 _NOT_MEASURED = 1e30
 """Variance assigned to a missing sample."""
 
@@ -88,7 +88,7 @@ class Forecaster:
         return np.asarray(np.repeat(np.maximum.accumulate(usual), self._bin))
 
     def compare(self, first: int, p: Reals) -> None:
-        """Compare forecasts with the tracked ``p`` from sample ``first`` on, NaN where the track was lost."""
+        """Compare forecasts with the tracked ``p`` from sample ``first`` on; ``p`` is NaN without a track."""
         while self._pending and self._pending[0][0] + self._count <= first + p.size:
             begin, forecast = self._pending.popleft()
             if begin < first:

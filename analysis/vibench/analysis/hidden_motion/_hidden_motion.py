@@ -43,7 +43,7 @@ _ALLOWED = 0.02
 _MOST_EXPECTED = 0.2
 """Largest expected deviation for a verdict; impacts act as noise in an accelerometer on a colliding mass."""
 _MOST_SCALE = 0.05
-"""Largest deviation from 1 of measured over tracked velocity; calibrations may be some per cent wrong."""
+"""Largest deviation of measured / tracked velocity from 1; calibrations may err by a few per cent."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class MassCheck:
     scale: float
     """Ratio of measured to tracked velocity."""
     unexplained: float
-    """Relative rms part of the measured velocity that the track does not explain."""
+    """Part of the measured velocity that the track does not explain (relative rms)."""
     expected: float
-    """Unexplained part to be expected from noise, the track's uncertainty and the sensor's mounting."""
+    """Unexplained part expected from noise, the track's uncertainty and the sensor's mounting."""
 
     @property
     def confirms(self) -> bool | None:
@@ -276,8 +276,8 @@ def hidden_motion(
     recording
         Recording of base acceleration and m0's velocity at 10 kHz or more (51.2 kHz to find the law).
     specimen
-        Description; m0, m2 and k1 must be exact, the rest within some per cent. By default the description in
-        the recording.
+        Description; m0, m2 and k1 must be exact, the rest within a few per cent. By default the description
+        in the recording.
     start_s, stop_s
         Stretch of the recording [s]; by default all of it.
     numbers

@@ -55,7 +55,7 @@ THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
 """Number of blocks from which the usual innovation level is learnt."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block is outside if its level exceeds both 1.5 times the usual level and the usual level plus 8 sd."""
+"""A block is unusual if its level exceeds both 1.5 times the usual level and the usual level plus 8 sd."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 
@@ -167,7 +167,7 @@ class LiveMotion(Tabular):
     level: float
     """Innovation level of the last block; 1 if only noise remains."""
     limit: float
-    """Limit of the innovation level above which a block is outside; NaN while the usual level is learnt."""
+    """Innovation level above which a block counts as unusual; NaN while the usual level is learnt."""
 
 
 HELD_S = 3.0
@@ -178,14 +178,14 @@ _LOOKED_S = 0.25
 _FIND_S = 2.4
 """Length of motion in which parameters are searched [s]."""
 _PATIENCE = 2.0
-"""Factor by which the waiting time between parameter searches grows with every search."""
+"""Factor by which the wait between parameter searches grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
 """First and longest time between attempts to start a track while the motion does not fit [s]."""
 _CLIPPED = 25.0
 """Upper limit of squared innovations, so that one late impact does not count as a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
 _APART = 3.0
-"""Change of a parameter that is reported, relative to the root sum square of both half widths."""
+"""Smallest reported change of a parameter, relative to the root sum square of both half widths."""
 
 
 class LiveTwin:
@@ -234,7 +234,7 @@ class LiveTwin:
         self._executor = executor
         self._finding: Future[FoundSpecimen] | None = None
         self.found: tuple[FoundParameter, ...] = ()
-        """Latest parameters found in this run; empty before."""
+        """Latest parameters found in this run; empty if none were found yet."""
         self.watch = ChangeWatch()
         self._begin_anew(0)
 

@@ -14,10 +14,10 @@ from ..signals.arrays import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
-"""Bands, relative to the sample rate, in the converter's pass band but above any motion."""
+"""Bands, relative to the sample rate, that lie in the converter's pass band but above any motion."""
 _SEGMENT = 1024
 _MOST_SEGMENTS = 4096
-"""Maximum number of segments to estimate noise, spread over a long motion: 80 s at 51.2 kS/s."""
+"""Maximum number of segments for the noise estimate, spread over a long motion: 80 s at 51.2 kS/s."""
 _PIECE = 1 << 19
 """Number of samples that are corrected at once."""
 _LEAST_NOISE = 1e-6

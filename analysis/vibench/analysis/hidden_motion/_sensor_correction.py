@@ -56,7 +56,7 @@ def sensor_correction(
 
 
 def ideal_sensors(sample_rate_hz: float) -> SensorCorrection:
-    """Return a correction only for the interpolation between samples."""
+    """Return a correction for the interpolation between samples only."""
 
     def interpolation(frequency_hz: Reals) -> Complexes:
         return np.asarray(np.sinc(frequency_hz / sample_rate_hz) ** 2, dtype=np.complex128)

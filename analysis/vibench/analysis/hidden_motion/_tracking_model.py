@@ -12,7 +12,7 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 
 STATES = 8
-"""States X, Y, Z and rates relative to the base, base velocity W, error B of base acceleration, SI.
+"""States: X, Y, Z and their rates relative to the base, base velocity W, error B of its acceleration, SI.
 
 Deviations of the estimated parameters follow these states. Equations: docs/hidden-motion.md.
 """
@@ -62,9 +62,9 @@ class StepTables:
     """Tables of a specimen for the filter."""
 
     flow: Reals
-    """Matrix from state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
+    """Matrix that maps state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
     small_flow: Reals
-    """Matrix from state, acceleration and its rise to the next small step, without stops; shape (8, 10)."""
+    """Matrix that maps state, acceleration and its rise over a small step, without stops; shape (8, 10)."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
@@ -76,7 +76,7 @@ class StepTables:
 
 
 def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Reals, Reals]:
-    """Return A (8, 8) and the inputs (8,) of the recorded acceleration and of a force on m1 against m2."""
+    """Return A (8, 8), and input vectors (8,) for recorded acceleration and a force on m1 against m2."""
     m0, m1, m2 = specimen.masses
     k0, k1, k2 = specimen.stiffnesses
     c0, c1, c2 = specimen.dampings

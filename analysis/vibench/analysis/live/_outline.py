@@ -98,7 +98,7 @@ def zigzag(low: Reals, high: Reals) -> Reals:
 LEGIBLE_COLUMNS = 6.0
 """Minimum length of a period that is drawn as a waveform [columns]."""
 _MARGIN = 1.25
-"""Number of periods over which a column takes extremes; above 1, because a sweep changes its period."""
+"""Number of periods over which a column takes extremes; above 1, because the period of a sweep changes."""
 _CLEAR = 0.25
 """Hysteresis for counting zero crossings, relative to the typical peak-to-peak value."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
@@ -145,7 +145,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the reach of each column: the longest period in its part and its two neighbours [columns]."""
+    """Return the reach of each column: the longest period in its part and the two next to it [columns]."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")

@@ -16,7 +16,7 @@ from ._ring import RingWindow
 _LEAST_SHARE = 0.5
 """Minimum share of a sine's power in its strongest spectral line and the neighbouring lines."""
 _NEIGHBOURS = 3
-"""Spectral lines on each side of a sine's strongest line (Hann), even at slowly changing frequency."""
+"""Number of a sine's spectral lines on each side of its strongest (Hann), even in a slow sweep."""
 _LEAST_LINE = 4
 """Minimum number of periods to analyse; with fewer, the sine's spectral line merges with the offset's."""
 
@@ -87,7 +87,7 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
 
 
 _BAND_BELOW = 0.3
-"""High-pass frequency for displacement relative to the drive; passes half orders but no drift."""
+"""High-pass frequency for displacement, relative to the drive's; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
 """Length of the newest signal in which the drive frequency is searched; five periods of 10 Hz [s]."""

@@ -253,7 +253,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Return the edges of the frequency axis and the rows; a row contains its strongest spectral line."""
+    """Return the edges of the frequency axis and the rows; a row shows the strongest line within it."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

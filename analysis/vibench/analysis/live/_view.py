@@ -34,7 +34,7 @@ _DAMPING_TIME_S = 2e-5
 _CONTACT_S = 30e-6
 """Duration of a contact, which is 20 to 40 us."""
 _APART_S = 100e-6
-"""Kinks that are closer than this are counted as one [s]."""
+"""Distance [s] below which two kinks are counted as one."""
 _LEAST_FRESH_S = 20e-3
 """Shortest piece of signal from which noise is estimated [s]."""
 _MOST_FRESH_S = 0.1
@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise, and its value for normal noise; impacts affect higher ones."""
+"""Quantile of |noise| that measures the noise, and its value if normal; impacts affect higher quantiles."""
 
 
 class ImpactCounter:
@@ -113,7 +113,7 @@ class ImpactCounter:
         return inorder[np.diff(inorder, prepend=-self._apart - 1) > self._apart]
 
     def _smooth(self, data: Reals) -> float:
-        """Return the filter output for a sine with the same mean square and mean square slope."""
+        """Return the filter output for a sine with the mean square and mean square slope of the data."""
         known = data[np.isfinite(data)]
         spread = float(np.std(known)) if known.size > 1 else 0.0
         if spread == 0.0:

@@ -64,7 +64,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Return the rms noise over the quiet blocks; the quietest block alone is some per cent too low."""
+    """Return the rms noise over the quiet blocks; the quietest block alone is a few per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)
@@ -142,7 +142,7 @@ def unseen_noise(
         return max(floor, noise.rms[BASE] ** 2 - passed_high * (recorded_v2 + unseen_v2))
 
     def excess(unseen_v2: float) -> float:
-        """Return the median of power / level minus log 2; it is 0 if the level is true."""
+        """Return the median of power / level minus log 2; it is 0 if the level is correct."""
         level = passed * (unseen_v2 + own_v2) + sensor(unseen_v2)
         return float(np.median(power / level) - np.log(2.0))
 
@@ -192,7 +192,7 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the filtered voltage, and for each batch the square root of the share kept of each line."""
+        """Return the filtered voltage, and for each batch the square root of the kept share of each line."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
         # Synthesis window, with which half-overlapping frames add up to the signal.
@@ -258,7 +258,7 @@ DRAWS, MOST_DRAWS = 16, 1000
 FIRST_DRAWS = 8
 """Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws computed between checks of whether draws suffice."""
+"""Number of draws computed between two checks for a sufficient number."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position [m]."""
 CLOCK_TOLERANCE = 50e-6

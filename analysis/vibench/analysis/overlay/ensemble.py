@@ -23,7 +23,7 @@ MIXED = -1
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the limit of |z|; if all values are within it after half of the draws, no more are made."""
+"""Share of the limit of |z|; if all values are within it after half of the draws, the rest is omitted."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -302,7 +302,7 @@ class CurveDifference(Tabular):
 
     @property
     def share_within_two(self) -> float:
-        """Share of points within two standard errors; 0.95 is expected if only scatter differs."""
+        """Share of points within two standard errors; 0.95 is expected if all differences are scatter."""
         known = self.standard_errors[~np.isnan(self.standard_errors)]
         return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
 
@@ -323,7 +323,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If the motion of all runs ends within this interval, the cause is common, such as the record's end [s]."""
+"""Interval [s] in which the ends of motion in all runs have a common cause, such as the record's end."""
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
 
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
-    """Return the bands of points with ``is_inside``; a band ends half way to the next point outside."""
+    """Return the bands of points flagged in ``is_inside``; a band ends half way to the next point outside."""
     middles = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     lows = np.concatenate([frequency_hz[:1], middles])
     highs = np.concatenate([middles, frequency_hz[-1:]])

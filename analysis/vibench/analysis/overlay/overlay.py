@@ -118,7 +118,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
-    """Levels of the terminal bands in the first draw, as for `displacement`."""
+    """Levels of the terminal bands; like `displacement`, from the first draw."""
     spectrum: EnsembleCurve
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
@@ -219,7 +219,7 @@ _EDGE_S = 1.0
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
     """Return the quantities of a sweep that are compared with draws.
 
-    Points are compared where both collide or neither does, except within a second of a region's edge.
+    Points are compared where both sweeps collide or neither does, except within a second of a region's edge.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))

@@ -36,7 +36,7 @@ class FittedShaker:
 
     shaker: Shaker
     covariance: Reals
-    """Covariance of the logarithms of its first six parameters, shape (6, 6), widened by chi^2 above 1."""
+    """Covariance of the logarithms of the first six parameters, shape (6, 6), widened if chi^2 exceeds 1."""
     chi2: float
     """Reduced chi square of the fit."""
     lines: int
@@ -109,7 +109,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starting points: data determine products of parameters better than single ones."""
+    """Search from several starting points, as data determine products of parameters better than factors."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -151,7 +151,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return base acceleration over voltage, times s, since estimators take these for velocity and base."""
+    """Return base acceleration over voltage, times s, as estimators treat the two as velocity over base."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     plan = analysis.excitation

@@ -64,7 +64,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Return the signal advanced by any number of samples (also fractional), by the phase of its spectrum."""
+    """Return the signal advanced by any number of samples (even a fraction), via its spectrum's phase."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -75,7 +75,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 _PIECE_S = 5.0
 """Duration that is simulated at once, to limit memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; the end effect of a spline falls to 0.27 with every sample."""
+"""Extra samples on each side of a piece; each sample reduces the end effect of a spline to 0.27."""
 _VX = 3
 _STATE = 6
 
@@ -91,7 +91,7 @@ class SimulatedChannels(RecordedChannels):
     base_acceleration: Samples
     """Acceleration of the simulated or recorded table that drove the specimen, shape (samples,) [m/s2]."""
     has_sensors: bool
-    """Whether the velocity includes delay and gain of the recorded channel; if not, it has no sensor."""
+    """Whether the velocity includes delay and gain of the recorded channel; if not, it is the true motion."""
 
     @property
     def response_delay_s(self) -> float:

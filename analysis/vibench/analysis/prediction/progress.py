@@ -286,7 +286,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Maximum number of points of both models together; more points take hours and cannot be seen."""
+"""Maximum number of points of both models together; more take hours and cannot be told apart."""
 
 
 class Exponent(StrEnum):

@@ -73,7 +73,7 @@ def simulate(
 ) -> None:
     """Compute a request, the time signals first; return early when cancelled.
 
-    ``cancelled`` is called several times a second; points that are being computed (below 1 s) are finished.
+    ``cancelled`` is called several times a second; points in progress (less than 1 s each) are finished.
     """
     for model in request.models if request.signal_hz is not None else ():
         if cancelled():

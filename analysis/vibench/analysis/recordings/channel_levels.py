@@ -108,10 +108,10 @@ _TOPS = (0.1, 0.03, 0.01)
 _FLAT = 0.88
 """Share of a top's samples in its upper half: 0.71 for smooth, 0.84 for straight, 1 for clipped peaks."""
 _FLAT_VALUE = 0.4
-"""Share of the samples in the upper half of a peak that have one value; smooth peaks have fewer."""
+"""Share of the samples in the upper half of a peak that have one value; it is lower in smooth peaks."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
-"""Minimum converter steps up to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
+"""Minimum number of converter steps to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
 """Largest empty range of values in a well sampled smooth peak, relative to the peak and to a top."""
 _AS_FREQUENT = 0.4
@@ -127,7 +127,7 @@ def _lasting(bins: Reals) -> tuple[int, int]:
 
 
 def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
-    """Return the value at which the upper peaks are clipped; None if they are not, or if it is unclear.
+    """Return the value at which the upper peaks are clipped; None if not, or if this is unclear.
 
     If the sample clock is locked to the drive, every period has the same few values. A smooth peak may then
     have the histogram of a clipped peak, but with an empty range above ``lasting``, the highest bin that
@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; with less, the signal rests there."""
+"""Smallest height of a peak above the median, relative to the span; below it, the signal rests."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
@@ -178,7 +178,7 @@ def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
 
 
 _CLIPPED_SHARE = 0.2
-"""Largest share of samples at full scale in a usable channel; a sine that just reaches it has 3 %."""
+"""Largest share of samples at full scale in a usable channel; a sine just up to full scale has 3 %."""
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:

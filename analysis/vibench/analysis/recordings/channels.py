@@ -70,7 +70,7 @@ def _number(sensor: Mapping[str, Any], key: str) -> float:
 
 
 OnRead = Callable[[int, int], None]
-"""Callback (samples read, total samples) during reading."""
+"""Callback during reading, with arguments (samples read, total samples)."""
 
 
 def ignore_reading(samples: int, of: int) -> None:
@@ -126,10 +126,10 @@ class Channels(Protocol):
         """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
 
     def overload_flags(self, start: int, stop: int) -> Flags:
-        """Return the samples at which one of the channels was near full scale, shape (samples,)."""
+        """Return flags of the samples at which a channel was near full scale, shape (samples,)."""
 
     def bridge_flags(self, start: int, stop: int) -> Flags:
-        """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
+        """Return flags of the samples at which the response bridges a drop-out, shape (samples,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ class RecordedChannels:
         return read
 
     def overload_flags(self, start: int, stop: int) -> Flags:
-        """Return the samples at which one of the channels was near full scale, shape (samples,)."""
+        """Return flags of the samples at which a channel was near full scale, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, self._response.role):
@@ -215,7 +215,7 @@ class RecordedChannels:
         return marks
 
     def bridge_flags(self, start: int, stop: int) -> Flags:
-        """Return the samples at which the response was bridged over a drop-out, shape (samples,)."""
+        """Return flags of the samples at which the response bridges a drop-out, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for dropout in self._response.dropouts(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = True

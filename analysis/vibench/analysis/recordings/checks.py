@@ -23,7 +23,7 @@ class Verdict(StrEnum):
 
     PASSED = "passed"
     NOTE = "note"
-    """Nothing is wrong, but the text should be known before the result is used."""
+    """Nothing is wrong, but the text should be read before the result is used."""
     WARNING = "warning"
     """The result may be wrong, or contains less than was planned."""
 

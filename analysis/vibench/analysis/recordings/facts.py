@@ -34,7 +34,7 @@ from .response import (
 )
 
 MOST_BYTES = 1e9
-"""Memory up to which a recording is not checked against the size of its file [bytes]."""
+"""Memory need [bytes] up to which a recording is not checked against the size of its file."""
 BYTES_A_SAMPLE = 80
 """Memory per sample of a stretch analysed at once: three channels and intermediate results [bytes]."""
 LARGEST_PACKING = 16.0

@@ -27,7 +27,7 @@ _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
 """Parameter beta of the Kaiser window; truncation errors of the integral are below 3e-5 above 5 Hz."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
-"""Derivative: samples on each side, and share of the sample rate up to which it errs by at most 1e-4."""
+"""Derivative: samples on each side, and share of the sample rate up to which errors are at most 1e-4."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
 """Derivative: number of fitted frequencies, and weight above the exact band, which limits the gain there."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
@@ -96,7 +96,7 @@ class ResponseChannel:
     quantity: str = field(init=False)
     _kernel: Reals = field(init=False, default_factory=lambda: np.empty(0))
     _block: tuple[int, Reals] | None = field(init=False, default=None)
-    """Number and velocities of the last block; kept because estimators read blocks in order."""
+    """Index and velocities of the last block; kept because estimators read blocks in order."""
 
     def __post_init__(self) -> None:
         found = self.response or response_role(self.recording)

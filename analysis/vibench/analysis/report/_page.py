@@ -22,7 +22,7 @@ LONGEST_CAPTION = 225
 MOST_OPEN_CARDS = 12
 """Maximum number of cards shown unfolded, which keeps the page short."""
 _LARGEST_SVG_BYTES = 300_000
-"""Largest embedded SVG; a PNG instead of a larger one is smaller, faster to show and equally legible."""
+"""Largest embedded SVG; above this size, a PNG is smaller, faster to show and equally legible."""
 _SENTENCE_ENDS = re.compile(r"(?<=\.)(?<!\bal\.)(?<!\bFig\.)\s+(?=[A-Z0-9])")
 
 

@@ -143,7 +143,7 @@ def _level(result: NoiseResult) -> str:
 
 
 def _band(result: NoiseResult) -> tuple[float, float]:
-    """Return the measured band, rounded because two converter clocks differ by some ppm."""
+    """Return the measured band, rounded because two converter clocks differ by a few ppm."""
     found = result.analysis.response.frequency_response.frequency_hz
     return round(float(found[0])), round(float(found[-1]))
 
@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest multipliers at a level without a resonance, or that it has no motion."""
+    """State the model's largest multipliers at a level without a resonance, or that no motion exists."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2

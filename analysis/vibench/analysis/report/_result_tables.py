@@ -145,7 +145,7 @@ def edge_text(edge: Edge, instead: str) -> str:
 
 
 def _last(edge: Edge) -> str:
-    """Return the end of a region without bounds; this end is random and differs between runs."""
+    """Return the end of a region, without bounds because it is random and differs between runs."""
     return f"{edge.frequency_hz:.1f} Hz in this run"
 
 
@@ -210,7 +210,7 @@ def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, s
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's median level in all draws [dB]; for one run or a low level, that of the first draw."""
+    """Return a band's median level in all draws [dB]; for one run or a low level, use the first draw."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]

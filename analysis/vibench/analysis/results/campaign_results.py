@@ -182,7 +182,7 @@ def analyse_files(
     """Analyse recordings one after the other with `analyse`, and overlay a simulation on each.
 
     Copies of a recording are counted once. By default, the simulation uses each recording's bench
-    configuration. If it describes no shaker, a shaker is fitted to the weakest noise among the recordings.
+    configuration. If that describes no shaker, one is fitted to the weakest noise among the recordings.
     Raises NotEnoughData when no path is given.
 
     Parameters

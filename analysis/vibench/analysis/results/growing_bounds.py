@@ -1,8 +1,8 @@
 """Process that computes the bounds of a recording's results while it is being recorded.
 
-It runs as ``python -m vibench.analysis.results.growing_bounds``. The first output line means it is ready.
-Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run that
-lasts until a bound is small enough starts this process (`vibench.acquisition.run.until`).
+It runs as ``python -m vibench.analysis.results.growing_bounds``. The first output line means that the process
+is ready. Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run
+that lasts until a bound is small enough starts this process (`vibench.acquisition.run.until`).
 """
 
 import json

@@ -25,7 +25,7 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Line spacing of a density from the longest segments; Hann window, 50 % overlap [Hz]."""
+"""Line spacing [Hz] of a density from the longest segments, with Hann window and 50 % overlap."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})

@@ -1,4 +1,4 @@
-"""Minimum and maximum of a long signal in each of some hundred bins, for plots."""
+"""Minimum and maximum of a long signal in each of a few hundred bins, for plots."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -18,7 +18,7 @@ class Window(StrEnum):
     FLAT_TOP = "flattop"
     """Accurate amplitude of a sine between bins, within 0.01 dB."""
     BLACKMAN_HARRIS = "blackmanharris"
-    """Side lobes below -92 dB: a small line next to a large line."""
+    """Side lobes below -92 dB, for a small line next to a large one."""
 
 
 _COSINES = {

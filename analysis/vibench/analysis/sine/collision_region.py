@@ -31,7 +31,7 @@ _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _VOTE_S = 1.0
-"""An interval collides if most intervals within this time exceed the threshold: collisions persist."""
+"""Time around an interval in which most intervals must exceed the threshold, as collisions persist."""
 _MERGE_S = 3.0
 """Quiet intervals shorter than this do not split a region: motion may settle briefly between impacts."""
 
@@ -94,16 +94,16 @@ class Collisions(Tabular):
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find the intervals of a sweep in which the masses collide: the motion is no slowly varying sine.
+    """Find the intervals of a sweep in which the masses collide, so that the motion is no slow sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
     sweep. The residual has three limits: 4 times the noise, 2 % of order 1, and twice the residual simulated
     without contact. The noise is the larger of two estimates: from the sixth difference of the samples, and
     from the quietest tenth of the sweep if it can be smooth. An interval collides if most neighbours exceed
     the limits, also in drop-outs, or if two successive intervals exceed twice the limits and show impacts.
-    Above twice the limits without impacts, it is not determined. Impacts show as orders 2 and 3 above a tenth
-    of order 1 and above twice their value without contact. If no specimen is known, a region must show
-    impacts at frequencies whose double and triple the sweep has not just passed.
+    Above twice the limits without impacts, the interval is undetermined. Impacts show as orders 2 and 3 above
+    a tenth of order 1 and above twice their value without contact. If no specimen is known, a region must
+    show impacts at frequencies whose double and triple the sweep has not just passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -188,7 +188,7 @@ def _merged_runs(flags: Flags, gap: int) -> list[tuple[int, int]]:
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
-    """Move the ends of a colliding run, blurred by the majority, to the split with fewest wrong intervals."""
+    """Move the ends of a colliding run, blurred by the majority vote, to the split with fewest errors."""
     half = votes // 2 + 1
     begin = _best_split(above, max(0, first - half), min(first + half, last))
     end = (

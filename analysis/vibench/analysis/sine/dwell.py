@@ -33,7 +33,7 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Limit of the residual relative to the noise in silence, which is shorter than a mode's ring-down."""
+"""Limit of the residual relative to the noise in silence; a silence is shorter than a mode's ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
@@ -135,7 +135,7 @@ _LEAST_CYCLES = 4.0
 """Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks that random blocks (ten) exceed in one of a hundred records."""
+"""Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
 _ONCE = 0.5
 """Share of the variance at one cycle per record above which the change may continue after the record."""
 _BEYOND = 3.0
@@ -187,17 +187,17 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
 
 
 _LOWEST_ORDER = 0.1
-"""High-pass frequency for displacement relative to the drive frequency, above drift and hum."""
+"""High-pass frequency for displacement, relative to the drive frequency; above drift and hum."""
 _BAND_ABOVE = 0.33
-"""Low-pass frequency for displacement relative to the sample rate."""
+"""Low-pass frequency for displacement, relative to the sample rate."""
 _HIGHEST_ORDER = 0.45
 """Frequency of the highest order relative to the sample rate; aliases above it look like lower orders."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
-"""Band relative to the sample rate that contains only vibrometer noise, above modes and impacts."""
+"""Band, relative to the sample rate, that contains only vibrometer noise, above modes and impacts."""
 _NOISE_SEGMENT = 4096
 LEAST_CLEAR = 0.2
-"""Smallest share of a window that must be free of drop-outs."""
+"""Minimum share of a window that is free of drop-outs."""
 _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
@@ -274,7 +274,7 @@ class DwellResponse(Tabular):
     lines: tuple[Line, ...]
 
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
-        """Return a copy that counts the non-repeating part as noise, for motions not known as irregular.
+        """Return a copy that counts the non-repeating part as noise, for motions not known to be irregular.
 
         If the motion is not known to repeat either, the part counts as noise only if it is at most
         `OVERHEARD` times the known noise.

@@ -33,7 +33,7 @@ BAND_ABOVE = 0.25
 
 
 _CLEAR_MOTION = 0.8
-"""Smallest share of a dwell without drop-outs for the verdict that its motion does not repeat."""
+"""Minimum share of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
 """Largest deviation of noise maxima from their median, in median deviations; a burst exceeds it."""

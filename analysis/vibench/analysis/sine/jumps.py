@@ -17,11 +17,11 @@ _SIDE = 12
 """Number of intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""Minimum size of a jump in standard errors, since thousands of steps are tested with rough errors."""
+"""Minimum size of a jump in standard errors, since thousands of steps with rough errors are tested."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
-"""Number of intervals during the jump itself, which belong to neither side."""
+"""Number of intervals within the jump itself; they belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
 """Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
 the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""

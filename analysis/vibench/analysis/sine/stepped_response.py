@@ -147,7 +147,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
     """Return the indices that continue a record at both ends, shape (samples + 2 edge,).
 
-    The record is continued by copies of its ends, as many drive periods long as fits the response best.
+    Copies of the ends continue the record; their length in drive periods is chosen to fit best.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
@@ -282,7 +282,7 @@ class TrackedResonance:
     """Resonance of a mode at one level of the base."""
 
     number: int
-    """Number of the base level in the order of playing, from 0."""
+    """Index of the base level in the order of playing, from 0."""
     base_m_per_s2: float
     """Peak of the fundamental of the base acceleration."""
     frequency_hz: float
@@ -292,7 +292,7 @@ class TrackedResonance:
     amplitude_m: float
     """Amplitude of m0 at the drive frequency, or at the resonant harmonic or subharmonic."""
     harmonic: int
-    """Harmonic of the drive, at which m0 resonates."""
+    """Harmonic of the drive at which m0 resonates."""
     subharmonic: int
     """Number of drive periods in a period of m0."""
     mode_hz: float | None

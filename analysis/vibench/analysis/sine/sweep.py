@@ -107,15 +107,15 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 _SAMPLES_PER_CYCLE = 24
 """Minimum samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
 _BAND_BELOW = 0.25
-"""High-pass frequency for displacement over the lowest drive frequency: half orders pass, drift does not."""
+"""High-pass frequency for displacement, relative to the lowest drive frequency; passes half orders only."""
 _BAND_ABOVE = 0.3
 """Low-pass frequency relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
-"""Upper limit of the linear motion relative to the highest drive frequency, above order 5."""
+"""Upper frequency limit of the linear motion, relative to the highest drive frequency; above order 5."""
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Relative difference of the largest Response II from linear simulation up to which both agree."""
+"""Relative difference of the largest Response II from linear simulation up to which the two agree."""
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
@@ -265,7 +265,7 @@ class SweepSums:
 
     @property
     def neighbour_samples(self) -> int:
-        """Number of samples before and after the sweep needed for its displacement, in whole intervals."""
+        """Number of samples before and after the sweep that its displacement needs, in whole intervals."""
         disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
         return self._factor * self._interval * ceil(disturbed / self._interval)
 

@@ -16,7 +16,7 @@ from ..signals.window import Window, effective_averages, hop_samples, taper, win
 from ..tables import Tabular
 
 _BATCH_SAMPLES = 1 << 19
-"""Samples (all channels) transformed at once: 4 MB, so that a batch fits into the cache."""
+"""Number of samples of all channels transformed at once: 4 MB, so that a batch fits into the cache."""
 _PIECE_SAMPLES = 1 << 19
 """Samples per channel of each block of `pieces`."""
 
@@ -178,7 +178,7 @@ class SpectralDensity(Tabular):
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float
-    """Equivalent noise bandwidth: density times this is the power of a sine on a line."""
+    """Equivalent noise bandwidth; times the density, it gives the power of a sine on a line."""
     segments_used: int
     segments_excluded: int
     sample_rate_hz: float

@@ -54,7 +54,7 @@ _EDGE_PERIODS = 80
 """Drive periods at each end of a window that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Difference of runs, in standard errors, above which they are on different motions."""
+"""Difference of runs, in standard errors, above which the runs are on different motions."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class SimulatedDwell:
     sd_second: float
     """Relative standard deviation of Response II; 0 if nothing collides."""
     has_several_motions: bool
-    """Whether some runs collide and others do not, or they differ by more than chance."""
+    """Whether some runs collide and others do not, or the runs differ by more than chance."""
 
 
 def simulated_dwell(
@@ -206,7 +206,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
-    specimen. For a sine, they are both Responses over at most 5 s. Their chance is the scatter of three
+    specimen. For a sine, they are both Responses over at most 5 s. Their random error is the scatter of three
     simulated runs, analysed like recordings; it is not stated if the runs settle on different motions.
     Scatter falls with the root of the time. Other kinds of plan, and rigs without a channel for the motion of
     m0 or the base's acceleration, have no expected results.
@@ -274,7 +274,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield for some parts three times [s]: needed for all targets, until the first check, and planned."""
+    """Yield, for some parts, three times [s]: as needed for all targets, to the first check, as planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -500,7 +500,7 @@ class TimeShare:
     needed_s: float | None
     """Predicted recording time until the targets are reached [s]; None without targets or a prediction."""
     allotted_s: float
-    """Longest recording time after the distribution [s]."""
+    """Longest recording time once the available time is distributed [s]."""
 
     @property
     def sentence(self) -> str:
