@@ -199,7 +199,7 @@ MOST_NUMBERS = 3e7
 """Maximum number of values stored for a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Maximum number of equal parts of a whole run whose RMS is shown."""
+"""Maximum number of equal parts of a whole run; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
 time was requested, at most this share of the time simulated before."""
@@ -338,7 +338,7 @@ def _bare_run(
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Return a run with its outcome and impacts only, such as a run that did not reach its end."""
+    """Return a run with its outcome and impacts only, as for a run that did not reach its end."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,

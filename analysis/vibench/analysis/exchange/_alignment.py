@@ -58,11 +58,11 @@ _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03
 SAME_RATE = 1e-4
 """Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
-"""Largest spread of times around an even axis whose rate counts as exact, in sample intervals."""
+"""Largest spread of times around an even axis for its rate to count as exact, in sample intervals."""
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Smallest relative distance of irregular intervals from multiples of the usual one; allowed share."""
+"""Relative distance from multiples of the usual interval that counts as irregular; its allowed share."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 10
@@ -310,7 +310,7 @@ def _begin(block: Reals) -> "_Scan | None":
 
 
 def _last_digit(off: Reals, typical: float) -> float:
-    """Return the last decimal digit of times whose rounding may explain their intervals; else 0.
+    """Return the last decimal digit of times if its rounding may explain their intervals; else 0.
 
     Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
     later times away from a line; rounding moves each time by half a digit at most.

@@ -37,7 +37,7 @@ _HOUR_S, _DAY_S = 3600, 86400
 
 
 class ClockTimes:
-    """Converter of the dates and times in a file, in order, to seconds since midnight of the first day."""
+    """Converter of a file's successive dates and times to seconds since midnight of the first day."""
 
     def __init__(self) -> None:
         self._last_s: float | None = None
@@ -95,7 +95,7 @@ def _orders(text: str) -> Iterator[date | None]:
 TIME_FORMAT = "%.9f"
 """Format of the seconds since the recording's first sample, to nanoseconds."""
 VALUE_FORMAT = "%.10g"
-"""Format of values, with one digit more than steps of 2^-30 of the range need; lost samples: ``nan``."""
+"""Format of values: one digit more than needed for steps of 2^-30 of the range; ``nan`` if lost."""
 
 
 def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
@@ -116,7 +116,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 LONGEST_HEAD = 200
 """Maximum number of heading lines of a text file."""
 DELIMITERS = (";", "\t", "|", ",", None)
-"""Separators in order of trial; None means blanks. With any except the comma, commas are decimal marks."""
+"""Separators in order of trial; None means blanks. With all but the comma, commas are decimal marks."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"

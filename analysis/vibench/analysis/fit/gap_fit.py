@@ -146,7 +146,7 @@ _OVERSHOOT = 1.5
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Return the gap with the narrowest bounds, each from one dwell without and one with collisions.
+    """Return the gap with the narrowest bounds, found from a dwell without and a dwell with collisions.
 
     Raises NotEnoughData when no frequency has dwells on both sides of the onset.
     """

@@ -34,7 +34,7 @@ _LARGEST_SCATTER = 100.0
 """Largest ratio of variance about a linear response to variance in silence; light collisions exceed 1000."""
 _WEAKER = "so masses may collide or rub; measure weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
-"""Relative error of the fitted table mass due to coil, filters and held samples."""
+"""Relative error of the fitted table mass due to coil, filters and sample-and-hold output."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class UpdatedSpecimen(Tabular):
     collisions: CollisionNumbers | None
     """Parameters from tracked collisions or from statistics; None if neither is possible."""
     linear: SpecimenFit | None
-    """Linear fit to the weakest noise recording; None without noise."""
+    """Linear fit to the recording of the weakest noise; None without such a recording."""
     linear_from: str
     """Name of the recording that gives damping and frequencies; empty if none."""
     table: TableFit | None

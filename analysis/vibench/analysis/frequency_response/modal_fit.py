@@ -103,9 +103,9 @@ class Leakage:
     segment_s: float
     window: Window
     noise: Reals
-    """Correlation of the sensor-noise errors of spectral lines k apart, shape (far lines,)."""
+    """Correlation of the sensor-noise errors of two lines at distance k, shape (far lines,)."""
     ringing: Reals
-    """Covariance of the errors of lines k apart due to cut-off ringing, per |dH/df|^2 [Hz^2]."""
+    """Covariance of the errors of two lines at distance k due to cut-off ringing, per |dH/df|^2 [Hz^2]."""
 
     def smeared_pole(self, frequency_hz: Reals, pole: complex, slope_per_hz: Reals | Complexes) -> Complexes:
         """Return the estimate of 1 / (i w - s) including leakage, with s = `pole` [rad/s].
@@ -168,7 +168,7 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
 
 @lru_cache(maxsize=16)
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
-    """Return the correlations of errors k lines apart due to sensor noise and due to ringing.
+    """Return the correlations of errors at distance k [lines] due to sensor noise and due to ringing.
 
     Both are sums over j of (1 - |j| / K) conj(c_j(k)) d_j(k), for K segments with hop D. c_j transforms
     w(n) w(n + j D). For noise, d_j = c_j; for ringing, d_j has w' instead of w.

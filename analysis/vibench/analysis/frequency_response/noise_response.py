@@ -43,7 +43,7 @@ _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Median difference of two estimators above which it counts as bias, in standard deviations of the median."""
+"""Smallest median difference of two estimators that counts as bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
 """Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
 

@@ -33,7 +33,7 @@ _CONVERGED = 1e-9
 _LARGEST_OFFSET = 200e-6
 """Largest relative offset between two clocks, for oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
-"""A drive repeats if its mean period has at least this share of the mean power of its periods."""
+"""Minimum share of the mean power of a drive's periods that is in the mean period if the drive repeats."""
 
 
 @dataclass(frozen=True)
@@ -482,7 +482,7 @@ class PeriodicSums:
         self._realisations.append(_Realisation(repetition, spectra.mean(axis=1), covariance))
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """For each realisation, yield the spectra of all others; nothing for a single realisation."""
+        """Yield, for each realisation, the spectra of all others; nothing for a single realisation."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,

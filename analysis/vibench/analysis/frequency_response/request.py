@@ -37,7 +37,7 @@ class FrequencyResponseView:
     base: Quantity = Quantity.DISPLACEMENT
     scale: MagnitudeScale = MagnitudeScale.LOG
     is_force: bool = False
-    """Whether to show the apparent mass, force over the base's acceleration, instead of the quantities."""
+    """Whether to show the apparent mass (force over base acceleration) instead of the quantities."""
 
     @property
     def power(self) -> int:
@@ -122,9 +122,9 @@ def parse_view(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> Frequen
 
 
 _SEGMENT_S = 4.0
-"""Default segment of streamed noise [s]: lines 0.25 Hz apart resolve a bandwidth of 1 Hz."""
+"""Default segment length of streamed noise [s]: lines 0.25 Hz apart resolve a bandwidth of 1 Hz."""
 _LEAST_SEGMENTS = 8
-"""Minimum number of segments by default; a short record gets shorter segments."""
+"""Minimum number of segments of the default length; a short record gets shorter segments."""
 _PROXY_SAMPLES = 4096
 """Window length for computing overlap correlations; the length does not change the result."""
 

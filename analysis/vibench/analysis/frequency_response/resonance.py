@@ -30,7 +30,7 @@ _LEAST_RISE = 3.0
 _MOST_MODES = 3
 """Maximum number of modes fitted to one peak."""
 _APART = (0.5, 1.5)
-"""Initial spacing of poles side by side, in half widths."""
+"""Initial spacing of neighbouring poles, in half widths."""
 _LEAST_GAIN = 25.0
 """Minimum reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
 in a thousand cases."""

@@ -333,7 +333,7 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
 
 _COLUMNS = 7
 _MOST_STEPS = 400
-"""Longest contact of a collision [samples]; in longer contacts m1 rests on the stop."""
+"""Longest contact of a collision [samples]; in longer contacts, m1 rests on the stop."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ class Hidden(StrEnum):
     EXPONENT = "contact_exponent"
     LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
-    """Mean of both gaps; statistics determine it better than each gap."""
+    """Mean of both gaps; statistics determine the mean better than each gap."""
 
 
 class Search(NamedTuple):
@@ -35,7 +35,7 @@ class Search(NamedTuple):
     step: float
     """Step of the parameter for numerical derivatives."""
     near: float
-    """Prior standard deviation about the description, if the description can track the motion."""
+    """Prior standard deviation about the description, if the latter suffices to track the motion."""
     least_sd: float = 0.0
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0

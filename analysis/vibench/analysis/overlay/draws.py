@@ -258,7 +258,7 @@ DRAWS, MOST_DRAWS = 16, 1000
 FIRST_DRAWS = 8
 """Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws computed between two checks for a sufficient number."""
+"""Number of draws computed between two checks of whether their number suffices."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position [m]."""
 CLOCK_TOLERANCE = 50e-6

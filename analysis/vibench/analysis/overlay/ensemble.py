@@ -323,7 +323,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""Interval [s] in which the ends of motion in all runs have a common cause, such as the record's end."""
+"""Interval [s]; if the motion ends within it in all runs, the cause is common, such as the record's end."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from .overlay import prediction_grid
 from .prediction import ResponsePrediction, predict
 
 MOST_POINTS = 60
-"""Maximum number of simulated frequencies; their simulation takes some seconds."""
+"""Maximum number of simulated frequencies; their simulation takes a few seconds."""
 SIMULATED_S = 6.0
 """Duration from rest at each frequency; the transient decays to 0.1 % in half of this time."""
 FOLLOWED_POINTS = 200

@@ -75,7 +75,7 @@ def predict(
     amplitude_m
         Base amplitude A0, one value for all points or one per point [m].
     accuracy
-        Quick by default: in chaos, Response I scatters by more than any accuracy could reduce, and free
+        Quick by default: in chaos, Response I scatters by more than the error of any accuracy, and free
         flight is exact at every level.
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)

@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; below it, the signal rests."""
+"""Smallest height of a peak above the median, relative to the span; if lower, the signal rests there."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:

@@ -94,7 +94,7 @@ class Collisions(Tabular):
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find the intervals of a sweep in which the masses collide, so that the motion is no slow sine.
+    """Find the intervals of a sweep with collisions, where the motion is not a slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
     sweep. The residual has three limits: 4 times the noise, 2 % of order 1, and twice the residual simulated

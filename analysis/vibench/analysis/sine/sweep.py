@@ -107,7 +107,7 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 _SAMPLES_PER_CYCLE = 24
 """Minimum samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
 _BAND_BELOW = 0.25
-"""High-pass frequency for displacement, relative to the lowest drive frequency; passes half orders only."""
+"""High-pass frequency for displacement [lowest drive frequency]; half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
 """Low-pass frequency relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
