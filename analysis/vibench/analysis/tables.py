@@ -301,7 +301,7 @@ def _row_shape(part: Any) -> tuple[Any, ...] | None:
 
 
 def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[str, Any]) -> None:
-    """Collect parts that are single numbers into one variable per field; missing numbers become NaN."""
+    """Collect parts that hold single numbers into one variable per field; missing numbers become NaN."""
     for key, _ in _numbers_of(rows[0]):
         values = [getattr(row, key) for row in rows]
         is_word = any(isinstance(each, str) for each in values)

@@ -98,7 +98,7 @@ _SHORTEST_BLOCK = 50
 
 
 def begin_of_last_motion(points: Points) -> int:
-    """Return the index at which the last motion of a record starts; 0 if it never changes.
+    """Return the index at which the last motion of a record starts; 0 if the motion never changes.
 
     Each block of the record is tested for repetition within its noise. One change of the result means that a
     transient ended or a motion was lost. Several changes mean chaos with calm intervals, which counts as one
@@ -121,7 +121,7 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Maximum number of points, from the end of a record, for tests of their shape; more only take time."""
+"""Maximum number of points, from the end of a record, to test their shape; more points only take time."""
 ABOVE_NOISE = 5.0
 """Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
@@ -129,9 +129,9 @@ LARGEST_NOISE = 0.1
 SMALL = 0.05
 """Largest scatter of a periodic motion with linear noise, relative to the size of the orbit."""
 SLOW = 0.5
-"""Largest `slow_share` of the variance; if it is larger, the motion changes slowly."""
+"""Largest `slow_share` of the variance of a motion that does not change slowly."""
 _FEWEST_TURNS = 3.0
-"""Minimum number of turns of a closed curve in a record; fewer count as a slow change."""
+"""Minimum number of turns around a closed curve in a record; fewer turns count as a slow change."""
 _LARGEST_HUM = 0.1
 """Largest mains hum relative to the orbit; a larger hum may be motion at the mains frequency."""
 _LOW_PERIOD = 4

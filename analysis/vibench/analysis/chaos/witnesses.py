@@ -38,7 +38,7 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
 
 
 def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> tuple[Integers, Integers]:
-    """Find for each point the nearest point that is not near in time.
+    """Find, for each point, the nearest point that is distant in time.
 
     Returns the indices of the points that have such a neighbour, and of their neighbours.
 
@@ -193,7 +193,7 @@ class ZeroOne:
     """Result of the 0-1 test."""
 
     k: float
-    """Median of the correlations K_c: near 0 regular, near 1 chaotic *or noisy*."""
+    """Median of the correlations K_c; near 0 for regular motion, near 1 for chaos *or noise*."""
     spread: float
     """Half the interquartile range of the correlations K_c."""
     neighbour_correlation: float

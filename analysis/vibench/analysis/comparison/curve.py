@@ -169,7 +169,7 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """Minimum height of a peak above the neighbouring valley [dB]."""
 _LEAST_RISE_SD = 8.0
-"""Minimum height of a peak in standard deviations; a thousand points of noise span 6.5 of them."""
+"""Minimum height of a peak in standard deviations; a thousand points of noise span 6.5."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
 """Pairs (n, distance in half widths): within that distance of a mode lie at most n peaks with its own."""
 _CROWD_RISE = 0.3

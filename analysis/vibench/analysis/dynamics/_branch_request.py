@@ -65,7 +65,7 @@ class BranchRequest(SpecimenChoice):
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of the harmonic balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
-    """Number of values in the range at which motions are searched."""
+    """Number of values in the range at which motions are searched for."""
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
     """Number of random initial states at each value; a larger number finds more isolated branches."""
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4

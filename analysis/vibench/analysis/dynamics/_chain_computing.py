@@ -255,7 +255,7 @@ def _time_run(
 
 
 def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
-    """Compute the responses in a run from rest, then energies and motion in a continuation of it."""
+    """Compute the responses in a run from rest, then energies and motion in its continuation."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error = np.full(chain.size, math.nan)
     if request.has_target:

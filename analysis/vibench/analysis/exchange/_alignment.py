@@ -80,13 +80,13 @@ _LEAST_RISING = 64
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
-"""Maximum number of samples by which times may go back; beyond it, another record begins."""
+"""Maximum number of samples by which times may go back; at more, another record begins."""
 FARTHEST = 2**40
 """Largest gap between two times that is counted, in sample intervals."""
 _DATENUM = (693_000, 770_000)
 """Range of MATLAB's ``datenum`` (days since the year 0) that is taken as a date: 1897 to 2108."""
 _LONGEST_PAUSE = 10
-"""Largest ratio of the time span, in sample intervals, to the number of samples; more means wrong times."""
+"""Largest ratio of time span [sample intervals] to number of samples; a larger one means wrong times."""
 
 
 def stated_times(

@@ -143,7 +143,7 @@ class ChannelMapping(FrozenModel):
 
 
 class Part(FrozenModel):
-    """Start and end of a part of the plan in the file [s since its first sample]."""
+    """Start and end of a part of the plan [s since the first sample of the file]."""
 
     start_s: NonNegativeFloat
     stop_s: PositiveFloat

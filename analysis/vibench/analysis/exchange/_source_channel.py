@@ -123,7 +123,7 @@ class SourceChannel:
     quantity: str = ""
     """Quantity stated in the file, if its unit is not stated."""
     step: float | None = None
-    """Step between values that the file stores as integers; it allows exact storage."""
+    """Step between values that the file stores as integers; knowing the step allows exact storage."""
     origin: Origin | None = None
     """Whether the channel was measured or simulated; None if unknown."""
     full_scale: float | None = None

@@ -24,7 +24,7 @@ SCALES = {"Linear", "Polynomial", "RTD", "Table", "Thermocouple", "Thermistor", 
 """Types of scales that npTDMS applies, with the parameters in the file."""
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 START_ERROR_S = 1e-6
-"""Resolution of start times, which are stored in microseconds [s]."""
+"""Resolution [s] of start times, which are stored in microseconds."""
 
 
 @contextmanager

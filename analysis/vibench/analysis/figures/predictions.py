@@ -152,7 +152,7 @@ def _numbers(found: ExponentSpectrum) -> Table:
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Drawn range of p before and beyond a stop [m]; the paper fits its contact laws up to 1 um beyond."""
+"""Range of p drawn before and beyond a stop [m]; the paper fits its contact laws up to 1 um beyond."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
 """Speed at which laws with losses are drawn: the impact speed of the paper's specimen at 5 um, 260 Hz."""

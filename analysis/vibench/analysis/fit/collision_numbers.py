@@ -106,7 +106,7 @@ class CollisionNumbers:
 
 
 def peakedness(dwell: DwellAnalysis) -> float:
-    """Return Response I, less its known noise bias, over Response II; the ratio is 1 for a sine."""
+    """Return the ratio of Response I, without its known noise bias, to Response II; 1 for a sine."""
     found = dwell.response
     lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
     return (found.response_i - lift) / found.response_ii

@@ -155,7 +155,7 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
 
 
 def _distances(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
-    """Return two squared distances of a run from other runs: along their components and outside of them.
+    """Return a run's squared distances from other runs: along their components, and outside of these.
 
     ``own_terms`` and ``own_values`` belong to this run, with shapes (terms,) and (statistics,).
     """
@@ -222,7 +222,7 @@ def above_sensor_noise(statistics: Reals, noise_rms: Reals, rate_hz: float) -> F
 
 
 def _bands(rate_hz: float) -> tuple[int, Integers]:
-    """Return the segment length [samples], and the band edges as line numbers of its spectrum."""
+    """Return the segment length [samples], and the band edges as line numbers of a segment's spectrum."""
     length = round(_SEGMENT_S * rate_hz)
     edges = np.geomspace(_LOWEST_HZ, min(_HIGHEST_HZ, _HIGHEST_PART * rate_hz), _BANDS + 1)
     return length, np.asarray(np.ceil(edges * length / rate_hz), dtype=np.int64)

@@ -575,7 +575,7 @@ class PeriodicSums:
 
 
 def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
-    """Return flags of the spectral lines with these orders, as far as the sample rate allows."""
+    """Return flags of the spectral lines with these orders, up to the limit of the sample rate."""
     marked = np.isin(np.arange(frequency_hz.size), orders)
     if not np.any(marked):
         raise InvalidRequest(

@@ -32,8 +32,8 @@ _MOST_MODES = 3
 _APART = (0.5, 1.5)
 """Initial spacing of neighbouring poles, in half widths."""
 _LEAST_GAIN = 25.0
-"""Minimum reduction of chi square that justifies another mode (four parameters). By chance it exceeds 19 once
-in a thousand cases."""
+"""Minimum reduction of chi square that justifies another mode (four parameters). By chance, the reduction
+exceeds 19 once in a thousand cases."""
 _REACH_DAMPING = 4.0
 """Largest change of ln(damping ratio) from its start value in a fit."""
 _USUAL_HZ = 300.0
@@ -41,7 +41,7 @@ _USUAL_HZ = 300.0
 _LARGEST_SD_UNRESOLVED = 0.1
 """Largest relative uncertainty of the line or damping of an unresolved peak; others may be ripples."""
 _BACKGROUND_DEGREES = (1, 2, 3)
-"""Degrees of the background, tried in turn; near broad peaks a straight line is not enough."""
+"""Degrees of the background, tried in turn; near broad peaks, a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
 """Relative uncertainty of damping above which a peak counts as noise, not as a resonance."""
 
@@ -276,7 +276,7 @@ def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> Mod
 
 
 def _determined_modes(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
-    """Return the modes of a fit that its lines determine, sorted by frequency."""
+    """Return the modes that the lines of a fit determine, sorted by frequency."""
     determined_modes = (each for each in fit.resonances if _is_determined(each, lines))
     return tuple(sorted(determined_modes, key=lambda one: one.frequency_hz))
 

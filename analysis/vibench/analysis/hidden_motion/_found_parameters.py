@@ -22,7 +22,7 @@ from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
-"""Length of the part of the motion in which each restart searches the parameters [s]."""
+"""Length of the part of the motion in which each restart searches for parameters [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
 """Number of restarts; in a short motion their parts overlap and only their start values differ."""
 _TRIAL_S = 0.25
@@ -53,7 +53,7 @@ _ONE_SIDED_SD = {
 """Systematic error [SI] if m1 strikes one stop only. On 15 random dwells, all gaps were 0.4 to 7 nm too
 small, for an unknown reason."""
 _STARTS_APART = 0.3
-"""Shift of start values in prior standard deviations; their influence then shows as scatter."""
+"""Shift of start values in prior standard deviations, so that their influence shows as scatter."""
 
 
 _SHOWN = {
@@ -125,7 +125,7 @@ class FoundSpecimen(Tabular):
     parameters: tuple[FoundParameter, ...]
     restarts: int
     searched: bool
-    """Whether parameters were searched because tracking with the description failed."""
+    """Whether parameters were searched for because tracking with the description failed."""
 
 
 def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundSpecimen:
@@ -170,7 +170,7 @@ def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estima
 def _refine(
     described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> FoundSpecimen | str:
-    """Find parameters near start values; repeat from the result until it converges."""
+    """Find parameters near start values; restart from the result until convergence."""
     wanted = tuple(near)
     for _ in range(_ROUNDS):
         good = _restarts(motion, start, near)

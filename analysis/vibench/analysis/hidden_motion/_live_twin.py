@@ -176,7 +176,7 @@ _NOISE_S = 0.5
 _LOOKED_S = 0.25
 """Length of the newest samples searched for drop-outs [s]."""
 _FIND_S = 2.4
-"""Length of motion in which parameters are searched [s]."""
+"""Length of motion from which parameters are found [s]."""
 _PATIENCE = 2.0
 """Factor by which the wait between parameter searches grows with every search."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4

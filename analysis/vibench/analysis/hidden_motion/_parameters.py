@@ -39,8 +39,8 @@ class Search(NamedTuple):
     least_sd: float = 0.0
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
-    """Ratio of actual errors to the filter's standard deviation; the random walk makes it smaller than 1.
-    Determined on 31 random rigs; the slow tests check other rigs."""
+    """Ratio of actual errors to the filter's standard deviation; the random walk makes the ratio smaller than
+    1. Determined on 31 random rigs; the slow tests check other rigs."""
 
 
 SEARCHES = {

@@ -18,7 +18,7 @@ _EXACT_BAND = 0.42
 """Fraction of the sample rate up to which the correction is fitted; converters pass up to 0.45."""
 _FIT_POINTS = 400
 _REST_WEIGHT = 1e-3
-"""Weight of the correction's fit above its band; it only limits the gain there."""
+"""Weight of the correction's fit above its band; the weight only limits the gain there."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ _BAND_BELOW = 0.3
 """High-pass frequency for displacement, relative to the drive's; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
-"""Length of the newest signal in which the drive frequency is searched; five periods of 10 Hz [s]."""
+"""Length [s] of newest signal from which the drive frequency is found; five periods of 10 Hz."""
 _STRETCH_PERIODS = 25
 """Number of drive periods for one point of the responses, without disturbed ends; at least 0.1 s."""
 _STRETCH_S = 0.1

@@ -62,7 +62,7 @@ class LiveSpectra:
         self._is_used: Flags = np.zeros(averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
-        """Number of completed segments; when it changes, earlier results are out of date."""
+        """Number of completed segments; when this number changes, earlier results are out of date."""
 
     def add(self, values: Values) -> None:
         """Add the next samples, shape (channels, samples)."""

@@ -40,7 +40,7 @@ _LEAST_FRESH_S = 20e-3
 _MOST_FRESH_S = 0.1
 """Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
-"""Threshold of a kink in standard deviations of the noise; noise exceeds it once in two minutes."""
+"""Threshold of a kink in standard deviations of the noise, which exceeds it once in two minutes."""
 _SMOOTH_FACTOR = 3.0
 """Threshold of a kink relative to the filter output for a sine at the mean frequency of the motion."""
 _REST_SHARE = 0.2
@@ -199,7 +199,7 @@ class LiveView:
     channels
         Channels in the order of the rows of samples.
     band_hz
-        Excited band [Hz]. Transmission is shown in this band, and the drive is not searched below it.
+        Excited band [Hz]. Transmission is shown in this band, and the drive is not sought below it.
     delay_s
         Lag of the response channel behind the base channel [s].
     lead_in_s

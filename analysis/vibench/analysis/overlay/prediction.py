@@ -128,7 +128,7 @@ def _follow_points(
 
 
 def paper_amplitude_m(amplitude_vpp: float) -> float | None:
-    """Return the A0 of the paper for one of its three voltages; otherwise None."""
+    """Return the A0 of the paper for one of its three voltages; None for other voltages."""
     for voltage, amplitude in PAPER_AMPLITUDES_M.items():
         if np.isclose(voltage, amplitude_vpp, rtol=1e-3):
             return amplitude

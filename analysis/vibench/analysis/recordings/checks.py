@@ -38,7 +38,7 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""Smallest share of its input range that a channel should use, to be resolved by the converter."""
+"""Minimum share of the input range that a channel should use, so that the converter resolves it."""
 _FARTHEST = 1000.0
 """Largest plausible ratio of the motions of mass and base, or of base and mass."""
 _OFTEN_DARK = 0.01

@@ -315,7 +315,7 @@ def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:
 
 
 def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
-    """Draw the common figures, then those of each result: noise, sweeps, dwells, stepped sines."""
+    """Draw the common figures, then the figures of each result: noise, sweeps, dwells, stepped sines."""
     yield from figures_together(results)
     for each in results.in_order:
         yield from DRAWINGS[each.kind].figures(each)

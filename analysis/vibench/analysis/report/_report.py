@@ -171,7 +171,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
-    """Draw each map, with the levels and Responses I of stepped sines and sweeps on it."""
+    """Draw each map, with levels and Response I of stepped sines and sweeps on it."""
     levels = [
         RecordedLevel(each.analysis.facts.name, level, tuple(_curves(each, CurveKind.RESPONSE_I)))
         for each in results.in_order
@@ -297,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return result and age of the last bench check, and its findings that are not ok, as text."""
+    """Return, as text, result and age of the last bench check, and findings that are not ok."""
     check = facts.bench_check
     if not check:
         return "none"

@@ -162,7 +162,7 @@ class CampaignResults:
 
     @property
     def dwells(self) -> tuple[DwellResult, ...]:
-        """Results of dwells, sorted by frequency, then weak to strong."""
+        """Results of dwells, sorted by frequency and then from weak to strong."""
         return self._results_of(DwellAnalysis)
 
     def _results_of(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:

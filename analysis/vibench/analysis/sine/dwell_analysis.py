@@ -36,7 +36,7 @@ _CLEAR_MOTION = 0.8
 """Minimum share of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Largest deviation of noise maxima from their median, in median deviations; a burst exceeds it."""
+"""Largest deviation of noise maxima from their median, in median deviations; bursts deviate more."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 

@@ -223,7 +223,7 @@ def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
     """Return the smallest and largest difference between the levels of the jumps up and down [V].
 
-    None unless there are jumps in both directions.
+    Returns None unless there are jumps in both directions.
     """
     rises = [each for each in jumps if each.direction == "up" and each.factor > 1]
     falls = [each for each in jumps if each.direction == "down" and each.factor < 1]
@@ -312,7 +312,7 @@ def _response_near(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
 
 
 def _pairs(up: tuple[Jump, ...], down: tuple[Jump, ...]) -> tuple[tuple[Jump, Jump], ...]:
-    """Pair jumps of opposite sign: a step up in the up sweep is a step down in the down sweep."""
+    """Pair jumps of opposite sign, as a step up in the up sweep is a step down in the down sweep."""
     pairs, free = [], list(down)
     for jump in up:
         opposite = [each for each in free if each.decibel * jump.decibel < 0]

@@ -247,7 +247,7 @@ def spectral_density(
 
 @dataclass(frozen=True)
 class AmplitudeSpectrum(Tabular):
-    """Amplitude spectrum: a sine of amplitude 1 shows as 1."""
+    """Amplitude spectrum, in which a sine of amplitude 1 has the value 1."""
 
     OWN_UNITS: ClassVar = {"value": "{unit}", "amplitude": "{unit}"}
 

@@ -1,4 +1,4 @@
-"""Expected uncertainty of a plan before the measurement; recording times that reach its targets."""
+"""Expected uncertainty of a plan before the measurement, and recording times that reach its targets."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -245,7 +245,7 @@ def recorded_s(measurement: Measurement) -> float:
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
     """Predict the recorded time of a measurement with `until`, total of all parts [s].
 
-    A part ends at a check of its bounds, and at its planned time at the latest. None if the scatter is
+    A part ends at a check of its bounds, or at its planned time at the latest. None if the scatter is
     unknown beforehand, or without `until`.
     """
     return _in_all(measurement, rig, end_s)
