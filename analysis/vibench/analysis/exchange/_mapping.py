@@ -143,7 +143,7 @@ class ChannelMapping(FrozenModel):
 
 
 class Part(FrozenModel):
-    """Start and end of a part of the plan [s since the first sample of the file]."""
+    """Start and end of a part of the plan in the file [s since its first sample]."""
 
     start_s: NonNegativeFloat
     stop_s: PositiveFloat
