@@ -2,7 +2,7 @@
 
 Each one implements a protocol of `vibench.acquisition.instruments`: every setting is read back, a refused
 setting becomes an error with advice, and outputs are switched off after any error. No other package here
-imports pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but no plans or runs, and cannot
+imports pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but not plans or runs, and cannot
 distinguish a simulated instrument from a real one.
 """
 

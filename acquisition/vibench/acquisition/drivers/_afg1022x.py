@@ -36,7 +36,7 @@ class AFG1022X(ScpiInstrument):
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` is the same in words."""
+    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` describes it in words."""
     wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
 
@@ -58,7 +58,7 @@ class AFG1022X(ScpiInstrument):
     codes: ArbitraryCodes | None = None
     """Waveform in the memory that the output plays; None if the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
-    """Settings that could neither be made nor read remotely: the operator must confirm them."""
+    """Settings that could be neither made nor read remotely: the operator must confirm them."""
     _is_known = False
     _is_silent_and_closed = _has_not_stopped = False
 
@@ -125,7 +125,7 @@ class AFG1022X(ScpiInstrument):
         minimum.
 
         Raises SettingRefused when the memory reads back differently, and LimitExceeded when points,
-        repetition or amplitude are outside the limits of instrument or bench.
+        repetition or amplitude are outside the limits of the instrument or the bench.
         """
         codes = self.model.codes(waveform)
         panel_vpp = amplitude_vpp * codes.panel_factor
@@ -185,7 +185,7 @@ class AFG1022X(ScpiInstrument):
             self.output = "ON"
 
     def stop(self) -> None:
-        """Switch the output off. May be called at any time; repeated if it fails, also over a new session.
+        """Switch the output off, at any time; after a failure, try again, also over a new session.
 
         Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
         must act.
@@ -233,7 +233,7 @@ class AFG1022X(ScpiInstrument):
     def measured_latency_s(self) -> float:
         """Return the duration of one verified change of amplitude [s]; a stop takes at least as long.
 
-        The result is the median of nine changes; each sets the present amplitude again.
+        The result is the median of nine changes; each change sets the present amplitude again.
         """
         durations_s = []
         for _ in range(_LATENCY_TRIALS):
@@ -323,11 +323,11 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Set the load that the generator expects; return it as a setting to confirm if it cannot be read.
+        """Set the load that the generator expects; return it for confirmation if it cannot be read.
 
         Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so the
         driver tries it. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused
-        when the generator reports another load that cannot be changed.
+        when the generator reports a different load and does not change it.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")

@@ -1,4 +1,4 @@
-"""Digitizer on NI-DAQmx: samples continuously, hardware-timed, without gaps; it is always released."""
+"""Digitizer on NI-DAQmx: continuous hardware-timed sampling without gaps; it is always released."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -31,7 +31,7 @@ from ._overload import overload_ranges
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of calls after a call without reply [s], so that a run ends in a bounded time."""
+"""Time limit of each call once a call had no reply [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
@@ -127,7 +127,7 @@ _MOST_COUNTS = 2**29
 
 
 def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | None:
-    """Add one input to a task, named by its role; return its volts per count (None if not linear).
+    """Add one input to a task under the name of its role; return its volts per count (None if not linear).
 
     Raises SettingRefused when coupling or sensor current read back differently, and DaqError when the device
     refuses a setting.
@@ -228,7 +228,7 @@ class DaqmxDigitizer:
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
         self.session = session
-        """Connection to the driver, which an output of the same driver uses, too."""
+        """Connection to the driver; an output of the same driver uses it, too."""
         self._config = config
         self._channels = channels
         self.roles = tuple(channel.role.value for channel in channels)
@@ -250,7 +250,7 @@ class DaqmxDigitizer:
         """Reserve the converter of a rig with all its inputs, read back its rate, and return the digitizer.
 
         Raises InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError or SettingRefused as
-        `_daqmx_errors` assigns them. Nothing stays reserved then.
+        `_daqmx_errors` assigns them. After an error, nothing stays reserved.
         """
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
         with ExitStack() as undo:
@@ -268,7 +268,7 @@ class DaqmxDigitizer:
         return self._identity
 
     def start_trigger(self) -> str:
-        """Terminal of this task's start trigger; arm other tasks with it before `start`."""
+        """Terminal of this task's start trigger; other tasks must be armed with it before `start`."""
         with daqmx_call(f"reading the start trigger of {self._config.device}"):
             return str(self._open_task().triggers.start_trigger.term)
 
@@ -309,7 +309,7 @@ class DaqmxDigitizer:
 
     @property
     def waiting_samples(self) -> int:
-        """Number of converted samples of every channel that are not read yet."""
+        """Number of samples per channel that were converted but not yet read."""
         if not self._is_running:
             return 0
         with daqmx_call(f"reading the number of waiting samples of {self._config.device}"):

@@ -29,7 +29,7 @@ class DaqmxOutput:
     """An `AnalogOutput` on NI-DAQmx, started by the same trigger as the inputs.
 
     ``open`` it, ``write`` the first samples, ``arm`` it, then start the digitizer: both begin with sample 0.
-    Continue to write as fast as samples are played. `stop` goes to zero volts at once; the next ``write``
+    Then keep writing as fast as samples are played. `stop` goes to zero volts at once; the next ``write``
     begins a new stream. If the program dies, the output runs out of samples within ``ahead_s`` and stops.
     """
 
@@ -62,9 +62,9 @@ class DaqmxOutput:
         Raises
         ------
         SettingRefused
-            When the device takes another sample rate than requested.
+            When the device uses a sample rate other than the requested rate.
         InstrumentError
-            As listed in `_daqmx_errors`; nothing stays reserved then.
+            As listed in `_daqmx_errors`; afterwards, nothing stays reserved.
         """
         output = cls(physical, config, digitizer)
         output._to_zero()
@@ -87,7 +87,7 @@ class DaqmxOutput:
         LimitExceeded
             When a sample is beyond the limit of the bench, or NaN. Nothing was written.
         DataLost
-            When the output ran out of samples before and has stopped.
+            When the output has run out of samples and stopped.
         """
         require_playable(volts, self._physical, self._config.limit_v, is_open=self._is_open)
         task = self._task or self._reserve()
@@ -185,7 +185,7 @@ class DaqmxOutput:
 
 
 def _set_idle_output(channel: AOChannel) -> IdleOutput:
-    """Set the idle output to zero volts; return the value read back, as many devices hold the last value."""
+    """Set the idle output to zero volts, as many devices hold the last value; return the value read back."""
     # A device that cannot hold zero refuses the setting; a device without this setting refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS

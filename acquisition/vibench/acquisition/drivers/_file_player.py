@@ -82,7 +82,7 @@ class FilePlayer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """Step of the recording's converter for each channel [V]; None if count zero is not zero volts."""
+        """Converter step of each channel in the recording [V]; None if count zero is not zero volts."""
         heads = (self._recording.channel(role) for role in self.roles)
         return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
 

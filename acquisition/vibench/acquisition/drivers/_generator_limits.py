@@ -26,7 +26,7 @@ class Shape(StrEnum):
 class ArbitraryCodes(NamedTuple):
     """Codes of one period in the generator's memory, without DC and over the full range of codes.
 
-    Code 0 plays minus half of the panel's peak-to-peak amplitude, the model's ``top_code`` plays plus half.
+    Code 0 plays minus half of the panel's peak-to-peak amplitude; the model's ``top_code`` plays plus half.
     """
 
     codes: NDArray[np.uint16]
@@ -36,12 +36,12 @@ class ArbitraryCodes(NamedTuple):
 
 @dataclass(frozen=True)
 class GeneratorModel:
-    """Limits of one generator model, and the class of `vibench.acquisition.drivers` that opens it."""
+    """Limits of one generator model, and the class in `vibench.acquisition.drivers` that drives it."""
 
     name: str
     driver: str
     open_range_vpp: tuple[float, float]
-    """Smallest and largest amplitude without load and without offset, peak to peak [V]."""
+    """Smallest and largest amplitude with no load and no offset, peak to peak [V]."""
     lowest_hz: float
     highest_hz: dict[Shape, float]
     memory_points: tuple[int, int]
@@ -61,7 +61,7 @@ class GeneratorModel:
         )
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open a generator and return its driver; pyvisa is loaded only now."""
+        """Open a generator and return its driver; pyvisa is not loaded before this call."""
         driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
         return cast("GeneratorDriver", driver).open(config)
 
@@ -79,7 +79,7 @@ class GeneratorModel:
         _require(cycles, self.burst_cycles, "cycles", f"a burst of the {self.name}")
 
     def check_amplitude(self, config: GeneratorConfig, amplitude_vpp: float) -> None:
-        """Raise LimitExceeded unless bench and generator allow this amplitude, without an offset."""
+        """Raise LimitExceeded unless bench and generator allow this amplitude at zero offset."""
         allowed = self.amplitude_range_vpp(config)
         limit_vpp = config.amplitude_limit_vpp
         reason = f"the {self.name} with load_ohm = {config.load_ohm}"
@@ -176,7 +176,7 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Placeholder on a bench without generator; refuses all commands, or accepts those of a played recording.
+    """Placeholder on a bench without generator; refuses all commands except those of a replayed recording.
 
     The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """
@@ -187,7 +187,7 @@ class NoGenerator:
     amplitude_limit_vpp: float = 0.0
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return a description that allows no signal, or one that allows the plan of a recording."""
+        """Return capabilities that allow no signal, or those that allow the plan of a recording."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
@@ -220,7 +220,7 @@ class NoGenerator:
         self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: the description of the generator has no internal sweep."""
+        """Refuse the internal sweep, which the placeholder's capabilities do not include."""
         raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot be played by {self.name}")
 
     def set_frequency(self, frequency_hz: float) -> None:

@@ -1,6 +1,6 @@
 """The Keysight 33500B: sines, waveforms and bursts like any other generator, and internal sweeps.
 
-Commands: Keysight Trueform Series Operating and Service Guide, as public drivers use them; the driver was not
+Commands: Keysight Trueform Series Operating and Service Guide, as used in public drivers. This driver was not
 tested on an instrument.
 """
 
@@ -100,7 +100,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Write the memory; compare number and mean of its points, because points cannot be read back."""
+        """Write the memory; compare the number and mean of its points, as the points cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

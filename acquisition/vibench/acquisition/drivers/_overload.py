@@ -1,4 +1,4 @@
-"""Samples near the end of an input's range, and samples that an output must not play."""
+"""Checks for samples near the ends of an input's range, and for samples that an output must not play."""
 
 import numpy as np
 

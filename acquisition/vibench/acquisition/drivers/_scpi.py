@@ -1,4 +1,4 @@
-"""SCPI instruments: error queues and settings are read back, and lost connections are reported."""
+"""SCPI instruments: the error queue and each setting are read back; lost connections are reported."""
 
 import re
 import threading
@@ -47,7 +47,7 @@ class ScpiInstrument:
     channel
         Replaces ``{c}`` in the headers of settings.
     settle_s
-        Pause that the instrument needs after each command [s]; none after a reply.
+        Pause that the instrument needs after each command [s]; it needs none after a reply.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class ScpiInstrument:
         self.name = name
         self.channel = channel
         self.held: dict[str, Any] = {}
-        """Values of settings read back since the last failure, by SCPI header."""
+        """Values of the settings, as read back since the last failure, by SCPI header."""
         self._connect = connect
         self._settle_s = settle_s
         self._pause = pause
@@ -70,7 +70,7 @@ class ScpiInstrument:
         self._reply_due = False
 
     def command(self, message: str, codes: Codes | None = None) -> None:
-        """Send a command; raises InstrumentError when the instrument's error queue then has an entry."""
+        """Send a command; raises InstrumentError if the error queue has an entry afterwards."""
         if complaints := self.send(message, codes):
             raise InstrumentError(
                 f"{self.name} refused {message!r}: {'; '.join(complaints)}. The setting has no effect; "
@@ -168,7 +168,7 @@ class ScpiInstrument:
             )
 
     def disconnect(self) -> None:
-        """Close the session. May be called at any time, also when the connection is lost."""
+        """Close the session. May be called at any time, even when the connection is lost."""
         with self._lock, self._report_losses("closing the session"):
             self._link.close()
 
@@ -286,7 +286,7 @@ class Word:
         self._expect(owner, word)
 
     def insist(self, owner: ScpiInstrument, word: str) -> None:
-        """Set the word and ignore errors in the queue, which may be old: the value read back decides."""
+        """Set the word; the value read back decides, as errors in the queue may be old and are ignored."""
         owner.send(f"{self.header.format(c=owner.channel)} {word}")
         self._expect(owner, word)
 
@@ -306,4 +306,4 @@ def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> Setting
 
 
 SWITCH = {"ON": ("1", "ON"), "OFF": ("0", "OFF")}
-"""Words, and valid replies, of a setting that is on or off."""
+"""Command words of an on/off setting, and the replies it accepts."""

@@ -1,8 +1,8 @@
 """Calibrated sound card as converter and analogue output, over PortAudio.
 
 A sound card does not report volts and passes no DC. Its full scale is therefore measured once and entered in
-``daq.options`` (docs/instruments.md, decision 0054); without it, no card is opened. Inputs and output form
-one stream, so they start together except for the card's delay.
+``daq.options`` (docs/instruments.md, decision 0054); without this value, no card is opened. Inputs and output
+form one stream, so apart from the card's delay they start together.
 """
 
 from collections import deque
@@ -21,14 +21,14 @@ from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges, require_playable
 
 _LATEST_S = 10.0
-"""Delay of samples after which the card counts as lost [s]."""
+"""Time without samples after which the card counts as lost [s]."""
 _SAME_RATE = 1e-6
 
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
 
 
 def _sounddevice() -> Any:
-    """Load the library; raises MissingLibrary if it, or the system's PortAudio, is not installed."""
+    """Load the library; raises MissingLibrary if the library or the system's PortAudio is not installed."""
     require_extra("sound")
     try:
         return import_module("sounddevice")
@@ -119,7 +119,7 @@ class SoundCardDigitizer:
         self.roles = tuple(channel.role.value for channel in channels)
         """Roles of the channels, in the order of the rows of a block."""
         self.volts_per_count = (None,) * len(channels)
-        """None for each channel, because PortAudio returns numbers without converter counts."""
+        """None for each channel, because PortAudio returns fractions of full scale, not converter counts."""
         self._full_scale_v = float(rig.daq.options["input_full_scale_v"])
         self._next_sample = 0
         self._is_running = False
@@ -281,7 +281,7 @@ class SoundCardOutput:
             self._card.is_armed = True
 
     def stop(self) -> None:
-        """Play zero volts from the next block on. May be called at any time."""
+        """Play zero volts, starting with the next block. May be called at any time."""
         self._card.drop()
 
     def close(self) -> None:

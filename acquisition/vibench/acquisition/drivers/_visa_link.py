@@ -91,7 +91,7 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
 
 
 def _is_locked_out(resource: str) -> bool:
-    """Whether Linux shows a USB device to which this account may not write; libusb reports it as absent."""
+    """Whether Linux lists a USB device that this account may not write to; libusb reports it as absent."""
     named = _USB.match(resource)
     if named is None:
         return False

@@ -1,4 +1,4 @@
-"""``python -m vibench.acquisition.engine``: process of an engine. It first prints its address in one line."""
+"""``python -m vibench.acquisition.engine``: process of an engine. Its first line of output is its address."""
 
 import argparse
 import os
@@ -15,7 +15,7 @@ from ._server import LOOPBACK, address_line, serving
 from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
-"""Interval at which an engine without parent process checks whether its own work has ended [s]."""
+"""Interval at which an engine without a parent process checks whether its work has ended [s]."""
 FORGOTTEN_S = 60.0
 """An idle unattended engine ends after this time without a request [s]."""
 
@@ -59,7 +59,7 @@ def _handle_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
-    """End an idle engine that nobody uses, because it may block a bench for other programs."""
+    """End an idle engine that nobody uses, because it may keep a bench from other programs."""
 
     def look() -> None:
         pause = Event()

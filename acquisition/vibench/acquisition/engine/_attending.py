@@ -1,4 +1,4 @@
-"""``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which imports little.
+"""``python -m vibench.acquisition.engine._attending``: process of an `Attendant`; it imports little.
 
 Its standard input is a line with the engine's address, then one byte each time the parent program shows that
 it is responsive. The process ends when the parent program ends.
@@ -18,9 +18,9 @@ from ._wire import ANSWERS, Message, receive, send
 BEAT_S = 0.04
 """Interval between heartbeats to the engine [s]."""
 STOPPED = ("T", "t", "Z", "X")
-"""Letters in ``/proc`` for the state of a process that is suspended or dead (Linux)."""
+"""State letters in ``/proc`` of a suspended or dead process (Linux)."""
 LEAST_OWN = 0.25
-"""Smallest fraction of the time without an input byte that counts; the rest may be waits for a processor."""
+"""Smallest counted fraction of the time without an input byte; the rest may be waits for a processor."""
 
 
 class _Program:

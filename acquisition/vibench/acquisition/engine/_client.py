@@ -69,7 +69,7 @@ def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str]
 
 
 def announced_engines() -> tuple[Announcement, ...]:
-    """Return all engines of this computer whose process runs, oldest first, even if they do not answer.
+    """Return all engines on this computer whose process runs, oldest first, even if they do not answer.
 
     An engine that refuses connections is left out; `programs_without_engine` returns it if its process runs.
     """
@@ -89,7 +89,7 @@ def programs_without_engine() -> tuple[Program, ...]:
 
 
 def the_engine(pid: int | None) -> Announcement:
-    """Return the engine with the process number ``pid``; None: the only engine.
+    """Return the engine with the process number ``pid``; if ``pid`` is None, return the only engine.
 
     Raises EngineError when there is no such engine, or several engines and ``pid`` is None.
     """
@@ -112,7 +112,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
     Programs in other containers of this computer are included, since they read the same state folder. So are
     programs that ended without confirming silence. Raises EngineError when there is none. ``pid`` selects one
-    program; None: all of this computer.
+    program; None selects all of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained, *unconfirmed_programs())
@@ -129,7 +129,7 @@ def out_of_reach() -> str:
 
 
 def require_ended(engine: Announcement) -> None:
-    """Refuse to continue after an engine was killed: its output is not confirmed to be off.
+    """Refuse to continue after an engine was killed, as its output is not confirmed to be off.
 
     Raises EngineGone when the announced ``engine`` was killed, with the advice to switch the amplifier off.
     """
@@ -159,7 +159,7 @@ def _refuses(address: EngineAddress) -> bool:
 
 
 PATIENCE_S = 5.0
-"""Longest wait for an answer of the engine, which usually takes milliseconds [s]."""
+"""Longest wait for an answer from the engine, which usually answers within milliseconds [s]."""
 
 
 class Hello(FrozenModel):
@@ -201,9 +201,9 @@ def exchange(
     Raises
     ------
     EngineSilent
-        When no answer comes in time; the connection is closed then.
+        When no answer comes in time; the connection is then closed.
     EngineGone
-        When the connection has ended; it is closed then.
+        When the connection has ended; it is then closed on this side, too.
     AcquisitionError
         When the engine refuses the request; this is the engine's own error.
     """
@@ -304,7 +304,7 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
 
 
 BEAT_EVERY_S = 0.02
-"""Shortest interval between two bytes that `Attendant.live` sends [s]."""
+"""Shortest interval between bytes that `Attendant.live` sends [s]."""
 AGAIN_S = 1.0
 """Shortest interval between restarts of an attendant process that ended too early [s]."""
 
@@ -312,10 +312,10 @@ AGAIN_S = 1.0
 class Attendant:
     """Small separate process that sends heartbeats to an engine, and sleeps most of the time.
 
-    On a busy computer, a thread of a window can wait a second or more for Python's lock. A process that
-    mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It sends
-    no heartbeat while the system has stopped that program (Linux). Each heartbeat reports how long `live` has
-    not been called.
+    On a busy computer, a thread of a window can wait a second or more for Python's global lock. A process
+    that mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It
+    sends no heartbeat while the system has suspended that program (Linux). Each heartbeat reports how long
+    `live` has not been called.
     """
 
     def __init__(self, address: EngineAddress) -> None:

@@ -56,7 +56,7 @@ def bench_facts(bench: Bench, role: Role | None = None) -> BenchFacts:
 
 
 class Engine:
-    """A bench and its jobs. One thread calls the methods; only this thread uses the instruments.
+    """A bench and its jobs. A single thread calls the methods and uses the instruments.
 
     Other threads read `published` and use `switch`. If a method fails, it publishes the error and then raises
     it. Call `close` at the end: the bench is then silent and closed.
@@ -84,7 +84,7 @@ class Engine:
 
     @property
     def stop_sentence(self) -> str:
-        """Sentence: why the run was stopped, and whether the output is off; empty without a stop."""
+        """Sentence that tells why the run was stopped and whether the output is off; empty without a stop."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""
@@ -96,7 +96,7 @@ class Engine:
         return () if self._reconnecting is None else self._reconnecting.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
-        """Open the bench of a rig; ``confirm`` as for `vibench.acquisition.open_bench`."""
+        """Open the bench of a rig; for ``confirm``, see `vibench.acquisition.open_bench`."""
         try:
             self._reconnecting = ReconnectingBench(rig, confirm)
             self._reconnecting.__enter__()
@@ -139,7 +139,7 @@ class Engine:
         messengers: tuple[Messenger, ...] = (),
         move_beam: CommandMessenger | None = None,
     ) -> tuple[PointResult, ...]:
-        """Run a campaign and return its results; `run_campaign` calls the functions that are given."""
+        """Run a campaign and return its results; the given functions are called by `run_campaign`."""
         assert self._reconnecting is not None
         facts_at = cache(partial(bench_facts, self.bench))
         roles = {name: each.point and each.point.role for name, each in request.campaign.recordings()}
@@ -199,7 +199,7 @@ class Engine:
         return point_results
 
     def turn_twin(self, switch: TwinSwitch) -> None:
-        """Start or end the live twin, a separate process that is never waited for."""
+        """Start or end the live twin, a separate process for which the engine never waits."""
         self._twin.turn(switch)
         self.published.twin(TwinStatus() if self._twin.is_on else None)
 

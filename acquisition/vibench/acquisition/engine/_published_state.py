@@ -33,7 +33,7 @@ from ._status import (
 )
 
 HELD_S = 10.0
-"""Length of the newest samples that are kept for viewers [s]."""
+"""Duration of the newest samples, which are kept for viewers [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class Messages:
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
-        """Report that the engine stopped the drive on its own, without a request of the operator."""
+        """Report that the engine stopped the drive without a request of the operator."""
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:
@@ -217,7 +217,7 @@ class PublishedState:
         self._put(check=report, checked_utc=utc)
 
     def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
-        """Set the armed plan, which will start next."""
+        """Set the armed plan, which is the next to start."""
         self._armed_until_s = monotonic() + plan.expires_in_s
         self._put_rows(_queue_rows(campaign))
         self._put(state=EngineState.ARMED, armed=plan)
@@ -308,7 +308,7 @@ class PublishedState:
         )
 
     def _look_at_disk(self) -> None:
-        """Read the free disk space in another thread: a folder that hangs must not delay a stop."""
+        """Read the free disk space in another thread: an unresponsive folder must not delay a stop."""
         if monotonic() < self._disk_due_s or self._beside.is_busy:
             return
         self._disk_due_s = monotonic() + DISK_INTERVAL_S

@@ -94,9 +94,9 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 STALL_S = 0.2
-"""Interval between two checks of the viewers above which this process counts as stalled [s]."""
+"""Interval between two checks of the viewers beyond which this process counts as stalled [s]."""
 LATE_FACTOR = 4.0
-"""Factor on this process's own delay, by which the time allowed without requests grows (same computer)."""
+"""Growth of the time allowed without requests, per unit of this process's own delay (same computer)."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995
@@ -104,11 +104,11 @@ FORGETTING = 0.995
 
 
 class RequestHandler:
-    """Handles the requests to an engine.
+    """Handler of the requests to an engine.
 
     The handler answers from the published state, queues a job for the engine, or sets the engine's stop
-    switch. `carry_out` takes requests: it raises `EngineError` with one sentence when the engine's state does
-    not permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
+    switch. `carry_out` accepts requests: it raises `EngineError` with one sentence when the engine's state
+    does not permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
 
     def __init__(self, engine: Engine, jobs: JobQueue) -> None:
@@ -161,7 +161,7 @@ class RequestHandler:
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the status of the engine; without the rows if the viewer already has them."""
+        """Return the status of the engine, without the rows if the viewer already has them."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 
@@ -301,7 +301,7 @@ class RequestHandler:
 
     @property
     def outlives_its_parent(self) -> bool:
-        """Whether work remains after the parent program has ended.
+        """Whether work remains once the parent program has ended.
 
         The work is an unattended campaign; afterwards the engine continues while a viewer attends it.
         """

@@ -35,9 +35,9 @@ from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireE
 
 WAITING_MOST = 64
 GREETING_S = 2.0
-"""A connection that has not shown the token after this time is closed [s]."""
+"""Time after which a connection that has not shown the token is closed [s]."""
 YOUNG_S = 0.01
-"""Every connection has at least this time to show the token, even if there are many connections [s]."""
+"""Shortest time that a connection gets to show the token, even if there are many connections [s]."""
 _NO_ROOM = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 Admitted = Callable[[socket.socket, ConnectionRole], None]
@@ -184,7 +184,7 @@ class Admission:
 
 
 def answer_to(handler: RequestHandler, message: Message) -> Message:
-    """Carry out the request in a message. If the engine refuses it, one sentence is returned."""
+    """Carry out the request in a message, and return the answer, or one sentence if the engine refuses."""
     try:
         arguments = dict(REQUEST.validate_json(message.text))
         verb = VERBS[arguments.pop("ask")]
@@ -199,7 +199,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Maximum number of viewers (20 MB each if they do not read). The next displaces the least recent viewer."""
+"""Maximum number of viewers (20 MB each if they do not read). One more displaces the least recent."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 

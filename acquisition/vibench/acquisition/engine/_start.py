@@ -48,7 +48,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def unattended_engine() -> Announcement | None:
-    """Return an engine that runs a campaign although its parent program has ended; None if there is none."""
+    """Return an engine that runs a campaign although its parent program has ended; None without one."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
@@ -135,7 +135,7 @@ class StopDelivery(StrEnum):
     UNHEEDED = "unheeded"
     """The engine accepted the stop but has not confirmed that its output is off."""
     KEPT = "kept"
-    """The engine has not accepted the stop; its process is alive, and will obey when it runs again."""
+    """The engine has not accepted the stop; its process is alive and will obey when it runs again."""
 
 
 def stop_engine(
@@ -143,12 +143,11 @@ def stop_engine(
 ) -> StopDelivery:
     """Stop the drive of an engine or another program, and its campaign.
 
-    The stop is written to a file in the state folder. The program obeys within 0.05 s, or when
-    its process runs again. The function returns when the program has confirmed that its output is off, or
-    after a time limit. If no file can be written, or the program does not read it, the stop is sent over the
-    engine's connection. A hold (pause) is only sent, because a hold from a file could begin too late.
-    ``engine`` is the announcement of the program, ``level`` the kind of the stop; ``reason`` is stored in the
-    recording.
+    The stop is written to a file in the state folder. The program obeys within 0.05 s, or when its process
+    runs again. The function returns when the program has confirmed that its output is off, or after a time
+    limit. If no file can be written, or the program does not read it, the stop is sent over the engine's
+    connection. A hold (pause) is only sent, because a hold from a file could begin too late. ``engine`` is
+    the announcement of the program, ``level`` is the kind of stop, and ``reason`` is stored in the recording.
 
     Raises
     ------

@@ -64,7 +64,7 @@ VIEWER_PATIENCE_S = 0.5
 LONGEST_PATIENCE_S = 10.0
 """Longest time without requests that an attended run can be granted [s]."""
 HUNG_FACTOR = 4.0
-"""Factor on the allowed time without requests for a viewer that reports a blocked window."""
+"""Factor that multiplies the allowed time without requests if a viewer reports a blocked window."""
 
 
 def hung_patience_s(granted_s: float) -> float:
@@ -101,14 +101,14 @@ class BenchFacts(FrozenModel):
 
 
 class ArmedPlan(FrozenModel):
-    """Description of an armed campaign, in words for the experimenter."""
+    """Description of an armed campaign for the experimenter."""
 
     campaign: str
     folder: str
     lines: tuple[str, ...]
     """Lines of text on signal, level, limits, duration and folder of the campaign."""
     expires_in_s: float
-    """The engine disarms itself after this time."""
+    """Time after which the engine disarms itself."""
     attendance: Supervision
     """Whether the run needs the presence of a viewer."""
     patience_s: float
@@ -135,7 +135,7 @@ class RunStatus(FrozenModel):
     plan: str = ""
     """Text on the excitation: kind and highest level."""
     until: UntilNote | None = None
-    """Error bounds of the results so far, for a measurement with `until`."""
+    """Present error bounds of the results, for a measurement with `until`."""
 
 
 class ChannelLevel(FrozenModel):
@@ -179,7 +179,7 @@ class EngineMessage(FrozenModel):
 
 
 class TwinStatus(FrozenModel):
-    """The live twin's last report: motion of m1 between its stops, estimated parameters, and delay."""
+    """Last report of the live twin: motion of m1 between the stops, estimated parameters, and delay."""
 
     pid: int = 0
     """Process number of the twin; 0 until its first report."""
@@ -192,21 +192,21 @@ class TwinStatus(FrozenModel):
     step_s: float = 0.0
     """Time step of ``p_m`` [s]; the last value of ``p_m`` is at the newest sample."""
     p_m: tuple[float | None, ...] = ()
-    """Relative displacement of m1 [m]; None where the twin had lost the motion."""
+    """Relative displacement of m1 [m]; None where the twin had lost track of the motion."""
     forecast_m: tuple[float, ...] = ()
     """Forecast of ``p_m`` from the newest sample on, as far as it is reliable [m]."""
     forecast_error_m: tuple[float, ...] = ()
-    """Error bound that 68 % of earlier forecasts did not exceed, for each time ahead [m]."""
+    """Error that 68 % of earlier forecasts did not exceed, for each time ahead [m]."""
     stops_m: tuple[float, float] = (0.0, 0.0)
     """Positions of the lower and the upper stop of m1 [m]."""
     numbers: tuple[tuple[str, str], ...] = ()
     """Parameters estimated from this run's collisions: name, and value with 95 % bounds."""
     level: float | None = None
-    """Normalised innovation over the last 0.1 s; 1 for noise alone, None when the motion is lost."""
+    """Normalised innovation over the last 0.1 s: 1 for noise alone; None if the twin has lost the motion."""
     limit: float | None = None
-    """Level above which a change of the specimen is suspected; None while the usual level is being learnt."""
+    """Innovation above which a specimen change is suspected; None while the usual level is being learnt."""
     busy_share: float = 0.0
-    """Processor time of the twin's process relative to the time since the run began."""
+    """Processor time of the twin divided by the time since the run began."""
     missed_s: float = 0.0
     """Duration of motion that the twin skipped because it was too slow [s]; recorded nevertheless."""
     behind_s: float = 0.0
@@ -235,7 +235,7 @@ class EngineStatus(FrozenModel):
     samples: int = 0
     """Number of samples per channel in this run so far."""
     run_id: int = 0
-    """Number of the recording in this engine; data with another number are out of date."""
+    """Number of the recording, counted by this engine; data with another number are out of date."""
     twin: TwinStatus | None = None
     """The live twin's last report; None without a twin."""
     is_left_alone: bool = False
@@ -294,7 +294,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Return why the twin ended by itself, only once; None while the twin runs or is off."""
+        """Return, only once, why the twin ended by itself; None while the twin runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

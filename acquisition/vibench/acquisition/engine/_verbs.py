@@ -62,7 +62,7 @@ class CampaignRequest(FrozenModel):
     changed_bench: ChangedBench = ChangedBench.REFUSE
     check: CheckRule = CheckRule.FRESH
     attendance: Supervision | None = None
-    """Whether the run needs the presence of a viewer; None: as set at the start of the engine."""
+    """Whether the run needs the presence of a viewer; None uses the setting from the start of the engine."""
     longest_patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)] = (
         VIEWER_PATIENCE_S
     )
@@ -80,7 +80,7 @@ class Answer(Generic[A]):
 
     written: Callable[[A], Message]
     read: Callable[[Any, bytes], A]
-    """Returns the value of an answer from its parsed JSON text and the bytes after that text."""
+    """Function that returns an answer's value from its parsed JSON text and the bytes after that text."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ VERBS: dict[str, Verb[Any]] = {}
 def verb(
     word: str, answer: Answer[A], *states: EngineState, work_s: float = 0.0
 ) -> Callable[[Callable[Concatenate[Any, P], A]], Callable[Concatenate[Any, P], A]]:
-    """Return a decorator that declares a method as a verb; the method then sends the request."""
+    """Return a decorator that declares a method as a verb, so that calling the method sends the request."""
 
     def declare(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
         parameters = signature(call)
@@ -259,7 +259,7 @@ class EngineVerbs:
 
     @verb("beat", DONE)
     def heartbeat(self, still_s: NonNegativeFloat = 0.0) -> None:
-        """Report that the viewer is present, and how long its window was blocked (``still_s`` [s])."""
+        """Report that the viewer is present, and how long its window has been blocked (``still_s`` [s])."""
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:
@@ -273,4 +273,4 @@ class EngineVerbs:
 
 _REQUESTS: Any = reduce(or_, (row.request for row in VERBS.values()))
 REQUEST: TypeAdapter[FrozenModel] = TypeAdapter(Annotated[_REQUESTS, Field(discriminator="ask")])
-"""Validates the JSON text of a request."""
+"""Validator of the JSON text of a request."""

@@ -35,7 +35,7 @@ ANSWERS = Bounds(32_000_000, 64_000_000)
 
 
 class WireError(ConnectionError):
-    """The other side of the connection has disconnected, or does not use this protocol."""
+    """Error: the other side of the connection has disconnected, or does not use this protocol."""
 
 
 @dataclass(frozen=True)

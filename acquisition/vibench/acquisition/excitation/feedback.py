@@ -10,7 +10,7 @@ from ..host.toml_file import FrozenModel
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
-"""Displacement to be held [m]. The bounds, which no sensor or shaker reaches, only catch wrong units."""
+"""Displacement to be held [m]. The bounds only catch wrong units; no sensor or shaker reaches them."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
 """Acceleration to be held [m/s2]. The bounds only catch wrong units, as no shaker reaches 10 000 g."""
 
@@ -56,7 +56,7 @@ class BaseLevel(FrozenModel):
     acceleration_m_per_s2: HeldMetresPerS2 | None = None
     """Peak acceleration of the fundamental [m/s2]; give either this or ``displacement_m``."""
     displacement_m: HeldMetres | None = None
-    """Peak displacement of the fundamental at every frequency [m]; or give ``acceleration_m_per_s2``."""
+    """Peak displacement of the fundamental at every frequency [m]; give this or ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
     """Allowed deviation of the measured level from the level to be held, relative to that level."""
     most_change: float = Field(default=1.25, gt=1, le=4)
@@ -70,7 +70,7 @@ class BaseLevel(FrozenModel):
 
     @property
     def quantity(self) -> str:
-        """The quantity of the base that is held: ``"acceleration"`` or ``"displacement"``."""
+        """The quantity of the base motion that is held: ``"acceleration"`` or ``"displacement"``."""
         return "acceleration" if self.displacement_m is None else "displacement"
 
     @property
@@ -94,6 +94,6 @@ class JumpSearch(FrozenModel):
     factor: float = Field(default=1.5, gt=1, le=100)
     """Change of Response II (fundamental of m0 over base) above this factor counts as a jump."""
     resolution_hz: PositiveFloat = 0.25
-    """Largest allowed distance between the two frequencies that enclose a located jump [Hz]."""
+    """Largest allowed spacing of the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
     """Largest number of searches in one pass, including those at steep changes that are no jumps."""

@@ -49,7 +49,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     tolerance_db: Decibels = 3.0
     """Allowed deviation of the measured power spectral density from ``spectrum`` [dB]."""
     abort_db: Decibels = 6.0
-    """Excess of the measured density over ``spectrum`` that ends the run [dB]."""
+    """Excess of the measured power spectral density over ``spectrum`` at which the run ends [dB]."""
     response_limits: tuple[SpectrumPoint, ...] = ()
     """Largest power spectral density of m0's velocity, at its corners [(m/s)2/Hz]. The base spectrum is
     lowered (notched) where m0 would exceed it; if empty, there is no limit."""

@@ -16,7 +16,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     """A stepped sine whose setting is corrected until m0 has a given amplitude, at every frequency.
 
     A level of the base may allow several responses, but each response needs only one level of the base.
-    Curves at constant response are therefore single-valued; from a set of them follow the curves at constant
+    Curves at constant response are therefore single-valued. A set of them yields the curves at constant
     level, including unstable parts (Karaagacli and Ozguven, Vibration 3 (2020) 19). Feedback can hold motions
     that are stable at constant voltage, and unstable ones that diverge more slowly than feedback acts.
     """
@@ -27,7 +27,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     response_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 that is held: relative to the base, or absolute."""
     tolerance: Share = 0.01
-    """Allowed relative deviation from ``response_m``, which two measurements in a row must meet."""
+    """Allowed relative deviation from ``response_m``; two measurements in a row must be within it."""
     most_change: float = Field(default=1.25, gt=1, le=4)
     """Largest factor by which one correction changes the amplitude setting."""
     start_share: Share = 0.02

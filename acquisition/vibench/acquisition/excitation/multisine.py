@@ -17,7 +17,7 @@ CANDIDATES = 20
 lower the crest factor of 1000 lines from about 3.8 to about 3.3; more sets hardly lower it further.
 """
 NEAREST_IMAGE_RATIO = 2.0
-"""Lowest allowed frequency of a held waveform's first image, over the upper edge of the band.
+"""Lowest allowed frequency of a held waveform's first image, divided by the upper edge of the band.
 A nearer image could not be removed by an analogue low-pass filter.
 """
 
@@ -44,7 +44,7 @@ def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
     """Return complex peak amplitudes of the held waveform at harmonics 0 to ``spans`` * N/2 - 1.
 
     The spectrum of the sampled ``values`` repeats in frequency and is multiplied by that of the hold:
-    c_m = X_(m mod N) / N * sinc(m/N) * exp(-i pi m/N); one-sided amplitudes are 2 c_m, c_0 for the mean.
+    c_m = X_(m mod N) / N * sinc(m/N) * exp(-i pi m/N); the one-sided amplitudes are 2 c_m; the mean is c_0.
     """
     points = len(values)
     harmonics = np.arange(spans * points // 2)
@@ -62,7 +62,7 @@ def flat_periods(
 
     Every line is divided by the droop of the hold, so that the played spectrum is flat. Each realisation uses
     the best of ``CANDIDATES`` sets of phases, by crest factor. All have the same rms value, because a
-    nonlinear specimen needs the same level in each; only the waveform with the highest peak reaches 1.
+    nonlinear specimen needs the same level in each. Only the waveform with the highest peak reaches 1.
 
     Returns
     -------

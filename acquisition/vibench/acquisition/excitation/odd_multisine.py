@@ -13,14 +13,14 @@ from .periodic_noise import MOST_REALISATIONS, PeriodicNoise
 GROUP = 4
 """Number of adjacent odd lines of which one, chosen at random, is a detection line."""
 DETECTION_KEY = 0x0DD
-"""Key of the random numbers for detection lines; they are independent of the random phases."""
+"""Key of the random numbers for the detection lines, which are independent of the random phases."""
 
 
 class OddMultisine(PeriodicNoise):
     """An odd random-phase multisine with random detection lines.
 
-    Even nonlinearities respond on even lines, odd nonlinearities on the odd detection lines. The drive has no
-    power on these lines (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    Even nonlinearities appear on the even lines, odd ones on the odd detection lines. The drive has no power
+    on either (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["odd_multisine"] = "odd_multisine"
@@ -29,7 +29,7 @@ class OddMultisine(PeriodicNoise):
     excited_lines: tuple[PositiveInt, ...] = ()
     """Harmonics of ``repetition_hz`` that are excited; if empty, they are chosen at random from the seed."""
     detection_lines: tuple[PositiveInt, ...] = ()
-    """Odd harmonics that are left out; if empty, all odd lines of the band that are not excited."""
+    """Odd harmonics that are left out; if empty, these are all odd lines of the band that are not excited."""
 
     @model_validator(mode="after")
     def _lines_fit_the_band(self) -> Self:

@@ -42,7 +42,7 @@ class BandNoise(AbstractExcitation):
         return self
 
     def level_at(self, frequency_hz: float) -> RmsSetting:
-        """Return how the level is specified: by the amplitude setting, for the whole band at once."""
+        """Return how the level is specified: by one amplitude setting for the whole band."""
         del frequency_hz
         return RmsSetting()
 
@@ -53,7 +53,7 @@ class BandNoise(AbstractExcitation):
 
 
 MOST_REALISATIONS = 1000
-"""Largest number of realisations in one measurement, which are computed together for a common rms."""
+"""Largest number of realisations in one measurement; all are computed together for a common rms value."""
 
 
 class PeriodicNoise(BandNoise):
@@ -67,7 +67,7 @@ class PeriodicNoise(BandNoise):
     periods: PositiveInt = 2
     """Number of periods recorded per realisation; two or more allow an estimate of the sensor noise."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
-    """Number of points of one period in the generator's memory; its size is checked before the run."""
+    """Number of points of one period in the generator's memory; the memory size is checked before the run."""
     settle_s: NonNegativeFloat = 3.0
     """Waiting time after each change of waveform, for the transient to die out [s]."""
     seed: int = Field(default=1, ge=0)

@@ -123,7 +123,7 @@ class LeadIn(FrozenModel):
 
 
 def band_around(frequency_hz: float) -> tuple[float, float]:
-    """Return the band assigned to a single sine: from an octave below to an octave above it [Hz]."""
+    """Return the band assigned to a single sine: from one octave below it to one octave above it [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
 
@@ -191,12 +191,12 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def approach(self) -> Approach:
-        """Start of the motion: the neighbouring frequency's motion if the frequency moves, else rest."""
+        """Initial state: the motion at the neighbouring frequency if the frequency moves, else rest."""
         return Approach.REST
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at each frequency, for a drive that changes frequency without a pause [s]; otherwise None."""
+        """Time at each frequency if the drive changes frequency without a pause [s]; otherwise None."""
         return None
 
     @property
@@ -227,7 +227,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def stretches(self) -> int:
-        """Number of times the drive starts from silence: once for sines, once per waveform for noise."""
+        """Number of times the drive starts from silence: one for sines, one per waveform for noise."""
         return 1
 
     @property
@@ -286,7 +286,7 @@ class FixedSine(AbstractExcitation):
 class AbstractFeedback(AbstractExcitation):
     """An excitation whose next step depends on measured values; run by `vibench.acquisition.control`.
 
-    ``steps`` lists the expected steps without waits, for previews and for lists of the segments.
+    ``steps`` lists the expected steps without waits, for previews and for lists of segments.
     ``amplitude_vpp`` is the largest setting that feedback may use.
     """
 
@@ -303,7 +303,7 @@ class AbstractFeedback(AbstractExcitation):
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return the highest base level that is held; if none is held, the amplitude setting."""
+        """Return the highest base level that is held, or the amplitude setting if none is held."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 

@@ -13,24 +13,24 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor per change of the setting; large, as the loop has only 150 periods per level."""
+"""Largest factor by which one change alters the setting; large, as a level has only 150 loop periods."""
 
 
 class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
 
-    At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. The first
-    level is searched in settled motion. Then a phase-locked loop, which acts every ten periods, follows the
-    resonance from level to level; if it loses the resonance, the search is repeated. Other modes shift the
-    phase a little. While the motion is linear, measurements on both flanks give the natural frequency and
-    the damping without this shift.
+    At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. At the first
+    level, the resonance is searched in settled motion. Then a phase-locked loop, which acts every ten
+    periods, follows the resonance from level to level; if it loses the resonance, the search is repeated.
+    Other modes shift the phase a little. While the motion is linear, measurements on both flanks give the
+    natural frequency and the damping without this shift.
 
     ``harmonic`` n = 2 or 3 tracks a superharmonic resonance: the drive is at 1/n of the mode's frequency.
     Harmonic n of m0 then lags n times the phase of the base by 90 degrees (Volvert and Kerschen, J. Sound
     Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and Kerschen, arXiv 2401.01151). For n = 2 the
     phase is measured from a cosine at twice the drive frequency, as in the square of a sine. This harmonic
     lags if the spring between the masses is stiffer at positive p and p moves in phase with m0 in the mode
-    (modes 1 and 3 of the paper). If one of the two is reversed, it leads by 90 degrees (``phase_deg = 90``).
+    (modes 1 and 3 of the paper). If only one of these holds, it leads by 90 degrees (``phase_deg = 90``).
 
     ``subharmonic`` n = 2 or 3 tracks a motion of m0 that repeats every n drive periods: n times its phase
     lags the base by 90 degrees; for n = 2 the phase is again measured as for a square. Super- and
@@ -41,13 +41,13 @@ class ResonanceTracking(AbstractFeedback):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.RESONANCE,)
     kind: Literal["resonance_tracking"] = "resonance_tracking"
     start_hz: FrequencyHz
-    """Frequency at which the search starts; nearer to the tracked mode than to any other mode [Hz]."""
+    """Frequency at which the search starts [Hz]; it must be nearer to the tracked mode than to any other."""
     low_hz: FrequencyHz
     """Lowest frequency of the search [Hz]."""
     high_hz: FrequencyHz
     """Highest frequency of the search [Hz]."""
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
-    """Phase of m0 relative to the base that defines resonance, from displacements [degrees]."""
+    """Phase of m0 relative to the base at which resonance is defined, from displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 whose phase is used: relative to the base, or absolute."""
     harmonic: Literal[1, 2, 3] = 1

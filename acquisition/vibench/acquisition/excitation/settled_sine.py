@@ -32,7 +32,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
-    """Longest search for one jump [s]; then the last frequency interval is the result."""
+    """Longest search for one jump [s]; after it, the last frequency interval is the result."""
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
