@@ -276,7 +276,7 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def _panel_factor(self) -> float:
-        """Panel amplitude over requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
+        """Ratio of panel to requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
         return 1.0 if self.codes is None else self.codes.panel_factor
 
     def _mute(self) -> None:

@@ -208,7 +208,7 @@ class TwinStatus(FrozenModel):
     busy_share: float = 0.0
     """Processor time of the twin divided by the time since the run began."""
     missed_s: float = 0.0
-    """Duration of motion that the twin skipped because it was too slow [s]; recorded nevertheless."""
+    """Duration of motion that the twin was too slow to track [s]; it is recorded nevertheless."""
     behind_s: float = 0.0
     """Delay of the twin behind the newest sample, at its last report [s]."""
 

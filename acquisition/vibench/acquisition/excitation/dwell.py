@@ -35,7 +35,7 @@ class Dwell(FixedSine):
     """Duration of each tone of ``lead_in`` [s]."""
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
-        """Return a dwell at another frequency or setting, whose lead-in also contains this dwell's tone."""
+        """Return a dwell at another frequency or setting; its lead-in ends with this dwell's tone."""
         changed = {
             "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,

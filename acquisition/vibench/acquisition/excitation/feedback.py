@@ -89,7 +89,7 @@ class BaseLevel(FrozenModel):
 
 
 class JumpSearch(FrozenModel):
-    """Criteria by which a change between two steps counts as a jump, and how exactly a jump is located."""
+    """Criteria by which a change between two steps counts as a jump, and the accuracy of its location."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
     """Change of Response II (fundamental of m0 over base) above this factor counts as a jump."""

@@ -28,7 +28,7 @@ Spectrum = Annotated[tuple[SpectrumPoint, ...], Field(min_length=1, max_length=1
 
 
 def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Samples:
-    """Return the power densities of ``spectrum`` at ``frequency_hz``; constant beyond its end corners."""
+    """Return the spectral densities of ``spectrum`` at ``frequency_hz``; constant beyond its end corners."""
     corners_hz, densities = zip(*((each.frequency_hz, each.density) for each in spectrum), strict=True)
     return np.asarray(np.exp(np.interp(np.log(frequency_hz), np.log(corners_hz), np.log(densities))))
 

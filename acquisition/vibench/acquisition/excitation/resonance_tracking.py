@@ -70,7 +70,7 @@ class ResonanceTracking(AbstractFeedback):
     settling: Settling = Settling()
     """Criteria by which the motion counts as settled."""
     widest_step_hz: PositiveFloat = 1.0
-    """Largest frequency step of the search; smaller than the distance to the next antiresonance [Hz]."""
+    """Largest frequency step of the search [Hz]; must be below the distance to the next antiresonance."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """Largest number of frequencies at which one level's search may measure."""
     most_periods: int = Field(default=150, ge=30, le=MOST_PERIODS)

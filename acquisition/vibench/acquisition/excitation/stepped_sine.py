@@ -124,7 +124,7 @@ class FrequencySteps(AbstractExcitation):
 
 
 class SteppedSine(FrequencySteps):
-    """A list of frequencies; each is played until it has settled, then recorded as a separate segment.
+    """A list of frequencies; each is played until the motion has settled, then recorded as a segment.
 
     The phase is continuous from one frequency to the next and the amplitude is constant. The specimen
     therefore stays on its branch.
@@ -143,5 +143,5 @@ class SteppedSine(FrequencySteps):
 
     @property
     def planned_wait_s(self) -> float:
-        """The settling time before each recording [s]."""
+        """Settling time before each recording [s]."""
         return self.settle_s

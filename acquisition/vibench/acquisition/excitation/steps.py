@@ -30,11 +30,11 @@ class LoopTone(Tone):
 
 @dataclass(frozen=True, eq=False)
 class Waveform:
-    """One period, repeated, as in a generator's memory; each value is held until the next."""
+    """One period that repeats, as in a generator's memory; each value is held until the next."""
 
     values: Samples
-    """Values from -1 to 1; the full range is the amplitude setting. The peak may be below 1: realisations of
-    a noise have the same rms value, and only the realisation with the highest peak reaches 1."""
+    """Values from -1 to 1; the full range is the amplitude setting. The peak may be below 1: the realisations
+    of a noise have equal rms values, and only the realisation with the highest peak reaches 1."""
     repetition_hz: float
 
 
@@ -68,13 +68,13 @@ Play: TypeAlias = Tone | Waveform | Stream | Sweep
 
 
 def full_level(play: Play | None) -> float:
-    """Return the level of a signal after its ramp, as a fraction of the amplitude setting."""
+    """Return the level that a signal reaches after its ramp, as a fraction of the amplitude setting."""
     return play.level if isinstance(play, Tone) else 1.0
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A named range of the recording for the analysis."""
+    """A named range of the recording, for the analysis."""
 
     label: SegmentLabel
     numbers: Mapping[str, int | float | str] = field(default_factory=dict)
@@ -83,7 +83,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Step:
-    """One signal to play: first settle, then record.
+    """One signal to play: first the motion settles, then it is recorded.
 
     Consecutive steps with equal segments and no settling time are recorded as one segment.
     """
@@ -125,7 +125,7 @@ class Direction(StrEnum):
 
 
 class Approach(StrEnum):
-    """Start of the motion at each frequency, which selects one of several possible motions."""
+    """Initial state at each frequency, which selects one of several possible motions."""
 
     REST = "from rest"
     UP = "swept upwards"
@@ -153,7 +153,7 @@ class RelativeSetting:
 
 @dataclass(frozen=True)
 class RmsSetting:
-    """Noise at the plan's setting, represented by a sine of the same rms."""
+    """Noise at the plan's amplitude setting, represented by a sine of the same rms value."""
 
     basis: ClassVar[str] = "a sine of the same rms base displacement"
 

@@ -12,12 +12,12 @@ class WhiteNoise(PeriodicNoise):
     """White noise between two frequencies: periods of a multisine with equal amplitudes and random phases.
 
     A periodic signal needs no window and has no leakage, but averaging over its periods reduces only the
-    sensor noise. Every realisation therefore has new phases; averaging over realisations has the effect of
-    averaging noise (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    sensor noise. Every realisation therefore has new phases; averaging over realisations acts like averaging
+    of noise (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["white_noise", "multisine_noise"] = "white_noise"
-    """``multisine_noise``, the name in version 0.1, is read as ``white_noise``."""
+    """``multisine_noise``, the name of this kind in version 0.1, is read as ``white_noise``."""
 
     @field_validator("kind")
     @classmethod

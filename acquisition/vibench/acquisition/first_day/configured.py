@@ -40,7 +40,7 @@ class Question:
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
     choices: Callable[[InstrumentList], tuple[str, ...]] = lambda _: ()
-    """Function that returns the names of the found instruments that can answer the question."""
+    """Function that returns the names of the instruments found, as possible answers."""
 
 
 def _converters(seen: InstrumentList) -> tuple[str, ...]:
@@ -170,7 +170,7 @@ def _place(text: str, key: str) -> re.Match[str] | None:
 
 
 def _table(text: str, key: str) -> tuple[int, int, str]:
-    """Return begin and end of a key's table in the text, and the key's name in that table."""
+    """Return the beginning and end of a key's table in the text, and the key's name in that table."""
     if key.startswith(_CHANNEL):
         role, _, name = key.removeprefix(_CHANNEL).partition(".")
         begins = [found.start() for found in re.finditer(r"^\[\[daq\.channels\]\]$", text, re.MULTILINE)]
@@ -223,12 +223,12 @@ def _number(answer: str, key: str) -> str:
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Asks a question, with proposals and the template's value; an empty answer keeps that value."""
+"""Function that asks a question, with proposals and the template's value, which an empty answer keeps."""
 Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer, for input in which a question cannot be repeated."""
+    """Raise the error of an answer, for input that does not allow a question to be repeated."""
     raise error
 
 
@@ -247,11 +247,11 @@ def configure(
 ) -> Rig:
     """Ask all questions, write the configuration, read it back, and return it.
 
-    ``questions`` are by default those with a place in the template. Comments of ``template`` mark unchecked
-    values by CONFIRM. ``note``, such as name and time, is a comment on each answer. ``refuse`` receives the
-    error of one answer or of all answers together; if it returns, the questions are asked again.
+    By default, ``questions`` are those with a place in the template. CONFIRM in comments of ``template``
+    marks unchecked values. ``note``, such as name and time, is a comment on each answer. ``refuse`` receives
+    the error of one answer or of all answers together; if it returns, the questions are asked again.
 
-    Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
+    Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; then nothing is written.
     """
     if target.exists():
         raise ConfigurationError(f"{target} exists already, and nothing is overwritten; give another name")
@@ -299,7 +299,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value as the default answer; only the number if the value states a source."""
+    """Return the template's value as the default answer: only the number, if the value states a source."""
     written = value_in(text, key)
     held = tomllib.loads(f"held = {written}")["held"] if written else None
     return str(held["value"]) if isinstance(held, dict) and "value" in held else written.strip('"')
@@ -366,7 +366,7 @@ _FROM = {
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, at the shaker",
 }
 Confirmed = Callable[[str], str]
-"""Asks whether a wire connects two ends; an empty answer ends the procedure. The page shows the answer."""
+"""Function that asks whether a wire connects two ends; an empty answer ends. The page shows the answer."""
 
 
 @dataclass(frozen=True)
@@ -384,9 +384,9 @@ def first_day(
 ) -> DayPage:
     """Confirm wires, measure the noise floor, play a first 5 mVpp sine, check the bench; return the page.
 
-    The check at its usual level is made and stored only if the check at 5 mVpp has no FAIL.
+    The check at the usual level is made and stored only if the check at 5 mVpp has no verdict FAIL.
 
-    Raises CheckFailed when a wire is not confirmed; nothing has been played then. Raises InstrumentError when
+    Raises CheckFailed when a wire is not confirmed; nothing has then been played. Raises InstrumentError when
     an instrument fails.
     """
     folder = config.absolute().parent
@@ -404,7 +404,7 @@ def first_day(
 
 
 def in_a_command(path: Path) -> str:
-    """Return a path quoted for a shell."""
+    """Return a path, quoted for a shell."""
     return f'"{path}"' if " " in str(path) else str(path)
 
 

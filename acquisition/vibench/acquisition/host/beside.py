@@ -1,4 +1,4 @@
-"""A helper thread for work that may hang, and a base class of objects that a ``with`` closes."""
+"""A helper thread for work that may hang, and a base class of objects that a ``with`` block closes."""
 
 from abc import ABC, abstractmethod
 from collections import deque
@@ -11,9 +11,9 @@ from ..stopping.stop import MEMORY_RESERVE
 
 
 class Beside:
-    """Thread that runs jobs in order; it is started before anything is driven.
+    """Thread that runs jobs in order; it is started before any signal is played.
 
-    A later start could hang: if memory runs out while a thread starts, CPython waits for that thread forever.
+    A later start could hang: if memory runs out while a thread starts, CPython waits for it forever.
     """
 
     def __init__(self, name: str) -> None:
@@ -62,7 +62,7 @@ class Beside:
 
 
 class ClosedOnLeaving(ABC):
-    """Base of objects that are closed at the end of a ``with``."""
+    """Base of objects that are closed at the end of a ``with`` block."""
 
     @abstractmethod
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Conversion of a value to its enum member, so that functions accept value or member."""
+"""Conversion of a value to its enum member, so that functions accept either."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

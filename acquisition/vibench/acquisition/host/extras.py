@@ -1,4 +1,4 @@
-"""Checks of what a command requires of installation and computer, with errors that say what to do."""
+"""Checks of what a command needs from the installation and the computer; errors say what to do."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -27,7 +27,7 @@ def require_extra(extra: str) -> None:
 
 
 def require_space(megabytes: int, advice: str = "") -> None:
-    """Require address space for the libraries and their threads: with too little, they hang or abort.
+    """Require enough address space for the libraries and their threads, which otherwise hang or abort.
 
     ``megabytes`` is the space [MB]. Raises ConfigurationError if the process has a lower limit; ``advice`` is
     the last sentence of that error.
@@ -47,7 +47,7 @@ def require_space(megabytes: int, advice: str = "") -> None:
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
     """Return a ``__getattr__`` for an API that needs an extra: its import errors name the extra.
 
-    ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the name in `pyproject.toml`.
+    ``found`` is the ``__getattr__`` made by lazy_loader, ``extra`` the name of the extra in `pyproject.toml`.
     The wrapper raises MissingLibrary when a library of the extra is not installed.
     """
 

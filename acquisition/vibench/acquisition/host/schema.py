@@ -1,7 +1,7 @@
 """JSON Schemas of the TOML files that users write, for editors that complete keys.
 
 Draft 4 is used, because taplo, the TOML language server of most editors, supports no later draft. A schema
-never allows less than its model. It allows more where defaults or a named specimen may supply values.
+never refuses what its model allows. It allows more where defaults or a named specimen may supply values.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ Json = dict[str, Any]
 
 
 def _with_defaults(schema: Json) -> None:
-    """Make keys optional that ``[defaults]`` and templates can supply."""
+    """Make those keys optional that ``[defaults]`` and templates can supply."""
     parts = schema["definitions"]
     kinds = [
         part["$ref"].rpartition("/")[2] for part in parts["Measurement"]["properties"]["excitation"]["oneOf"]
@@ -58,7 +58,7 @@ def _with_defaults(schema: Json) -> None:
 
 
 def _with_a_base(schema: Json) -> None:
-    """Allow a specimen that starts from a named specimen, or is only a name."""
+    """Allow a specimen that starts from a named specimen, or is given only by name."""
     for name, part in schema["definitions"].items():
         if "masses_kg" in part.get("properties", {}):
             _starts_from_another(part)
@@ -66,7 +66,7 @@ def _with_a_base(schema: Json) -> None:
 
 
 def _starts_from_another(part: Json) -> None:
-    """Make keys optional that a named specimen supplies, and allow a stop on one side only."""
+    """Make those keys optional that a named specimen supplies, and allow a stop on one side only."""
     part["properties"]["model"] = _SPECIMEN
     part.pop("required", None)
     for side in part["properties"]["gap_m"]["anyOf"][1]["items"]:
@@ -74,7 +74,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Allow a range, or a list of numbers and ranges, as frequencies, and the former key of the specimen."""
+    """Allow the former key of the specimen, and as frequencies a range or a list of numbers and ranges."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
@@ -123,7 +123,7 @@ def schema_name(kind: str) -> str:
 
 
 def schema_line(model: BaseModel, schemas: Path) -> str:
-    """Return the line that names the schema of a file of ``model`` for an editor; empty if there is none.
+    """Return the line that tells an editor the schema of a file of ``model``; empty if there is none.
 
     ``schemas`` is the folder of the schemas, as ``shipped_folder("schemas")`` gives it.
     """
@@ -133,7 +133,7 @@ def schema_line(model: BaseModel, schemas: Path) -> str:
 
 
 def _draft_4(part: Any) -> Any:
-    """Convert pydantic's draft 2020-12 to draft 4, without null, which TOML does not have."""
+    """Convert a schema of pydantic (draft 2020-12) to draft 4, without null, which TOML lacks."""
     match part:
         case list():
             return [_draft_4(each) for each in part]

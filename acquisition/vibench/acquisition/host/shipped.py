@@ -46,7 +46,7 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
 def file_path(given: Path | str, folder: str) -> Path:
     """Return the path of a user's file, or of a shipped file given by its bare name such as ``"quick"``.
 
-    Raises ConfigurationError, with the names of the shipped files, when a bare name fits neither.
+    Raises ConfigurationError, with the names of the shipped files, when a bare name matches no file.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def file_path(given: Path | str, folder: str) -> Path:
 
 
 def built_site() -> Path:
-    """Return the folder of the site that ``vibench docs`` builds for this version; maybe not built yet."""
+    """Return the folder of the site that ``vibench docs`` builds for this version; it may not exist yet."""
     return state_folder() / "documentation" / version("vibench")
 
 

@@ -59,7 +59,7 @@ def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
 def validate(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
     """Validate ``content`` of TOML or JSON as ``model``; paths in it are relative to ``folder``.
 
-    Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow it.
+    Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow the content.
     """
     try:
         return model.model_validate(content, context={"folder": folder})
@@ -81,9 +81,9 @@ Place = tuple[str | int, ...]
 
 
 def complaints(error: ValidationError, content: object, model: type[BaseModel], within: Place = ()) -> str:
-    """Return a clause for each fault, one for all missing keys, and one for all unknown keys.
+    """Return one clause for each fault, one for all missing keys, and one for all unknown keys.
 
-    ``content`` of the file distinguishes its keys from the type names that pydantic adds to paths. Faults
+    The ``content`` of the file distinguishes keys from the type names that pydantic adds to paths. Faults
     outside the path ``within`` are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
@@ -150,7 +150,7 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
-    """Return which parts of a fault's path are keys of the file; the others are types.
+    """Return, for each part of a fault's path, whether it is a key of the file; the others are types.
 
     pydantic adds the type after a key with several types: ``frequency_hz``, ``Range``, ``step``. A key of the
     file may have the name of a type.
@@ -170,7 +170,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _closeness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Return how well a value fits a type: a fault inside it or in its size is less bad than a wrong type."""
+    """Return how well a value fits a type: a fault in its content or size counts less than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 

@@ -1,4 +1,4 @@
-"""Guard for plug-ins: an exception or value that violates the protocol becomes a short error.
+"""Guard for plug-ins: it turns an exception or value that violates the protocol into a short error.
 
 Vibench's own drivers are not guarded: an unexpected exception is a bug and needs its traceback.
 """
@@ -29,7 +29,7 @@ class PlugInKind(StrEnum):
     EXCITATION = "vibench.excitations"
     """Plan of a kind of measurement. Here and below, the entry point's name is the ``kind`` in a plan."""
     FEEDBACK = "vibench.feedback"
-    """The controller of a kind of measurement with feedback."""
+    """Controller of a kind of measurement with feedback."""
     ANALYSIS = "vibench.analyses"
     DRAWING = "vibench.drawings"
     DRIVE = "vibench.drives"
@@ -120,13 +120,13 @@ def _rows(kind: PlugInKind) -> tuple[EntryPoint, ...]:
 
 @lru_cache(maxsize=1)
 def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
-    """Read the entry points of installed packages; cached for each ``sys.path``, as it takes 6 ms."""
+    """Read the entry points of installed packages (6 ms); the result is cached for each ``sys.path``."""
     offered = entry_points()
     return {kind: tuple(offered.select(group=kind.value)) for kind in PlugInKind}
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
-    """Return a driver, guarded unless it is vibench's own; raises ConfigurationError as `plug_in` does.
+    """Return a driver, guarded unless it is part of vibench; raises ConfigurationError like `plug_in`.
 
     ``kind`` is the group of entry points, ``name`` the name in the hardware configuration and ``promise`` the
     protocol of the entry point's object.

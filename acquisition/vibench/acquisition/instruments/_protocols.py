@@ -20,7 +20,7 @@ Counts = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Identity:
-    """Identity that an instrument reports, stored with every recording."""
+    """Identity that an instrument reports; it is stored with every recording."""
 
     maker: str
     model: str
@@ -56,7 +56,7 @@ class FoundDevice:
 
 @dataclass(frozen=True)
 class Overload:
-    """Range of samples in which an input reaches 95 % of its full scale or more."""
+    """Range of samples in which an input reaches at least 95 % of its full scale."""
 
     channel: str
     """Role of the channel, for example ``"m0_velocity"``."""
@@ -87,7 +87,7 @@ def _not_zero(units: float) -> float:
 
 @dataclass(frozen=True)
 class SensorFacts:
-    """Conversion by a sensor of a quantity to volts."""
+    """Conversion of a quantity to volts by a sensor."""
 
     quantity: str
     """Quantity of the channel's role: ``"voltage"``, ``"acceleration"`` or ``"velocity"``."""
@@ -112,7 +112,7 @@ class Spacing(StrEnum):
     LINEAR = "linear"
     """The frequency changes at a constant rate in hertz per second."""
     LOGARITHMIC = "logarithmic"
-    """The frequency takes the same time for every octave."""
+    """The frequency passes through every octave in the same time."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class GeneratorDescription:
     name: str
     """Name of the model in messages: ``"AFG1022"``."""
     amplitude_range_vpp: tuple[float, float]
-    """Smallest and largest setting at the configured load, peak to peak [V]."""
+    """Smallest and largest amplitude setting at the configured load, peak to peak [V]."""
     highest_sine_hz: float
     memory_points: tuple[int, int]
     """Smallest and largest number of points in one period of a waveform."""
@@ -165,7 +165,7 @@ class FunctionGenerator(Protocol):
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Settings that could neither be made nor read remotely: the operator must confirm them."""
+        """Settings that could be neither made nor read remotely: the operator must confirm them."""
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
@@ -175,7 +175,7 @@ class FunctionGenerator(Protocol):
         """Set up a sine. The output stays on or off as it was."""
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Load one period of values and select it; values of -1 and 1 are the ends of ``amplitude_vpp``."""
+        """Load one period of values and select it; -1 and 1 are the two ends of ``amplitude_vpp``."""
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Set up a sweep: a sine at the start frequency, which `trigger` sweeps to the stop frequency.
@@ -200,7 +200,7 @@ class FunctionGenerator(Protocol):
         """End the burst mode, so that the signal plays continuously."""
 
     def measured_latency_s(self) -> float:
-        """Return the time of one verified change of amplitude [s]; no step, ramp or stop is shorter."""
+        """Return the duration of one verified amplitude change [s]; no step, ramp or stop is shorter."""
 
     def start(self) -> None:
         """Turn the output on."""
@@ -290,7 +290,7 @@ class AnalogOutput(Protocol):
         """
 
     def arm(self) -> None:
-        """Prepare to start with the digitizer, after the first samples are written. Sample 0 is common."""
+        """Prepare to start with the digitizer, once the first samples are written. Both share sample 0."""
 
     def stop(self) -> None:
         """Go to zero volts at once. May be called at any time; the next `write` begins a new stream."""

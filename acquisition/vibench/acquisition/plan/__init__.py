@@ -1,7 +1,7 @@
 """Plans (excitations, measurements, sweeps, campaigns) and their predicted effect on the rig.
 
 A `Measurement` is one excitation with its ramps and the limits during its run. A `Campaign` is an ordered
-list of measurements and nested sweeps, read from TOML. Before anything moves, a model of the rig predicts the
+list of measurements and nested sweeps, read from TOML. Before any motion, a model of the rig predicts the
 loads of a plan (`predicted_loads`). `MeasurementPreview` compares the loads with the rig's limits. Plans are
 frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
 no instrument and does not depend on bench or run. Chains of points:

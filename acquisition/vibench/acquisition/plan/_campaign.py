@@ -41,11 +41,11 @@ class RetryPolicy(FrozenModel):
         default=(Retryable.DATA_LOST, Retryable.INSTRUMENT_LOST, Retryable.INSTRUMENT_FAULT), min_length=1
     )
     reopen_for_s: NonNegativeFloat = Field(default=60.0, le=86400)
-    """Longest search for a lost instrument, after which the campaign ends [s]."""
+    """Longest search for a lost instrument [s]; after this time, the campaign ends."""
 
 
 BYTES_PER_SAMPLE = 4
-"""Size of one sample in a growing recording: a 32-bit count of the converter [bytes]; less when finished."""
+"""Size of one sample, a 32-bit count, in a growing recording [bytes]; less in a finished recording."""
 
 
 class Campaign(FrozenModel):
@@ -60,7 +60,7 @@ class Campaign(FrozenModel):
     notes: str = ""
     retry: RetryPolicy = RetryPolicy()
     rest_s: NonNegativeFloat = Field(default=0.0, le=86400)
-    """Pause between two recordings, in which specimen and amplifier cool [s]."""
+    """Pause between two recordings, during which specimen and amplifier cool [s]."""
     measurements: tuple[Measurement, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
     scan: tuple[ScanPoint, ...] = ()
@@ -169,7 +169,7 @@ def _point_at(place: ScanPoint, point: Point) -> Point:
 
 
 def distinct_drives(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Return one point for each different drive; its limit checks apply to all points with this drive."""
+    """Return one point for each distinct drive; its limit checks apply to all points with this drive."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats", "point"}), point)

@@ -51,7 +51,7 @@ _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
 
 
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
-    """Refuse to play back a recording with a plan that differs from its own plan.
+    """Refuse to play back a recording with a plan other than the one in the recording.
 
     Raises ConfigurationError. Imported recordings, and plans of another version, are not checked.
     """
@@ -73,7 +73,7 @@ def require_own_plan(measurement: Measurement, rig: Rig) -> None:
 RAMP_PERIODS = 3.0
 """Smallest length of a ramp, in periods of the shaker on its suspension; shorter ramps act like steps."""
 USABLE_BANDWIDTH = 0.45
-"""Usable bandwidth of a converter with an anti-alias filter, over the sample rate (NI 9234: 0.45)."""
+"""Usable bandwidth of a converter with an anti-alias filter, relative to the sample rate (NI 9234: 0.45)."""
 
 
 class LimitSide(StrEnum):
@@ -89,11 +89,11 @@ class Consequence(StrEnum):
     REFUSED = "refused"
     """The plan is not played."""
     TOLD = "told"
-    """The plan is played. The excess is reported beforehand. If it occurs, the recording marks it."""
+    """The plan is played. The excess is reported beforehand, and marked in the recording if it occurs."""
 
 
 _DIGITS = 6
-"""Number of digits of a value and its limit in messages, enough to tell 8200 from 8192 points."""
+"""Number of digits of values and limits in messages, enough to distinguish 8200 from 8192 points."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
 
 
 def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
-    """Check that the setting that holds the base level stays within `amplitude_vpp` of the plan."""
+    """Check that the setting needed to hold the base level does not exceed `amplitude_vpp` of the plan."""
     needed = [
         (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
         for frequency_hz, acceleration in measurement.excitation.held_accelerations()
@@ -378,13 +378,13 @@ def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck
 
 
 TOUCH_SHARE = 0.25
-"""Largest p in a check, over the gap: a sine without a ramp overshoots, and impacts could then persist."""
+"""Largest p in a check, relative to the gap: a sine without a ramp overshoots, and impacts might persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Frequencies within 3 % of the check's sine [Hz], because the model's resonances may be 3 % off (0072)."""
+"""Frequencies within 3 % of the check's sine [Hz]; the model's resonances may be off by 3 % (0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
-    """Return a setting for a check at which p stays within a quarter of the gap; 10 mV or more [Vpp].
+    """Return a setting of at least 10 mVpp for a check, at which p stays within a quarter of the gap [Vpp].
 
     ``wanted_vpp`` is the upper limit of the result; the model of ``rig`` includes the specimen on the table.
     """
@@ -419,7 +419,7 @@ def check_phasors(
 ) -> ComplexArray:
     """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
-    Each phasor assumes another shift of the specimen's resonances, up to 3 %. If p may come near a stop,
+    Each phasor assumes a different shift of the specimen's resonances, up to 3 %. If p may come near a stop,
     phasors for m1 bound to m2 are added. ``terminal_v`` is the peak voltage at the generator's terminal [V];
     the ``quantity`` of base or specimen is in SI units, such as m/s2 for an acceleration.
     """

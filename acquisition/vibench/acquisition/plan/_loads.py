@@ -1,7 +1,7 @@
 """Predict the peak loads of a plan on the rig, with the rig's model.
 
 The prediction is exact while p stays inside the gap. Otherwise it gives the fundamental of a motion with p
-limited to the gap. Impacts add to this fundamental (by how much:
+limited to the gap. Impacts add to this fundamental (for the amounts, see
 tests/acquisition/plan/test_specimen_loads.py). The real motion is monitored during the run.
 """
 
@@ -32,15 +32,15 @@ HELD_SPANS = 4
 Higher images are below 1/20 of the level of the band, and the table responds to them less.
 """
 PASSED_LEVELS = np.arange(1, 17) / 16
-"""Fractions of a tone's level at which loads are computed. Ramps pass through them, and with stops a lower
-level may cause a larger motion.
+"""Fractions of a tone's level at which loads are computed. Ramps pass through these levels, and with stops a
+lower level may cause a larger motion.
 """
 BAND_POINTS = 2000
 """Number of frequencies at which the power of streamed noise is computed."""
 
 Floats: TypeAlias = NDArray[np.float64]
 Transfer: TypeAlias = Callable[[Floats], ComplexArray]
-"""Function that returns the phasors of a quantity at the largest setting, for frequencies [Hz]."""
+"""Function that returns the phasors of a quantity at given frequencies [Hz], for the largest setting."""
 
 
 @dataclass(frozen=True)
@@ -170,8 +170,8 @@ def needed_vpp(
 ) -> float:
     """Return the setting at which the base reaches ``acceleration`` [m/s2], peak to peak [V].
 
-    ``on_table`` is what stands on the table of the rig's model. Feedback assumes a bare table (smooth
-    response), and corrects the rest.
+    ``on_table`` describes what is mounted on the table in the rig's model. Feedback assumes a bare table
+    (smooth response), and corrects the rest.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()
@@ -183,7 +183,7 @@ class BaseMotion:
 
     amplitude_m: NDArray[np.float64]
     basis: str
-    """Text on how the amplitude is predicted: level held, linear model, or sine of equal rms."""
+    """Text on how the amplitude is predicted: held level, linear model, or sine of equal rms value."""
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:

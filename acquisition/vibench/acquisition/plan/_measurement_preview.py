@@ -31,7 +31,7 @@ class MeasurementPreview:
     """Signal as set at the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """Frequency of the strongest spectral line in each of at most `SPECTRUM_POINTS` intervals [Hz]."""
+    """Frequency of the strongest spectral line of each interval [Hz]; at most `SPECTRUM_POINTS` intervals."""
     spectrum_v: Samples
     """Peak amplitude of the sine at each of ``spectrum_hz`` [V]."""
     rms_v: float
@@ -43,7 +43,7 @@ class MeasurementPreview:
     size_bytes: int
     """Size of the recording while it grows [bytes]."""
     least_growth_time_s: float | None
-    """Shortest growth time (factor e) of an unstable motion that feedback can hold [s]; None if unknown."""
+    """Shortest growth time (by a factor of e) of an unstable motion that feedback can hold [s]; or None."""
 
     @property
     def is_allowed(self) -> bool:

@@ -57,7 +57,7 @@ class OnChange(StrEnum):
     NOTE = "note"
     """Note the change as an event in the recording and continue."""
     STOP = "stop"
-    """Ramp down and end the run; the live twin is started if needed."""
+    """Ramp down and end the run; the live twin is started for this if needed."""
 
 
 class InRunLimits(FrozenModel):
@@ -76,7 +76,7 @@ class InRunLimits(FrozenModel):
     """Fraction of the amplifier's clipping voltage, measured at its output."""
     current: Fraction = 1.0
     """Fraction of the coil's peak current limit and of the amplifier's rms limiter. The current is computed
-    as amplifier voltage minus induced voltage of the moving coil, over the resistance of the coil."""
+    as amplifier voltage minus induced voltage of the moving coil, divided by the coil's resistance."""
     specimen_amplitude: Fraction = 1.0
     """Fraction of the specimen's amplitude limit: m0 relative to the base, from the sensor of m0."""
     on_overload: OnOverload = OnOverload.FLAG
@@ -91,7 +91,7 @@ class ScanPoint(FrozenModel):
     body: Literal["m0", "m1", "m2"]
     """Mass on which the point lies."""
     node: PositiveInt | None = Field(default=None, le=999_999_999)
-    """Node number in universal files; if absent, the position in the list, from 1."""
+    """Node number in universal files; if absent, the position of the point in the list, from 1."""
     x_m: float
     """Coordinate of the point along x [m]."""
     y_m: float
@@ -113,7 +113,7 @@ class ScanPoint(FrozenModel):
 
 
 class Measurement(FrozenModel):
-    """One excitation, from ramp up to ramp down, into one recording."""
+    """One excitation, from ramp up to ramp down, recorded in one file."""
 
     name: Name
     excitation: Excitation
@@ -126,7 +126,7 @@ class Measurement(FrozenModel):
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None
-    """Required accuracy of results, which ends the recording; if absent, the planned time is recorded."""
+    """Accuracy of results at which the recording ends; if absent, the planned time is recorded."""
     point: ScanPoint | None = None
     """Point of a scan at which the vibrometer measures; if absent, m0."""
 
@@ -211,9 +211,9 @@ class RunState(StrEnum):
 CHECK_FREQUENCY_HZ = 160.0
 """Sine of the bench check, near the calibration of accelerometers (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
 CHECK_FRACTION = 0.02
-"""Amplitude of the bench check over the planned amplitude."""
+"""Amplitude of the bench check relative to the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Smallest setting of a check, to exceed hum [Vpp]. If the plan's setting is lower, the check uses that."""
+"""Smallest setting of a check, to exceed hum [Vpp]; the check uses the plan's setting if that is lower."""
 CHECK_QUIET_S = 0.1
 """Duration of the silence that a check measures before the first signal [s]."""
 CHECK_SETTLE_S = 0.2
@@ -262,7 +262,7 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
 
 
 def known_phases(measurement: Measurement) -> Iterator[Phase]:
-    """Yield the phases known before the measurement: all phases, or none for a measurement with feedback."""
+    """Yield the phases known before the measurement: all of them, or none for a measurement with feedback."""
     return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
 
 
@@ -317,7 +317,7 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level of a half-cosine ramp at ``progress``, 0 to 1 [1]; both ends have zero slope."""
+    """Return the level of a half-cosine ramp at ``progress`` (0 to 1) [1]; both ends have zero slope."""
     return 0.5 * (1 - cos(pi * progress))
 
 
@@ -330,7 +330,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; for a stream the analogue output, even if missing."""
+    """Return the source that plays a measurement; for a stream, the analogue output even if it is missing."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -356,7 +356,7 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""Smallest over largest setting of an analogue output; the smallest equals some tens of counts."""
+"""Ratio of smallest to largest setting of an analogue output; the smallest equals some tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:

@@ -83,7 +83,7 @@ def values_of(given: Values) -> tuple[float, ...]:
 
 
 MOST_POINTS = 10_000
-"""Largest number of points in one sweep; a larger number counts as a mistake."""
+"""Largest number of points in one sweep; a larger number is taken for a mistake."""
 LONGEST_NAME = 64
 
 
@@ -114,13 +114,13 @@ class _Place:
 
     values: Mapping[SweepAxis, Any]
     words: Mapping[SweepAxis, str]
-    """Part of the point's name for each value, in the order of the axes."""
+    """Parts of the point's name, one for each value, in the order of the axes."""
 
     def name(self, sweep: str) -> str:
         return "-".join([sweep, *self.words.values()])
 
     def with_words(self, **words: str) -> "_Place":
-        """Return the same position with other parts of the name for some of its values."""
+        """Return the same position, with some parts of the name replaced."""
         return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
@@ -151,7 +151,7 @@ class Sweep(FrozenModel):
 
     lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
     """Largest number of earlier points in a lead-in, counted from the nearest; if absent, the whole chain. A
-    shorter lead-in saves time. If it starts behind the jump, it reaches the wrong branch."""
+    shorter lead-in saves time, but one that starts beyond the jump reaches the wrong branch."""
 
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:

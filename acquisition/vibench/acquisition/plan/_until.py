@@ -13,7 +13,7 @@ FEWEST_REALISATIONS = 4
 SHORTEST_S = 2.0
 """Default time before the first analysis [s]; a shorter recording is analysed only at its end."""
 LOOK_FACTOR = 2.0**0.5
-"""Factor from the recorded time of one analysis to that of the next."""
+"""Ratio of the recorded time at one analysis to that at the analysis before."""
 
 
 Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
@@ -23,12 +23,12 @@ Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
 class Until(FrozenModel):
     """Record until the bound on the error of every result named here is small enough.
 
-    The planned time is never exceeded. The bounds hold in 95 % of recordings, also of those that end early.
-    They include noise and chance, which recording time reduces, but not the uncertainty of calibrations.
+    The planned time is never exceeded. The bounds hold in 95 % of recordings, including those that end early.
+    They include noise and scatter, which a longer recording reduces, but not calibration uncertainty.
     """
 
     resonance_hz: Wish | None = None
-    """Uncertainty to reach for the frequency of every resonance under noise excitation: ``"0.1 %"``."""
+    """Required uncertainty of the frequency of every resonance under noise excitation: ``"0.1 %"``."""
     transmissibility: Wish | None = None
     """Required bound on the transmissibility at every resonance found in noise: ``"2 %"``."""
     response_i: Wish | None = None
@@ -36,8 +36,8 @@ class Until(FrozenModel):
     response_ii: Wish | None = None
     """Required bound on Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = SHORTEST_S
-    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; the planned time if
-    this is shorter."""
+    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; at most the planned
+    time."""
 
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":

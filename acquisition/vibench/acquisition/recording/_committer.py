@@ -23,29 +23,29 @@ from ._layout import cell, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
-"""Commit interval [s]: half of the one second that a crash may lose. A slow disk has the other half."""
+"""Commit interval [s]: half of the one second that a crash may lose. The other half is for a slow disk."""
 CLOSING_PATIENCE_S = 30.0
 """Time limit of the last commit [s]; writes to a disconnected network folder may hang forever."""
 QUEUE_PATIENCE_S = 2.0
-"""Time to wait while the queue is full, before the disk counts as too slow [s]."""
+"""Longest wait while the queue is full [s]; then the disk counts as too slow."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Writes that belong together, and counters that are written afterwards to mark the data as valid."""
+    """Batch of writes, and of counters that are written afterwards to mark the data as valid."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """Offset in the file and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
     """Value of each counter once the writes are on the disk, by file offset."""
     reservations: tuple[tuple[int, int], ...] = ()
-    """Offset and size of each range to reserve before the writes [bytes]."""
+    """Offset and size of each range to reserve before writing [bytes]."""
     samples: int = 0
-    """Samples per channel in this batch; the queue has a limit for their sum."""
+    """Samples per channel in this batch; the queue limits the sum over its batches."""
 
 
 class Committer:
-    """Writes batches in a thread and reports the first failure at the next call."""
+    """Writer of batches in a thread; it reports the first failure at the next call."""
 
     def __init__(self, disk: Disk, queue_samples: int, interval_s: float = COMMIT_INTERVAL_S) -> None:
         self._disk = disk
@@ -150,7 +150,7 @@ class Committer:
         return not is_last
 
     def _next(self) -> tuple[Batch | None, bool]:
-        """Return the next batch (None if a commit is due, or none is left), and whether all is written."""
+        """Return the next batch (None if a commit is due or no batch is left), and whether all is written."""
         with self._changed:
             # If there is nothing to commit, wait for the next batch without a time limit.
             remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
@@ -188,7 +188,7 @@ Cell = str | int | float
 
 
 class TableWriter:
-    """Encodes the rows of one table for their reserved offsets in the file."""
+    """Encoder of the rows of one table, for their reserved offsets in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
@@ -222,7 +222,7 @@ class TableWriter:
 
 
 Number = int | float | str
-"""Value stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
+"""Values stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
 
 
 @dataclass(frozen=True)

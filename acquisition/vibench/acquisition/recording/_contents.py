@@ -26,7 +26,7 @@ from ._layout import (
 DEEPEST_JSON = 40
 """Deepest nesting of JSON that is accepted; a plan has about five levels."""
 SAME_SCALE = 1e-9
-"""Allowed relative difference between stored and recomputed ``scale_factor`` and ``add_offset``."""
+"""Allowed relative difference of ``scale_factor`` and ``add_offset`` from their recomputed values."""
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -124,7 +124,7 @@ class ConfigurationFacts(_AbstractFacts):
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Return the file's validated attributes; a growing file keeps some of them in datasets: ``found``."""
+    """Return the file's validated attributes; a growing file keeps some of them in the datasets ``found``."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 

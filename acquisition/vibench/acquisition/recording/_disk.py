@@ -48,7 +48,7 @@ class PositionedFile(OpenFile):
 def sole_use(path: Path) -> Iterator[None]:
     """Lock a file for its recovery, until the ``with`` block ends.
 
-    Raises RecordingError when another process is recording to it.
+    Raises RecordingError when another process is recording to this file.
     """
     with closing(OpenFile(path)) as file:
         if not file.is_locked_alone():
@@ -134,7 +134,7 @@ class TroubledDisk(PositionedFile):
         super().sync()
 
     def reserve(self, offset: int, size: int) -> None:
-        """Reserve space at this range of the file."""
+        """Reserve space for this range of the file."""
         meet_trouble()
         super().reserve(offset, size)
 
@@ -159,6 +159,6 @@ def open_disk(path: Path) -> Disk:
 
 
 def meet_trouble() -> None:
-    """Apply the active simulated faults, before a write."""
+    """Apply the active simulated faults before a write."""
     for trouble in tuple(_installed):
         trouble.apply()

@@ -26,14 +26,14 @@ LOWEST_RATE_HZ = 20_000.0
 _FAR = 60.0
 """Smallest fourth difference at the edge of a drop-out, relative to the median fourth difference."""
 _DETECTED = 6.0
-"""Smallest fourth difference in the ringing of the converter's filter, relative to the median one."""
+"""Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
-"""Largest spacing of sharp corners that form one group (run) [s]."""
+"""Largest spacing between sharp corners of one group (run) [s]."""
 _MOST_RUNS = 12
 """Largest number of neighbouring runs that drop-outs can explain; more runs indicate real motion."""
 _FLANK_S = 1e-3
-"""Length of the motion on each side with which a drop-out is compared [s]."""
+"""Duration of the motion on each side with which a drop-out is compared (flank) [s]."""
 _LEAST_HELD = 8
 """Smallest number of equal samples that indicate a drop-out, if both ends are steep (`_QUANTA`)."""
 _QUANTA = 4.0
@@ -47,7 +47,7 @@ _OUTSTANDING = 8.0
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest change in the flanks."""
 _STEEP = 0.2
-"""Smallest change at the edge, relative to the largest distance from the fit; clipped peaks have less."""
+"""Smallest change at the edge, relative to the largest distance from the fit; clipped peaks change less."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; a larger number indicates real motion."""
 _ORDER = 48
@@ -124,7 +124,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def first_undecided(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Return the sample from which a drop-out may still be undetected; without one, the number of samples.
+    """Return the first sample of a drop-out that may still be undetected; without one, the sample count.
 
     ``velocity`` belongs to a channel that is still being recorded, shape (samples,), in which ``dropouts``
     were found.
@@ -142,7 +142,7 @@ def first_undecided(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dr
 
 
 def _corners(velocity: Samples) -> tuple[Samples, float]:
-    """Return fourth differences, which are large at sharp corners, and their median (infinite if zero)."""
+    """Return fourth differences, which are large at sharp corners, and their median (infinity if zero)."""
     sharp = np.zeros(velocity.size)
     sharp[2:-2] = np.abs(np.diff(velocity, 4))
     return sharp, float(np.nanmedian(sharp)) or np.inf
@@ -188,7 +188,7 @@ def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
 def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
     """Return the mean square residual of a smooth fit to both flanks; infinite if this is not a drop-out.
 
-    A drop-out jumps far away from the fit. A clipped peak is also far away, but changes more slowly.
+    A drop-out jumps far away from the fit. A clipped peak is also far from the fit, but changes more slowly.
     """
     near = velocity[dropout.first - before : dropout.stop + after]
     if not np.all(np.isfinite(near)):
@@ -226,7 +226,7 @@ def bridge(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
 
 
 def _groups(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
-    """Yield begin and end of each group of close drop-outs, and the begin of the next group."""
+    """Yield beginning and end of each group of close drop-outs, and the beginning of the next group."""
     groups: list[list[Dropout]] = []
     for each in dropouts:
         is_near = groups and each.first - groups[-1][-1].stop < _CONTEXT

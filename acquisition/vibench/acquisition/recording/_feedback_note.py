@@ -1,7 +1,7 @@
 """Notes of a feedback controller in a recording, one model for each kind.
 
 A note is stored as an event: the event has the note's kind, and its text is a JSON object of all other
-values. An event's text is limited in length, so notes of version 1 omit their version.
+values. Because an event's text is limited in length, notes of version 1 omit their version.
 """
 
 import json
@@ -154,13 +154,13 @@ class LevelNote(AbstractNote):
 
 
 class ExcursionNote(AbstractNote):
-    """Part of a sweep in which the base level was outside tolerance."""
+    """Part of a sweep in which the base level was outside its tolerance."""
 
     kind: Literal["level"] = "level"
     from_hz: SixFigures
     to_hz: SixFigures
     worst: SixFigures
-    """Largest relative deviation of the level, with its sign."""
+    """Largest relative deviation of the level, with sign."""
     level: Hold
 
 
@@ -225,11 +225,11 @@ class NoiseNote(AbstractNote):
     asked_rms: SixFigures
     """Requested rms acceleration in the band at full level, with notches [m/s2]."""
     within: SixFigures
-    """Fraction of spectral lines within the plan's tolerance of this realisation's level."""
+    """Fraction of the spectral lines that are within the plan's tolerance of this realisation's level."""
     worst_db: SixFigures
     worst_hz: SixFigures
     notched: SixFigures
-    """Fraction of spectral lines that are lowered to limit the response."""
+    """Fraction of the spectral lines that are lowered to limit the response."""
     kurtosis: SixFigures
     """Kurtosis of the base's acceleration; 3 for Gaussian noise."""
 
@@ -286,7 +286,7 @@ class Stability(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """The bounds of the multiplier include 1, or the motion changed: stability is not determined."""
+    """Stability is not determined, because the bounds of the multiplier include 1 or the motion changed."""
 
 
 class BranchStabilityNote(AbstractNote):
@@ -294,16 +294,16 @@ class BranchStabilityNote(AbstractNote):
 
     kind: Literal["branch_stability"] = "branch_stability"
     point: int
-    """Number of the branch point with this motion."""
+    """Number of the branch point that has this motion."""
     stability: Stability
     multiplier: SixFigures | None
     """Magnitude of the largest Floquet multiplier under prescribed base motion; None if unknown."""
     multiplier_u: SixFigures | None
     """Standard uncertainty of this magnitude; 95 % bounds are at 2.1 times this uncertainty."""
     perturbation: SixFigures
-    """Requested relative rms change of the fundamentals of base and m0; it applies to the larger change."""
+    """Requested relative rms change of the fundamentals of base and m0; applies to the larger of the two."""
     moved: SixFigures
-    """Relative change of the fundamental of m0 between before and after the perturbations."""
+    """Relative change of the fundamental of m0 from before to after the perturbations."""
 
 
 class BranchEndNote(AbstractNote):
@@ -315,7 +315,7 @@ class BranchEndNote(AbstractNote):
 
 
 class UntilNote(AbstractNote):
-    """Error bounds of results, for a step or dwell that is recorded until these are small enough."""
+    """Error bounds of results, for a step or dwell that is recorded until the bounds are small enough."""
 
     kind: Literal["until"] = "until"
     stretch: int
@@ -325,7 +325,7 @@ class UntilNote(AbstractNote):
     longest_s: SixFigures
     """Longest time for which the stretch may be recorded [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
-    """Relative 95 % bounds at the last analysis; None: not determined. Empty before the first analysis."""
+    """Relative 95 % bounds at the last analysis, None if not determined; empty before the first analysis."""
     looked_s: SixFigures = 0.0
     """Recorded time of the stretch at the last analysis [s]."""
     looks: int = 0
@@ -347,7 +347,7 @@ class UntilNote(AbstractNote):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence on bounds, requests, and remaining or recorded time."""
+        """Return a sentence on the bounds reached and requested, and on the remaining or recorded time."""
         text = ", ".join(
             f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} (goal: {100 * wish:.2g} %)"
             for name, wish in self.wishes.items()

@@ -1,7 +1,7 @@
 """Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
 HDF5's filters run on one core, under a global lock. Here, threads produce the same bytes with zlib, which
-releases Python's lock: shuffle (first bytes of all samples, then second bytes, ...), then deflate.
+releases Python's lock: shuffle (first bytes of all samples, then second bytes, ...), followed by deflate.
 """
 
 import hashlib
@@ -51,7 +51,7 @@ FIRST_CHOICE = "m0_"
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
-    """Add a labelled curve of a channel; the attributes ``default`` select the curve that is shown first."""
+    """Add a labelled curve of a channel; its attribute ``default`` selects the curve that is shown first."""
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
@@ -136,7 +136,7 @@ def _chunk(counts: Counts, length: int) -> bytes:
 INTERRUPTED_KIND = "interrupted"
 INTERRUPTED_REASON = "the recording program ended before it could record how the run ended"
 INT32_SAMPLES = 2**31
-"""Length from which sample numbers are stored with 64 bits (11 h at 51.2 kS/s)."""
+"""Number of samples above which sample numbers are stored with 64 bits (11 h at 51.2 kS/s)."""
 
 
 def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None = None) -> Path:
@@ -144,7 +144,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
     The caller must have locked the ``.part``, which is not changed. ``written`` has the checksum of each
     channel's recorded samples (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
-    fails (the disk may be full), or the copy reads back with other content than was written.
+    fails (the disk may be full), or the copy reads back differently from what was written.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
@@ -167,7 +167,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
 
 def location(part: Path, error: Exception) -> str:
-    """Return a sentence: where the committed samples are after a disk error, and what to do."""
+    """Return a sentence on where the committed samples are after a disk error, and what to do."""
     try:
         is_there = part.exists()
     except OSError:  # the folder no longer responds

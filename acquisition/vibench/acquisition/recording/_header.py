@@ -100,14 +100,14 @@ COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
 """-3 dB frequency of the first-order AC coupling of NI 9234, 4431 and similar modules [Hz]."""
 OPTIONAL = ("sensitivity", "volts_per_count")
-"""Numbers that may be unknown: NaN in the file, None here."""
+"""Number that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
 """Value of ``expected_samples`` in the file for a recording without a planned end."""
 
 FINE_STEP = 2.0**-30
 """Step of stored counts if the converter's step is unknown, as a fraction of the range.
 
-Twice the range still fits an int32, and 2^-30 lies 42 dB below a 24-bit converter's step.
+Twice the range still fits into an int32, and 2^-30 is 42 dB below a 24-bit converter's step.
 """
 
 
@@ -139,7 +139,7 @@ class ChannelHeader:
     range_v: float
     """Full scale of the input, symmetric about zero [V]."""
     volts_per_count: float | None = None
-    """Step of the converter [V]; None if unknown. Then the stored step is 2^-30 of the range."""
+    """Step of the converter [V]; None if unknown (the stored step is then 2^-30 of the range)."""
     volts_at_zero_count: float = 0.0
     """Voltage at count zero, from the converter's calibration [V]."""
     physical_offset: float = 0.0

@@ -56,13 +56,13 @@ SETTINGS = "settings"
 ROLE_WIDTH = 64
 STATE_WIDTH = 16
 TEXT_WIDTH = 480
-"""Largest size of an event's text or a reason [bytes]; longer texts are cut and end in an ellipsis."""
+"""Largest size of an event's text or a reason [bytes]; longer texts are cut and end with an ellipsis."""
 KIND_WIDTH = 32
 NUMBERS_WIDTH = 512
 
 
 class RecordingState(StrEnum):
-    """State of a recording, or how it ended."""
+    """State of a recording, or the way in which it ended."""
 
     RECORDING = "recording"
     COMPLETE = "complete"
@@ -156,7 +156,7 @@ def tmp_of(path: Path) -> Path:
 
 
 def packing(items: int, chunk_items: int = CHUNK_SAMPLES) -> dict[str, Any]:
-    """Return the settings with which h5py creates a compressed dataset of ``items``; none for no items."""
+    """Return the settings with which h5py creates a compressed dataset of ``items``; empty without items."""
     if items == 0:
         return {}
     chunks = (min(chunk_items, items),)
@@ -167,7 +167,7 @@ ELLIPSIS = "…"
 
 
 def encode(text: str, width: int) -> bytes:
-    """Return at most ``width`` UTF-8 bytes of ``text``, cut with an ellipsis."""
+    """Return at most ``width`` UTF-8 bytes of ``text``; a cut text ends with an ellipsis."""
     raw = text.replace("\0", "").encode("utf-8", "replace")
     if len(raw) <= width:
         return raw
@@ -189,7 +189,7 @@ def decode(raw: bytes) -> str:
 Attribute = str | int | float
 
 ATTRIBUTE_BYTES = 60_000
-"""Largest text of an attribute, because HDF5 limits an object's header to 64 KiB."""
+"""Largest size of an attribute's text [bytes]; HDF5 limits an object's header to 64 KiB."""
 
 
 def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> None:
@@ -209,7 +209,7 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
 
 
 READ_KINDS = "iufS"
-"""Types that are read: numbers and fixed-length text. HDF5 does not check the length of variable text."""
+"""Types that are read: numbers and fixed-length text, as HDF5 does not check variable-length text."""
 
 
 def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:

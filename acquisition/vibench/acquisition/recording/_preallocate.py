@@ -1,4 +1,4 @@
-"""Create the file before its first sample, with all known data and reserved space.
+"""Creation of the file before the first sample, with all known data and reserved space.
 
 After that, until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
 file, so a crash cannot damage its structure.
@@ -34,7 +34,7 @@ HOLD_ROOM_S = 600.0
 """Additional length for pauses during a run [s]; its disk space is reserved only when samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length of a recording without a planned end [s]; its disk space is reserved as samples arrive."""
+"""Declared length of a recording without a planned end [s]; disk space is reserved as samples arrive."""
 RESERVE_AHEAD_S = 60.0
 """Length of each further reservation when a recording outgrows its reserved space [s]."""
 
@@ -65,7 +65,7 @@ class Places:
     capacity: int
     """Largest number of samples per channel that fits into the file."""
     reserved: int
-    """Number of samples per channel for which disk space is reserved already."""
+    """Number of samples per channel for which disk space has been reserved."""
 
 
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:

@@ -45,7 +45,7 @@ LONGEST = 300
 """Largest number of characters of a faulty name or text that a message quotes."""
 
 _LOCKED_OTHERWISE = "file locking flag values don't match"
-"""HDF5's message if this process already has the file open with locks."""
+"""Message of HDF5 if this process has already opened the file with locks."""
 
 
 def open_hdf5(path: Path) -> h5py.File:
@@ -78,7 +78,7 @@ def open_hdf5(path: Path) -> h5py.File:
 
 
 def name_now(path: Path) -> Path:
-    """Return the current path of a recording: ``NAME.h5`` if the given ``.part`` was finished meanwhile."""
+    """Return the current path of a recording: ``NAME.h5`` if the given ``.part`` has since been finished."""
     if path.suffix != layout.PART_SUFFIX or path.exists():
         return path
     final = path.with_suffix("")
@@ -135,7 +135,7 @@ class OpenRecording:
             self.file = open_hdf5(self.path)
         self.counts = CheckedCounts()
         self.described = ""
-        """``repr`` of the recording at opening: all its content except samples and results."""
+        """``repr`` of the recording when opened: all of its content except samples and results."""
 
     def reopen(self) -> None:
         """Open the file again, to read what has been written since."""
@@ -173,7 +173,7 @@ class RecordingDescription:
     started_utc: str
     recording_id: str
     samples_id: str
-    """SHA-256 of all channels' checksums, equal in copies; empty while the file grows or without samples."""
+    """SHA-256 of all channels' checksums, equal in copies; empty without samples or while the file grows."""
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
