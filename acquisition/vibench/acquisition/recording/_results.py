@@ -26,7 +26,7 @@ AXES = "axes_json"
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
-"""Any value of JSON: numbers, text, booleans, lists and objects of them."""
+"""Any value of JSON: a number, text or boolean, or a list or object of these."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of an array's axes; earlier versions did not store them, so lengths are compared."""
+    """Return the names of an array's axes; for files of earlier versions, they are found from the lengths."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

@@ -1,9 +1,9 @@
 """The seal of a recording: a checksum of its content, which shows any change.
 
-A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, one of its
-data. The SHA-256 of the manifest is the seal. With a key, the seal is also signed (HMAC, RFC 2104). Without a
-signature it shows only accidental changes: anyone can compute a new seal, but a signature needs the key.
-``docs/recording-format.md`` shows how to check a seal without this package; reasons: decision 0031.
+A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, and one of
+its data. The SHA-256 of the manifest is the seal. With a key, the seal is also signed (HMAC, RFC 2104).
+Without a signature it shows only accidental changes: anyone can compute a new seal, but a signature needs the
+key. ``docs/recording-format.md`` shows how to check a seal without this package; reasons: decision 0031.
 """
 
 import hashlib
@@ -53,7 +53,7 @@ DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""Intermediate SHA-256 states by dataset path: one before each piece of data, and one at the end."""
+"""Intermediate SHA-256 states, by path of the dataset: one before each piece of data, and a last one."""
 
 
 class SealDepth(StrEnum):
@@ -75,7 +75,7 @@ class SealState(StrEnum):
     SEAL_GONE = "seal_gone"
     """The file was written by a version that seals every recording, but its seal is missing."""
     UNFINISHED = "unfinished"
-    """The file is still being recorded, or was cut off; finishing or recovering seals it."""
+    """The file is still being recorded, or was cut off; it is sealed when finished or recovered."""
     OTHER_KEY = "other_key"
     """The file is unchanged, but not signed with the given key."""
 
@@ -130,7 +130,7 @@ def seal_key(path: Path | None = None) -> SealKey | None:
 
 
 def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -> None:
-    """Seal a finished recording; ``known`` has the checksums of datasets computed during writing."""
+    """Seal a finished recording; ``known`` has those checksums of datasets that writing has computed."""
     manifest = {
         path: {
             "attributes": _checksum_of_header(item),
@@ -203,7 +203,7 @@ class FileIdentity(Protocol):
 
 
 def first_copies(recordings: Sequence[FileIdentity]) -> list[int]:
-    """Return for each recording the index of the first recording with the same samples or recording_id."""
+    """Return, for each recording, the index of the first one with the same samples or recording_id."""
     seen: dict[str, int] = {}
     firsts = []
     for place, each in enumerate(recordings):
@@ -367,7 +367,7 @@ def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[
 
 
 def _missing_seal(excuse: str, key: SealKey | None) -> SealCheck:
-    """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
+    """Report a missing seal, which is an error if a key is given: a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
     return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none made with the key ({key.name})", "")
@@ -411,7 +411,7 @@ class NotedSeal:
 
     point: str
     seal: str
-    """Seal in the table of points. For the file of an earlier attempt, it is the seal of that attempt."""
+    """Seal in the table of points; for the file of an earlier attempt, the seal of that attempt."""
     attempt_seal: str
     """Seal in the table of attempts; empty without an attempt, or for an attempt before seals existed."""
 
@@ -430,7 +430,7 @@ def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
 
 
 def journal_objection(path: Path, seal: str) -> str:
-    """Return why a journal in the recording's folder contradicts its seal; empty if no journal does.
+    """Return why a journal in the folder contradicts the recording's seal; empty if no journal does.
 
     Both tables of a journal must have the same seal. If they differ, neither confirms the recording.
     """
@@ -454,7 +454,7 @@ def open_database(uri: str) -> sqlite3.Connection:
 
 @contextmanager
 def close_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Close a new ``connection`` if its first use fails; Windows cannot move or delete an open file.
+    """Close a new ``connection`` if its first use fails, as Windows cannot move or delete an open file.
 
     Raises sqlite3.Error, or any other error of the first use, after closing.
     """
@@ -466,7 +466,7 @@ def close_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connectio
 
 
 def open_read_only(path: Path) -> sqlite3.Connection:
-    """Open a database read-only, also in a read-only folder."""
+    """Open a database read-only, even in a read-only folder."""
     address = path.resolve().as_uri()
     try:
         # If this connection could write, the last connection to close would clean up the database files.
@@ -483,11 +483,11 @@ def open_read_only(path: Path) -> sqlite3.Connection:
 # that is read later from a file with this seal is hashed again and compared with these states.
 
 _KNOWN: dict[str, ChannelStates] = {}
-"""Checksum states by seal; about 20 kB for a recording of a minute."""
+"""Checksum states, by seal; about 20 kB for a recording of one minute."""
 
 
 def remember(seal: str, states: ChannelStates) -> None:
-    """Keep the checksum states of a seal, with which later reads of files with this seal are compared."""
+    """Keep the checksum states of a seal, for comparison with later reads of files that have this seal."""
     _KNOWN[seal] = states
 
 

@@ -34,12 +34,12 @@ class EventKind(StrEnum):
     """The drive deviated from its planned time or phase; the text says by how much."""
     END = "end"
     OFF = "off"
-    """The output was switched off after an early end; the samples that confirm silence follow."""
+    """The output was switched off after an early end; the samples that confirm its silence follow."""
     SILENCE = "silence"
 
 
 REJECTED = "average rejected"
-"""Text of a mark: the last noise realisation that began before it is excluded from results."""
+"""Text of a mark that excludes from the results the last noise realisation begun before the mark."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Segment:
-    """A named range of samples, with the numbers that the analysis needs to use it."""
+    """A named range of samples, with the numbers that its analysis needs."""
 
     label: str
     first_sample: int
@@ -130,7 +130,7 @@ def first_number(group: h5py.Group, name: str) -> int:
 
 
 def ending(file: h5py.File) -> tuple[RecordingState, str]:
-    """Return state and reason of a ``.part``; after a killed program, the state is still "recording"."""
+    """Return state and reason of a ``.part``; if its program was killed, the state is still "recording"."""
     state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     is_whole = state in tuple(RecordingState)
     return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
@@ -232,7 +232,7 @@ class SegmentLabel(StrEnum):
     PERTURBED = "perturbed"
     """A branch point with small perturbations of the drive, to determine its stability."""
     CHECK = "check"
-    """The small sine before the first ramp."""
+    """The small sine of the check, before the first ramp."""
     LEAD_IN = "lead_in"
     """Tones played before a dwell, so that the specimen reaches the intended branch."""
     RAMP_UP = "ramp_up"

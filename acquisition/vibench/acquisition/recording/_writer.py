@@ -36,7 +36,7 @@ COUNT_TOLERANCE = 0.01
 
 
 class CountScale:
-    """Converts blocks of volts to counts."""
+    """Converter of blocks of volts to counts."""
 
     def __init__(self, channels: Sequence[ChannelHeader]) -> None:
         self._roles = [channel.role for channel in channels]
@@ -76,7 +76,7 @@ class CountScale:
 
 
 RESERVED = 8
-"""Number of reserved descriptors: recording, its copy, folder and disk checks, then the journal."""
+"""Number of reserved file descriptors: for the recording, its copy, folder and disk checks, the journal."""
 
 
 class DescriptorReserve:
@@ -101,7 +101,7 @@ class DescriptorReserve:
 
 
 QUEUE_S = 10.0
-"""Length of the queue of samples that wait to be written [s]; the slowest measured disk sync took 0.12 s."""
+"""Capacity of the queue of samples to be written [s]; the slowest measured disk sync took 0.12 s."""
 GAP_PIECE_SAMPLES = 51_200
 
 ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILED)
@@ -162,7 +162,7 @@ class RecordingWriter:
         self._key = key
         self._digests = {channel.role: hashlib.sha256() for channel in header.channels}
         self.samples = 0
-        """Samples per channel that were appended so far."""
+        """Number of samples per channel appended so far."""
         self._reserved = places.reserved
         self._is_finished = False
 
@@ -172,7 +172,7 @@ class RecordingWriter:
         return self._committer.committed_samples
 
     def append(self, block: Block) -> None:
-        """Append the next samples. Returns at once unless the disk is seconds behind.
+        """Append the next samples; wait only if the disk is seconds behind.
 
         Samples missing between the previous block and this block are marked as a gap; they read as NaN.
 
@@ -296,7 +296,7 @@ class RecordingWriter:
             )
 
     def _reserve_up_to(self, end: int) -> None:
-        """Reserve disk space ahead if the recording has no planned end, or is much longer than planned."""
+        """Reserve more disk space if the recording has no planned end, or is much longer than planned."""
         rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
         ahead = round(RESERVE_AHEAD_S * rate_hz)
         # Half the margin, so that a recording of the planned length needs no further reservation.
@@ -310,7 +310,7 @@ class RecordingWriter:
         self._reserved = target
 
     def _fill_gap(self, first: int, stop: int) -> None:
-        """Write the missing count for lost samples, in small pieces, and add the gap to its table."""
+        """Write the count that marks lost samples, in small pieces, and add the gap to the table of gaps."""
         missing = np.full(GAP_PIECE_SAMPLES, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
         for begin in range(first, stop, GAP_PIECE_SAMPLES):
             counts = np.broadcast_to(

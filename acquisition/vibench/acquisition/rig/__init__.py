@@ -2,9 +2,9 @@
 
 `load_rig` reads the configuration from TOML; with the table ``[virtual]`` the rig is simulated. `RigModel`
 describes the chain from voltage at the generator's terminal to amplifier, coil, table and specimen, which
-acts back on the table (`vibench.sim.shaker`), without clipping and the table's stops. `KnobSheet` lists the
-manual settings that an operator has confirmed. This package opens no instrument and does not depend on plans.
-See docs/hardware.md.
+acts back on the table (`vibench.sim.shaker`). Clipping and the table's stops are not included. `KnobSheet`
+lists the manual settings that an operator has confirmed. This package opens no instrument and does not depend
+on plans. See docs/hardware.md.
 
 Peak acceleration of the table [m/s2] per volt at the generator, at 260 Hz:
 

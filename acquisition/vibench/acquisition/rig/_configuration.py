@@ -47,11 +47,11 @@ def token_from_env() -> str:
 USUAL_GRID_RATE_HZ = 102_400.0
 """Default number of computed time steps per second on the virtual rig (its grid)."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Smallest number of time steps per second. Then the base motion is 0.8 % too small at `WATCHED_HZ`."""
+"""Smallest number of time steps per second, at which the base motion at `WATCHED_HZ` is 0.8 % too small."""
 WATCHED_HZ = 500.0
-"""Frequency at which a grid's error is judged: highest specimen resonance, top of the paper's range."""
+"""Frequency at which a grid's error is judged: highest specimen resonance and end of the paper's range."""
 _MEASURED = 0.55
-"""Factor in `level_error`, from a comparison with 409,600 time steps per second between 60 Hz and 1 kHz."""
+"""Factor in `level_error`, from a comparison with 409,600 time steps per second, at 60 Hz to 1 kHz."""
 LARGEST_LEVEL_ERROR = 0.01
 """Largest allowed level error of a plan on a grid coarser than the default."""
 STEPS_PER_SAMPLE = 2
@@ -63,7 +63,7 @@ class VirtualConfig(FrozenModel):
 
     seed: int = Field(ge=0)
     pace: Literal["free", "wall"] = "free"
-    """Pace of rig time. ``"free"``: as fast as possible; ``"wall"``: ``speed`` times real time."""
+    """Pace of rig time: ``"free"`` is as fast as possible, ``"wall"`` is ``speed`` times real time."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
     """Number of computed steps per second: 12,800 to 102,400, and at least twice the sample rate. A coarser
@@ -81,7 +81,7 @@ class VirtualConfig(FrozenModel):
     faults: str | None = None
     """Path of a fault script, relative to the folder of this file; see docs/campaigns.md."""
     converter_noise_v: NonNegativeFloat
-    """Noise of each converter input, rms at any sample rate [V]."""
+    """Noise of each converter input, rms; the same at any sample rate [V]."""
 
     @field_validator("grid_rate_hz")
     @classmethod
@@ -97,7 +97,7 @@ class VirtualConfig(FrozenModel):
 
 
 def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
-    """Return the largest relative error by which the base motion of a sine is too small.
+    """Return the largest relative amount by which the base motion of a sine is too small.
 
     Averaging and holding the drive over a step h contributes (pi f h)^2 / 3. The extrapolation of the
     specimen's force on the table over the step contributes the rest. The specimen's response is exact.
@@ -147,21 +147,21 @@ class OutputConfig(FrozenModel):
     """Sample rate of the output, which the hardware must support exactly [samples/s]."""
     # At least three blocks of a run: one is being played, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
-    """Time written in advance [s]. It is the longest tolerated pause of this computer, and the delay of an
-    early ramp down."""
+    """Duration of the samples written in advance [s]: longest tolerated pause of this computer, and delay of
+    an early ramp down."""
     source: str = Field(min_length=1)
     """Source of the values ``limit_v`` and ``sample_rate_hz``."""
 
 
 _LARGEST = 1e250
-"""Largest value of a shaker parameter, in SI units; products of several must not overflow."""
+"""Largest value of a shaker parameter, in SI units; products of several parameters must not overflow."""
 HIGH_Z: Literal["high-z"] = "high-z"
 SOURCE_OHM = 50.0
 """Output impedance of a function generator [ohm]."""
 
 
 Options = dict[str, str | int | float]
-"""Settings of a plug-in, checked only by the plug-in."""
+"""Settings of a plug-in, which only the plug-in checks."""
 
 
 class GeneratorConfig(FrozenModel):
@@ -172,7 +172,7 @@ class GeneratorConfig(FrozenModel):
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver; none of this package's drivers has any."""
+    """Further settings of the driver; the drivers of this package have none."""
     visa_library: str = "@py"
     """VISA library: ``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
@@ -198,7 +198,7 @@ class GeneratorConfig(FrozenModel):
 
     @property
     def shown_fraction(self) -> float:
-        """Displayed voltage for the load setting, relative to the open-circuit voltage."""
+        """Ratio of displayed voltage to open-circuit voltage, from the load setting."""
         ohm = inf if self.load_ohm == HIGH_Z else self.load_ohm
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
@@ -213,7 +213,7 @@ class AmplifierConfig(FrozenModel):
     model: str
     serial: str = ""
     gain_db: float = Field(ge=-60, le=60)
-    """Voltage gain of the amplifier at the present position of the knob [dB]."""
+    """Voltage gain of the amplifier at the present position of its knob [dB]."""
     clip_v: PositiveFloat
     """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: Sourced
@@ -342,7 +342,7 @@ class SpecimenConfig(SpecimenTable):
 
 
 class LoopInput(StrEnum):
-    """Channels that a real-time controller samples, in the order of its inputs."""
+    """Channels that a real-time controller samples, in the order of the controller's inputs."""
 
     BASE = "base_acceleration"
     M0 = "m0_velocity"
@@ -390,7 +390,7 @@ class Rig(FrozenModel):
     amplifier: AmplifierConfig
     shaker: ShakerConfig
     vibrometer: VibrometerConfig | None = None
-    """Sensor of ``m0_velocity``, or of another mass in a scan; absent if another sensor measures m0."""
+    """Sensor of ``m0_velocity``, or of another mass during a scan; absent if another sensor measures m0."""
     accelerometer: AccelerometerConfig
     """Sensor of the channel ``base_acceleration``, on the base."""
     sensors: dict[Role, TransducerConfig] = Field(default_factory=dict)
@@ -401,7 +401,7 @@ class Rig(FrozenModel):
     """Real-time controller that can replace the generator; optional."""
     calibration_valid_days: PositiveInt = 730
     check_valid_h: PositiveFloat = 12.0
-    """Time for which a passed bench check allows the bench to be armed [h]."""
+    """Time for which the bench may be armed after a passed bench check [h]."""
     virtual: VirtualConfig | None = None
     """Settings of a virtual rig, whose instruments are all simulated; absent for a real rig."""
 

@@ -35,7 +35,7 @@ def sensor_name(config: ChannelConfig) -> str:
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Return the properties of the sensor at an input.
 
-    Raises ConfigurationError when no package provides the sensor, or it measures another quantity than the
+    Raises ConfigurationError when no package provides the sensor, or if its quantity is not that of the
     channel. Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
     """
     name = sensor_name(config)
@@ -145,7 +145,7 @@ class KnobSheet(FrozenModel):
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Function that asks to confirm the settings and returns the sheet; raises CheckFailed if one is wrong."""
+"""Function that asks to confirm settings and returns the sheet; raises CheckFailed if a setting is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -195,7 +195,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
     """Return a function that accepts an earlier confirmation if it is recent and has the same settings.
 
     ``path`` is a sheet from `save_knob_sheet`; ``valid`` is the time for which the sheet is valid. The
-    function raises CheckFailed when the sheet is older or has other settings.
+    function raises CheckFailed if the sheet is older or its settings differ.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -239,7 +239,7 @@ def _knob_text(knob: Knob) -> str:
 
 
 class CalibrationRule(StrEnum):
-    """What happens if a calibration has expired."""
+    """Policy for an expired calibration."""
 
     ENFORCED = auto()
     """The bench is not opened if a calibration has expired."""
@@ -281,7 +281,7 @@ class Calibration:
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
     """Return the calibrations of a rig: of every sensor with a calibration date, and of every input.
 
-    The ages are counted up to ``today``.
+    Ages are as of ``today``.
     """
     channels = channels_of(rig)
     sensors = dict.fromkeys(

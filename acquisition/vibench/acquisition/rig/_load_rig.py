@@ -75,7 +75,7 @@ def with_faults(rig: Rig, script: Path) -> Rig:
 
 
 class GeneratorDriver(Protocol):
-    """Entry point of ``vibench.generators``, usually a class with these two class methods."""
+    """Entry point of ``vibench.generators``: an object, usually a class, with these two methods."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
         """Return the capabilities of the generator with this configuration, without opening it."""
@@ -83,7 +83,7 @@ class GeneratorDriver(Protocol):
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open and return a generator with its output off and its smallest amplitude set.
 
-        Raises InstrumentError when no generator or another instrument responds; nothing stays open then.
+        Raises InstrumentError when no instrument responds, or it is another one; then nothing stays open.
         """
 
 
@@ -100,8 +100,8 @@ class OutputDriver(Protocol):
     def open(self, physical: str, config: OutputConfig, digitizer: Any) -> AnalogOutput:
         """Set an output to zero volts, reserve it and return it.
 
-        ``physical`` is the full name of the output, such as ``"Dev1/ao0"``. The driver of the same name has
-        opened ``digitizer``, with which the output starts.
+        ``physical`` is the full name of the output, such as ``"Dev1/ao0"``. The output starts together with
+        ``digitizer``, which the driver of the same name has opened.
         """
 
 

@@ -16,7 +16,7 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""Peak over rms of a sine; the limiter setting is the rms current of the largest sine that is not limited."""
+"""Peak over rms value of a sine; the limiter is set to the rms current of the largest unlimited sine."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
@@ -59,11 +59,11 @@ _COLUMNS = {
     BaseQuantity.M0_ACCELERATION: (_M0, 2),
     BaseQuantity.P: (_P, 0),
 }
-"""For each quantity: column of the linear motion, and the power of i omega by which it is multiplied."""
+"""Column of the linear motion for each quantity, and the power of i omega that multiplies the column."""
 
 
 class OnTable(StrEnum):
-    """What stands on the table in the model."""
+    """What is mounted on the table in the model."""
 
     SPECIMEN = "specimen"
     NOTHING = "nothing"
@@ -77,7 +77,7 @@ class RigModel:
     Coil, table and specimen are solved together (`vibench.sim.shaker`), because the specimen changes the
     table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops are
     included to first order. Clipping, the current limiter, the table's stops and its axial resonance above
-    15 kHz are not included; the virtual rig or a check on the real rig covers them.
+    15 kHz are not included; the virtual rig, or a check on the real rig, covers these effects.
     """
 
     rig: Rig

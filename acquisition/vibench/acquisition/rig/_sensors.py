@@ -33,7 +33,7 @@ _UNITS = {
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
-"""Size of data-sheet units in SI units, by the unit of the recorded quantity."""
+"""Value of each data-sheet unit in SI units, by the SI unit of the recorded quantity."""
 _EXAMPLES = {
     "m s-2": "'100 mV/g' or '10 mV/(m/s2)'",
     "m s-1": "'250 mm/s/V' or '4 V/(m/s)'",
@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest accepted number of a sensitivity, and inverse of the largest; other numbers are typing errors."""
+"""Smallest accepted number in a sensitivity, and inverse of the largest; others are typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
@@ -77,7 +77,7 @@ def volts_per_unit(text: str, unit: str) -> float:
 
 
 def size_of_unit(name: str, unit: str) -> float | None:
-    """Return the size of the unit ``name`` in ``unit``: 9.80665 for ``"g"`` in ``"m s-2"``.
+    """Return the value of the unit ``name`` in ``unit``: 9.80665 for ``"g"`` in ``"m s-2"``.
 
     Return None if ``name`` is a unit of another quantity, or one of the two units is unknown.
     """
@@ -92,7 +92,7 @@ def _plain(unit: str) -> str:
 
 
 class Sourced(FrozenModel):
-    """A value and its source, to tell assumptions from values of a data sheet."""
+    """A value and its source, to distinguish assumptions from values of a data sheet."""
 
     value: PositiveFloat
     source: str = Field(min_length=1)
@@ -104,7 +104,7 @@ class StatedUncertainty(FrozenModel):
     relative: float = Field(gt=0.0, lt=1.0)
     """Expanded uncertainty relative to the value; 0.01 means 1 %."""
     coverage_factor: PositiveFloat = 2.0
-    """Expanded over standard uncertainty; 2 on most certificates, 1.73 for uniform bounds."""
+    """Ratio of expanded to standard uncertainty: 2 on most certificates, 1.73 for uniform bounds."""
     source: str = Field(min_length=1)
     """Source of the uncertainty: certificate with its number, or data sheet."""
 
@@ -125,9 +125,9 @@ class SensorConfig(FrozenModel):
     full_scale_v: PositiveFloat
     """Largest output voltage of the sensor, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
-    """Upper -3 dB frequency, first order [Hz]; if absent, far above the measured band."""
+    """Upper -3 dB frequency, first order [Hz]; if absent, it is far above the measured band."""
     resonance_hz: PositiveFloat | None = None
-    """Mounted resonance frequency [Hz]; if absent, far above the measured band."""
+    """Mounted resonance frequency [Hz]; if absent, it is far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
     """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects the phase."""
     iepe: Literal["yes", "no"] = "no"
@@ -136,7 +136,7 @@ class SensorConfig(FrozenModel):
     uncertainty: StatedUncertainty | None = None
     """Uncertainty of the calibration; if absent, every result reports that none was stated."""
     alignment_deg: Sourced | None = None
-    """Largest angle between the motion and the sensitive axis, or the laser beam [degrees]."""
+    """Largest angle between the motion and the sensitive axis or laser beam [degrees]."""
     noise_per_rthz: Sourced | None = None
     """Spectral density of the sensor noise [SI unit per root hertz]; absent if not stated."""
 
@@ -151,7 +151,7 @@ class SensorConfig(FrozenModel):
 
 
 class TransducerConfig(SensorConfig):
-    """Any other sensor, described by a table such as ``[sensors.m0_acceleration]``."""
+    """A sensor of any other channel, described by a table such as ``[sensors.m0_acceleration]``."""
 
     sensitivity: str
     """Sensitivity with the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
@@ -250,7 +250,7 @@ UNIT_OF_QUANTITY = {
 RESPONSE_ROLES = (Role.M0_VELOCITY, Role.M0_ACCELERATION, Role.M0_DISPLACEMENT)
 """Channels that measure the motion of m0, in the order of preference."""
 SCANNED_ROLES = (Role.M0_VELOCITY, Role.M1_VELOCITY, Role.M2_VELOCITY)
-"""Channels under which a scan can record the vibrometer."""
+"""Channels in which a scan can record the vibrometer."""
 _TABLES: Mapping[str, str] = {Role.BASE_ACCELERATION: "accelerometer", Role.M0_VELOCITY: "vibrometer"}
 
 

@@ -10,14 +10,14 @@ from ..instruments import Block, Digitizer, read_block
 from ..recording import EventKind, RecordingWriter
 
 BLOCK_S = 0.1
-"""Longest time between two checks of limits and stop switch [s]; NI-DAQmx suits ten reads per second."""
+"""Longest time between two checks of limits and stop switch [s]; ten reads per second suit NI-DAQmx."""
 
 
 class AcquisitionLoop:
     """Reads and records blocks. The number of samples read is the clock, so waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
-        """Create a loop that calls ``advance`` after every block of samples."""
+        """Create a loop, which calls ``advance`` after every block of samples."""
         self._advance = advance
         self._digitizer = digitizer
         self._sink = sink
@@ -37,8 +37,8 @@ class AcquisitionLoop:
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
         """Read and record blocks for another ``duration_s``; yield each block.
 
-        The last sample is nearest to the sum of all durations so far, so that rounding does not accumulate.
-        The last ``lead_s`` [s] are left for the next call.
+        The last sample is the one nearest to the sum of all durations so far, so rounding does not
+        accumulate. The last ``lead_s`` [s] are left for the next call.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
@@ -67,7 +67,7 @@ class AcquisitionLoop:
             waiting -= min(longest, waiting)
 
     def pass_time(self, duration_s: float) -> Iterator[Block]:
-        """Read until another ``duration_s`` has been converted; samples that waited before stay unread.
+        """Read until another ``duration_s`` has been converted; as many samples stay unread as before.
 
         If more time has passed already, the rest of the plan is delayed accordingly.
         """
@@ -101,7 +101,7 @@ class AcquisitionLoop:
         return block
 
     def cut(self) -> None:
-        """Let the next duration start now, even if the last one is incomplete and samples are unread."""
+        """Let the next duration start now, even if the last duration is incomplete and samples are unread."""
         self._due_s = self._converted / self._digitizer.sample_rate_hz
 
     def enter(self, segment: Segment | None) -> None:

@@ -13,10 +13,10 @@ from .stream_drive import StreamDrive
 
 
 class Drive(Protocol):
-    """Plays phases in sequence while the run reads samples.
+    """Player of consecutive phases, while the run reads samples.
 
-    A drive never waits. It yields the time for which to read until its next action, because samples read are
-    the only clock. Coming phases are announced, because some drives write samples in advance.
+    A drive never waits. It yields how long to read until its next action, because the samples read are the
+    only clock. Coming phases are announced, because some drives write samples in advance.
     """
 
     @property
@@ -33,7 +33,7 @@ class Drive(Protocol):
 
     @property
     def is_commanded(self) -> bool:
-        """Whether each change of the signal needs a command, whose time passes while sampling continues."""
+        """Whether each change of the signal needs a command, which takes time while sampling continues."""
 
     @property
     def setting_vpp(self) -> float:
@@ -41,7 +41,7 @@ class Drive(Protocol):
 
     @property
     def is_playing(self) -> bool:
-        """Whether a signal is playing that must be ramped down."""
+        """Whether the drive plays a signal that must be ramped down."""
 
     def arm(self, coming: Iterable[Phase]) -> None:
         """Prepare the drive; the first of ``coming`` starts at the digitizer's first sample."""
@@ -88,7 +88,7 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
 
 
 def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
-    """Return the configured dead man's switch; raise ConfigurationError if the signal does not allow it."""
+    """Return the configured dead man's switch; raise ConfigurationError if the signal does not allow one."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:
         return None

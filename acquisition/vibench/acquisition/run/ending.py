@@ -15,7 +15,7 @@ from .silence_watch import DriveGuard
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """State of a run after each block, for viewers."""
+    """State of a run after a block, for viewers."""
 
     state: RunState
     segment: Segment | None
@@ -54,7 +54,7 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the run was completed as planned; ``known`` is a text on bounds of results."""
+        """Note that the run was completed as planned; ``known`` is a text on the bounds of the results."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 

@@ -22,17 +22,17 @@ from ..plan import (
 )
 
 QUIET = 1.25
-"""Setting at level 0, where ramps start and end, over the generator's smallest setting (for a waveform of
-full range)."""
+"""Setting at level 0, where ramps start and end, relative to the generator's smallest setting (for a waveform
+of full range)."""
 
 
 GUARD_S = 0.02
 """Pause between the end of a burst and the next trigger [s]. The effect of a trigger during a burst is not
 documented for every firmware, and reading times vary by some milliseconds."""
 CHECK_MARGIN_S = 0.5
-"""Extra length of the burst for a check [s], to allow for commands and the reading of samples."""
+"""Extra length of a check's burst [s], to allow for commands and the reading of samples."""
 LITTLE = 0.98
-"""Ratio of new to old level below which the level is lowered before the frequency changes."""
+"""Ratio of new to old level below which the level is lowered before a change of frequency."""
 MOST_CYCLES = 50_000
 _BLIND_S = 0.1
 """Duration of a ramp during which no samples are read [s]."""
@@ -78,7 +78,7 @@ class DeadMan:
 
 
 class GeneratorDrive:
-    """A `Drive` whose commands take effect at once; a phase's first command is sent at its start."""
+    """A `Drive` whose commands take effect at once; the first command of a phase is sent at its start."""
 
     drive_source = DriveSource.GENERATOR
     is_commanded = True
@@ -141,7 +141,7 @@ class GeneratorDrive:
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
-        """Ramp down from the current level in as many steps as time allows; yield the time of each [s].
+        """Ramp down from the current level in as many steps as time allows; yield the duration of each [s].
 
         Steps whose time has passed are skipped, but no step exceeds 1/`FEWEST_STAIRS` of the ramp.
         """
@@ -157,11 +157,11 @@ class GeneratorDrive:
         self._stop()
 
     def silence(self) -> None:
-        """Ramp down as fast as the generator takes commands, then turn the output off in any case.
+        """Ramp down as fast as the generator takes commands; in any case, then turn the output off.
 
-        Used when the run ends without sampling, or when the drive was still measured after switching off. The
-        ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output was
-        off already, or the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
+        Used when the run ends without sampling, or when the drive was still measured after switching it off.
+        The ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output
+        was off already, or the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
         """
         was_off = not self._is_on
         try:
@@ -230,7 +230,7 @@ class GeneratorDrive:
     def _change_tone(self, old: Tone, new: Tone) -> None:
         """Change amplitude and frequency: lower the amplitude first, or raise it last, for safety.
 
-        Between steps of a sweep, a small decrease also comes last, so that the frequency is on time.
+        Between steps of a sweep, a small decrease of amplitude also comes last, so the frequency is on time.
         """
         if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
@@ -262,7 +262,7 @@ class GeneratorDrive:
         self._is_on = False
 
     def _lower(self) -> None:
-        """Set the amplitude of level 0 while the output is off."""
+        """Set the amplitude for level 0 while the output is off."""
         quiet_vpp = self._quiet_vpp()
         try:
             self._generator.set_amplitude(quiet_vpp)

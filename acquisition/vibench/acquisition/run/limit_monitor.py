@@ -14,7 +14,7 @@ from ..plan import InRunLimits, OnChange, OnOverload
 from ..rig import Channel, Rig, Role, suspended_mass_kg
 
 HIGH_PASS_HZ = 2.0
-"""Corner of every high-pass filter [Hz]. It attenuates a sine by 0.2 % at 10 Hz and by 2.5 % at 5 Hz."""
+"""Corner of every high-pass filter [Hz]. A sine is attenuated by 0.2 % at 10 Hz and by 2.5 % at 5 Hz."""
 
 
 class _Section:
@@ -44,7 +44,7 @@ def _high_pass(sample_rate_hz: float) -> _Section:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """Motion of the base at each sample of a block of samples."""
+    """Motion of the base at each sample of a block."""
 
     velocity: Samples
     """Velocity of the base at each sample [m/s]."""
@@ -53,7 +53,7 @@ class BaseMotion:
 
 
 class BaseTracker:
-    """Integrates the base acceleration twice, each time with a second-order high-pass filter."""
+    """Integrator of the base acceleration, twice, each time with a second-order high-pass filter."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._to_velocity = _integrator(sample_rate_hz)
@@ -68,8 +68,8 @@ class BaseTracker:
 class SpecimenTracker:
     """Displacement of m0 relative to the base, which stretches the springs.
 
-    If m0's sensor needs fewer integrations than the base acceleration, high-pass filters replace them, so
-    that both motions have the same phase.
+    If m0's sensor needs fewer integrations than the base acceleration, high-pass filters replace the others,
+    so that both motions have the same phase.
     """
 
     def __init__(self, sample_rate_hz: float, role: Role = Role.M0_VELOCITY) -> None:
@@ -93,9 +93,9 @@ RMS_S = 1.0
 REACTION = 1.1
 """Allowed force on the table, relative to the coil's force limit; above 1, as the specimen reacts, too."""
 SETTLING_S = 0.5
-"""Time after the start in which integrated quantities are not checked [s]. An AC-coupled input drifts after
-its current is switched on, and the drift integrates to metres. During this time, the run plays only the low
-level of its check. Measured quantities are checked from the first sample."""
+"""Time after the start during which integrated quantities are not checked [s]. An AC-coupled input drifts
+after its current is switched on, and the drift integrates to metres. During this time, the run plays only the
+low level of its check. Measured quantities are checked from the first sample."""
 _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 
@@ -113,10 +113,10 @@ class _MonitoredQuantity:
 
 
 class LimitMonitor:
-    """Checks the limits, and raises an error when the run must end.
+    """Monitor of the limits, which raises an error when the run must end.
 
-    The monitor is part of the loop that reads the samples, independent of windows and other processes. Blocks
-    must be consecutive; after a gap, the monitor restarts.
+    The monitor is part of the loop that reads samples. It is independent of windows and other processes.
+    Blocks must be consecutive; after a gap, the monitor restarts.
     """
 
     def __init__(
@@ -311,7 +311,7 @@ class LimitMonitor:
 
 
 def _blind(block: Block, role: Role) -> NDArray[np.bool_]:
-    """Return for each sample of a block whether the sensor exceeds its range."""
+    """Return, for each sample of a block, whether the sensor exceeds its range."""
     is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
     for overload in block.overloads:
         if overload.channel == role.value:

@@ -32,14 +32,14 @@ CLEAR = 0.3
 
 
 class Sink(Protocol):
-    """Object that receives every block that is read."""
+    """Receiver of every block that is read."""
 
     def append(self, block: Block) -> None:
         """Receive the next block of samples."""
 
 
 class GlideWatch:
-    """Counts the cycles of the recorded drive in a stepped sweep, and compares them with the plan."""
+    """Counter of the recorded drive's cycles in a stepped sweep, for comparison with the plan."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -113,7 +113,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Compares a sweep made by the generator with its planned course, block by block."""
+    """Comparison of a sweep made by the generator with its planned course, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide
@@ -130,7 +130,7 @@ class SweepWatch:
 
 
 HOLD_LONGEST_S = HOLD_ROOM_S
-"""Longest total hold of a run [s], limited by the space in its recording."""
+"""Longest total hold of a run [s]; the space in its recording limits it."""
 
 
 LATEST = 0.5
@@ -139,7 +139,7 @@ LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
 LEARNT = 0.05
-"""Smallest fraction of a delay by which later commands are sent earlier; larger for the first steps."""
+"""Smallest fraction of a measured delay by which later commands are advanced; larger for the first steps."""
 LONGEST_LEAD = 0.25
 """Largest lead of a command sent early, as a fraction of the step."""
 TOLD_CYCLES = 0.1
@@ -147,7 +147,7 @@ TOLD_CYCLES = 0.1
 MOST_MADE_UP = 3.0
 """Largest frequency correction for lost cycles, as a multiple of the planned frequency step."""
 LEAST_LEFT = 0.2
-"""Shortest time for a correction, relative to the step's duration; also the largest relative correction."""
+"""Shortest time for a correction, relative to the step; also the largest relative correction."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
@@ -157,7 +157,7 @@ class _Pace(Enum):
     AFTER_THE_COMMAND = auto()
     """The end of the phase's first command; used for settling."""
     OF_THE_COMMANDS = auto()
-    """The planned time, or the end of the last command if that is later; used for ramps."""
+    """The planned time, or the end of the last command if this is later; used for ramps."""
     OF_THE_PLAN = auto()
     """The planned time; used for stepped sweeps."""
     OF_ITSELF = auto()
@@ -173,7 +173,7 @@ class StopRequested(Exception):
 
 
 class PhaseRunner:
-    """The sampling part of a run: phases, holds, and the ramp of an early end.
+    """The sampling part of a run: phases, holds, and the ramp at an early end.
 
     After every block the limits and the stop switch are checked. If the run must end, LimitExceeded,
     RunStalled or `StopRequested` is raised, and the run ramps down.
@@ -214,10 +214,10 @@ class PhaseRunner:
         return self._drive.coefficients
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
-        """Play a phase and yield progress; its blocks are also appended to ``into``, if given.
+        """Play a phase and yield progress; the blocks of the phase are also appended to ``into``, if given.
 
         A phase begins when its command has been carried out, however long that takes. Steps of a sweep within
-        one segment start at their planned times instead; the run fails if they cannot.
+        one segment start at their planned times; the run fails if that is impossible.
         """
         self._enter(phase.state)
         pace, commanded = self._pace_of(phase), phase
@@ -271,8 +271,8 @@ class PhaseRunner:
     def _with_lost_cycles(self, phase: Phase, late_s: float) -> Phase:
         """Return the phase with its frequency corrected for the cycles lost before it.
 
-        While a command is late, the previous tone continues. The cycles lost are the difference of the two
-        frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
+        While a command is late, the previous tone continues. The cycles lost are the difference between the
+        two frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
         """
         if not isinstance(phase.play, Tone):
             return phase
@@ -339,7 +339,7 @@ class PhaseRunner:
         """Ramp down from the current state without limit checks; an open segment stays incomplete.
 
         A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of the ramp for a stop
-        level [s]. Records until silence is measured; raises InstrumentError if the drive stays on.
+        level [s]. The method records until silence is measured; raises InstrumentError if the drive stays on.
         """
         self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
@@ -363,7 +363,7 @@ class PhaseRunner:
         self._silence.require_silence()
 
     def _listen(self) -> Iterator[Progress]:
-        """Continue to record until the measured drive is silent, or for `LONGEST_S`.
+        """Continue to record until the measured drive is silent, but no longer than `LONGEST_S`.
 
         A drive that is still measured is switched off again, and its amplitude lowered, at growing intervals.
         """
@@ -412,7 +412,7 @@ class PhaseRunner:
         return "" if self._drive.can_hold else f"the present signal of the {source} cannot be held"
 
     def _stop_hold(self, reason: str) -> NoReturn:
-        """Stop the run, and with it the campaign, because a hold is impossible."""
+        """Stop the run, and thus the campaign, because a hold is impossible."""
         request = StopRequest.of(Cause.OPERATOR, reason)
         self._switch.ask(request)
         raise StopRequested(request)

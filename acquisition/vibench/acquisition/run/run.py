@@ -45,13 +45,13 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Smallest ratio of a sweep's step to the time of its commands; above 1, because command times vary."""
+"""Smallest ratio of a sweep's step duration to the time of its commands; above 1, as command times vary."""
 _MOST_COMMANDS = 2
 """Largest number of commands for one change of tone: amplitude and frequency."""
 
 
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
-    """Refuse a sweep with too short steps; return the time that commands add to settled tones [s].
+    """Refuse a sweep whose steps are too short; return the time that commands add to settled tones [s].
 
     Raises ConfigurationError when a step is shorter than `ROOM` times the measured time of its commands.
     """
@@ -115,7 +115,7 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
 
 
 def _origin(bench: Bench) -> Origin:
-    """Return the origin of the samples: simulated if the rig or any instrument is simulated."""
+    """Return the origin of the samples, which is "simulated" if the rig or any instrument is simulated."""
     origins = {identity.origin for identity in bench.identities.values()}
     simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in origins
     return Origin.SIMULATED if simulated else Origin.REAL
@@ -162,10 +162,10 @@ class Run(ClosedOnLeaving):
             for progress in run:
                 print(progress.state, progress.elapsed_s)
 
-    Iterating raises LimitExceeded when the plan exceeds a limit (before anything moves) or a measured value
-    does. It raises CheckFailed when the bench responds at low level otherwise than expected, RunStalled when
-    no samples were read for too long, and InstrumentError, DataLost or RecordingError when an instrument or
-    the disk fails.
+    Iterating raises LimitExceeded when the plan (before anything moves) or a measured value exceeds a limit.
+    It raises CheckFailed when the response at low level is not as expected, RunStalled when no
+    samples were read for too long, and InstrumentError, DataLost or RecordingError when an instrument or the
+    disk fails.
     """
 
     def __init__(
@@ -281,7 +281,7 @@ class Run(ClosedOnLeaving):
             raise
 
     def _open_writer(self) -> RecordingWriter:
-        """Check plan and bench before anything moves; then create the recording and return its writer."""
+        """Check the plan and the bench before anything moves; create the recording and return its writer."""
         self._state = RunState.CHECKING
         try:
             require_checkable(self._bench.channels)
@@ -396,7 +396,7 @@ def _run_controller(runner: PhaseRunner, controller: Controller[None]) -> Iterat
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress; the default for ``on_progress``."""
+    """Ignore the progress, by default of ``on_progress``."""
 
 
 def run_measurement(

@@ -30,7 +30,7 @@ WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
 """Largest input signal before anything plays, as a fraction of the signal expected from the sine."""
 STILL_SHARE = 0.3
-"""Fraction at the start of the quiet record that is ignored, because filter and table may still ring."""
+"""Fraction of the quiet record, at its start, that is ignored because filter and table may still ring."""
 
 
 class LowLevelCheck(StrEnum):
@@ -38,7 +38,7 @@ class LowLevelCheck(StrEnum):
 
     AT_LOW_LEVEL = "at low level"
     RECENTLY_PASSED = "recently passed"
-    """No check, because the bench was checked in the same session and not changed since."""
+    """No check, because the bench was checked in the same session and has not changed since."""
 
 
 @dataclass(frozen=True)
@@ -157,21 +157,21 @@ def _require_base(figures: CheckFigures) -> None:
 
 
 SILENT_V = 5e-3
-"""Half peak-to-peak voltage that counts as silence: noise, hum, the lowest generator setting [V]."""
+"""Half of the peak-to-peak voltage that still counts as silence: noise, hum, lowest generator setting [V]."""
 HUM_FACTOR = 2.0
-"""Factor on the hum before the run; up to this level a signal counts as silence, if above `SILENT_V`."""
+"""Multiple of the hum before the run up to which a signal counts as silence, if above `SILENT_V`."""
 LISTEN_S = 0.02
 """Step of the search for silence: one period of the mains [s]."""
 LONGEST_S = 12.0
 """Longest search for silence [s], longer than the converter's buffer."""
 LOWER_AFTER_S = 1.0
-"""Time of measured drive after which the amplitude is lowered, too [s]: the output's relay may be stuck."""
+"""Time after which a still measured drive is also lowered in amplitude [s]: the relay may be stuck."""
 STILL_ON = 0.1
 """Fraction of the largest recorded drive above which a remaining signal cannot be hum."""
 
 
 class SilenceWatch:
-    """Monitors the recorded drive after a stop until it is silent."""
+    """Monitor of the recorded drive, from a stop until silence."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
@@ -191,7 +191,7 @@ class SilenceWatch:
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
     def begin(self, sample: int) -> None:
-        """Start the measurement of silence; the stop was noticed before this sample."""
+        """Start the measurement of silence; the stop was noticed before the next sample."""
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
@@ -220,7 +220,7 @@ class SilenceWatch:
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
     def note_signal(self) -> None:
-        """Note whether more than hum remains after the output was switched off."""
+        """Note whether more than hum remains after the output has been switched off."""
         self.is_heard |= not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
 
     def require_silence(self) -> None:
@@ -245,7 +245,7 @@ STANDSTILL_BLOCKS = 50
 STOPPED_BLOCKS = 15
 """Number of missed blocks that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest counted interval between two checks [s]; a longer one means that the process was suspended."""
+"""Longest interval between two checks that counts [s]; a longer one means that the process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):
@@ -298,7 +298,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """Stop monitoring, at any time; a drive that was not confirmed as off is still listed as on."""
+        """Stop monitoring, at any time; a drive that was not confirmed as off stays listed as on."""
         self._watchdog.close()
 
     def _look(self) -> None:

@@ -36,7 +36,7 @@ class _Stretch:
 
 
 class OutputSynthesizer:
-    """Converts phases of a run to samples from -1 to 1, on demand and in order.
+    """Converter of a run's phases to samples from -1 to 1, on demand and in order.
 
     The level is an envelope: a half cosine over a ramp, otherwise constant. A tone continues without a phase
     step when its frequency changes. Phases of the run end at the samples nearest to the sums of all
@@ -60,11 +60,11 @@ class OutputSynthesizer:
         return self._stretch.play is None and self.level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
-        """Append ``phases``; they start at once if no earlier phase is left."""
+        """Append ``phases``; the first starts at once if no earlier phase is left."""
         self._coming = chain(self._coming, phases)
 
     def fade(self, duration_s: float) -> None:
-        """Discard coming phases, and fade the signal from the next sample on."""
+        """Discard the coming phases, and fade the signal from the next sample on."""
         self._coming = iter(())
         self._fade(duration_s)
 
@@ -152,7 +152,7 @@ class StreamDrive:
         """``terminal_factor`` is the voltage at a generator's terminal per volt of its setting."""
         self._output = output
         self.pause_s = output.ahead_samples / output.sample_rate_hz
-        """Time that the samples written in advance take to play [s]."""
+        """Playing time of the samples written in advance [s]."""
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
         self._synthesizer = OutputSynthesizer(output.sample_rate_hz)
@@ -166,7 +166,7 @@ class StreamDrive:
 
     @property
     def is_playing(self) -> bool:
-        """Whether samples other than zero still have to be played."""
+        """Whether samples other than zero are still to be played."""
         return self._is_playing and self._sounds_until > self._played_samples
 
     def arm(self, coming: Iterable[Phase]) -> None:
@@ -213,7 +213,7 @@ class StreamDrive:
 
     @property
     def _played_samples(self) -> int:
-        """Number of samples played so far, from the reading time."""
+        """Number of samples played so far, as derived from the time of reading."""
         return round(self._read_s * self._output.sample_rate_hz)
 
     def _split_duration(self, duration_s: float, end_vpp: float) -> Iterator[float]:

@@ -29,12 +29,12 @@ LONGEST_HINDRANCE = 120
 """Largest length of the text that states why a bound is missing [characters]."""
 _ENDING_S = 2.0
 _READY_S = 60.0
-"""Longest wait for the analysis to start [s]; after it, the run starts anyway."""
+"""Longest wait for the analysis to start [s]; after this wait, the run starts anyway."""
 _ASK_S = 0.05
 
 
 class UntilWatch(ClosedOnLeaving):
-    """Analyses a growing recording again and again until the error bounds are small enough.
+    """Repeated analysis of a growing recording, until the error bounds are small enough.
 
     A stretch is a part of the recording with one result. Process and thread start before anything plays. The
     run queues requests, reads results and never waits. If the process fails, the longest time is recorded.

@@ -59,9 +59,9 @@ class KeptStops:
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
-        """Stops that are being carried out, by the names that their files had first."""
+        """Stops that are being carried out, by the original names of their files."""
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Reserved file descriptor; closing it lets a reason be read even if no more are free."""
+        """Reserved file descriptor; once it is closed, a reason can be read even if no other is free."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
@@ -69,7 +69,7 @@ class KeptStops:
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
     def obey(self) -> None:
-        """Carry out new stops, the hardest first, and confirm those that were carried out."""
+        """Carry out new stops, the hardest first, and confirm the stops that were carried out."""
         for level, path in self._paths.items():
             try:
                 found = path.stat()
@@ -128,11 +128,11 @@ INTERVAL_S = 0.05
 """Interval between two calls of a watchdog [s]."""
 LEFT_ALONE_S = 1.0
 FRESH_S = 60.0
-"""Age up to which a confirmation of silence is kept after its program has ended [s]."""
+"""Age up to which a confirmation of silence is kept once its program has ended [s]."""
 
 
 class Watchdog:
-    """Calls a function every `INTERVAL_S`, in a separate thread, until closed.
+    """Thread that calls a function every `INTERVAL_S`, until closed.
 
     Raises AcquisitionError when the system provides no thread.
     """
@@ -169,7 +169,7 @@ Press = Callable[[StopLevel, str], None]
 
 
 class Program(BaseModel):
-    """Announcement of a program that drives a bench, or may start to do so at any moment."""
+    """Announcement of a program that drives a bench, or may do so at any moment."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
@@ -207,7 +207,7 @@ class Program(BaseModel):
 
 
 _RIGS: set[str] = set()
-"""Generators of the rigs whose benches this process has opened."""
+"""Generators of all rigs whose benches this process has opened."""
 
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 
@@ -242,7 +242,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 
 
 def unconfirmed_programs() -> tuple[Program, ...]:
-    """Return the programs that ended here, also before the last boot, without confirming silence.
+    """Return the programs that ended here without confirming silence, even before the last boot.
 
     `note_open_bench` forgets them. Raises AcquisitionError in the same cases as `announced_programs`.
     """
@@ -251,7 +251,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced the generator ``rig``, also after earlier programs."""
+    """Note that this process has silenced the generator ``rig``, also on behalf of earlier programs."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():
@@ -306,14 +306,14 @@ def withdraw(program: Program) -> None:
 class _StopTargets:
     """Activities of this process that a stop from outside ends: an engine, runs, checks.
 
-    Only the oldest one is announced, but a stop ends all; an engine's announcement thus covers its runs.
+    Only the oldest activity is announced, but a stop ends all; an engine's announcement covers its runs.
     """
 
     def __init__(self) -> None:
         self._inside: list[tuple[Press, Program]] = []
         self._kept: KeptStops | None = None
         self._mark: OpenFile | None = None
-        """File lock by which other containers see that this process is alive."""
+        """File lock that shows other containers that this process is alive."""
         self._watchdog: Watchdog | None = None
         self._changing = Lock()
 
@@ -350,7 +350,7 @@ class _StopTargets:
             withdraw(entry[1])
 
     def announce_again(self) -> None:
-        """Announce rigs that this process opened after its announcement; ignore a failure."""
+        """Add the rigs opened since the announcement of this process to it; ignore a failure."""
         with self._changing, suppress(OSError):
             if self._inside:
                 self._announce(self._inside[0][1])
@@ -414,7 +414,7 @@ def _path(program: Program) -> Path:
 
 
 def _lock(path: Path) -> OpenFile | None:
-    """Return a file locked for as long as this process lives; None if the file cannot be locked."""
+    """Return a file that stays locked while this process lives; None if the file cannot be locked."""
     try:
         file = OpenFile(path)
     except OSError:
@@ -447,7 +447,7 @@ def _write(program: Program) -> Path:
 def _sweep() -> None:
     """Remove files of processes that have ended; file names begin with the process number.
 
-    Confirmations of silence stay for a minute, because the sender of a stop may not have read them.
+    Confirmations of silence stay for a minute, because the sender of a stop may not have read them yet.
     """
     folder, fresh_s = engines_folder(), time() - FRESH_S
     for path in folder.iterdir():
@@ -464,7 +464,7 @@ def _sweep() -> None:
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
-"""Signals that are not handled: the first two cannot be caught, the others would recur after a handler."""
+"""Signals that are not handled: the first two cannot be caught; the others recur after their handler."""
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """Signals that by default neither end nor suspend a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
@@ -475,11 +475,11 @@ _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
 
 @contextmanager
 def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]:
-    """Request a stop of ``switch`` on a signal or a stop from outside the program, inside the context.
+    """Inside the context, request a stop of ``switch`` on a signal or a stop from outside the program.
 
-    ``vibench stop`` finds the program under the name ``what`` and leaves a stop file in the state folder; it
-    works in any thread. Python delivers signals only to the main thread. There, every signal that would end
-    or suspend the program requests a stop (`stop_signals`). SIGHUP stays ignored if it was ignored before
+    ``vibench stop`` finds the program under the name ``what`` and leaves a stop file in the state folder.
+    This works in any thread. Python delivers signals only to the main thread. There, every signal that would
+    end or suspend the program requests a stop (`stop_signals`). SIGHUP stays ignored if it was ignored before
     (nohup), because such a run is meant to continue.
 
     The first signal ramps down and ends the run as stopped: Ctrl-C with the planned ramp, the others faster.
@@ -526,7 +526,7 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal, or its number for a real-time signal, real-time signals have no name."""
+    """Return the name of a signal, or its number for a real-time signal, which has no name."""
     known = {each.value: each.name for each in signal.Signals}
     return known.get(number, f"signal {number}")
 

@@ -24,7 +24,7 @@ class StopLevel(StrEnum):
     """Switch the output off at once, with a step."""
 
     def is_harder_than(self, other: "StopLevel") -> bool:
-        """Return whether this level ends the drive sooner than ``other``."""
+        """Return whether this level ends the drive sooner than ``other`` does."""
         return _HARDNESS[self] > _HARDNESS[other]
 
 
@@ -42,7 +42,7 @@ class Cause(StrEnum):
     TERMINATED = "terminated"
     """The operating system ended the process."""
     VIEWER_GONE = "viewer gone"
-    """No request for too long in an attended run: its window froze, was closed or was killed."""
+    """An attended run received no request for too long: its window froze, was closed or was killed."""
     PARENT_GONE = "parent gone"
     """The program that started the engine has ended."""
     PROGRAM = "program left"
@@ -68,7 +68,7 @@ LEVELS: Mapping[Cause, StopLevel] = {
     Cause.FAULT: StopLevel.OFF,
 }
 """Stop level for each cause. After a failure of an instrument, the disk or the program, nothing more can be
-read. A generator that still responds is then ramped down as fast as it accepts commands, and turned off.
+read. A generator that still responds is then ramped down as fast as it accepts commands and turned off.
 """
 
 
@@ -97,7 +97,7 @@ class StopSwitch:
         self._requests: dict[StopLevel, StopRequest] = {}
         self._holding = False
         self.refusal_to_hold: Callable[[], str] = str
-        """Returns why the run cannot be held now; empty if it can, or nothing runs."""
+        """Function that returns why the run cannot be held now; empty if it can be held, or nothing runs."""
         self._marks: deque[str] = deque()
         self._changes: deque[str] = deque()
 
@@ -165,7 +165,7 @@ class DrivesOn:
         return bool(self._drives)
 
     def begin(self, drive: object, generator: str = "") -> None:
-        """Note that a drive may be on, and forget an earlier drive of this generator that is unconfirmed."""
+        """Note that a drive may be on, and forget an earlier unconfirmed drive of the same generator."""
         self._drives[generator] = drive
 
     def confirm_silence(self, drive: object) -> None:
@@ -188,7 +188,7 @@ DRIVES_ON = DrivesOn()
 
 
 RESERVE_BYTES = 16_000_000
-"""Size of the memory reserve. Generator commands need some kB; other threads may take the rest."""
+"""Size of the memory reserve. Generator commands need some kB; other threads may use up the rest."""
 
 
 class MemoryReserve:
@@ -219,7 +219,7 @@ class MemoryReserve:
 
     @contextmanager
     def release_when_short(self) -> Iterator[None]:
-        """Release the reserve on a MemoryError inside the context, and raise the error again."""
+        """Release the reserve on a MemoryError inside the context, then raise the error again."""
         try:
             yield
         except MemoryError:
