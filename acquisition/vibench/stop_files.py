@@ -16,7 +16,7 @@ LONGEST_REASON = 500
 TAKEN_S = 1.0
 """Longest time for a program to accept a stop [s]; programs check 20 times per second."""
 HEEDED_S = 5.0
-"""Longest time without progress until the output is off [s]; a block and a setting take some tenths."""
+"""Longest time without progress until the output is off [s]; a block plus a setting take some tenths."""
 LOOK_S = 0.01
 SWITCH_OFF = "The generator may still be driving: switch the amplifier off, then open the bench again"
 
@@ -62,7 +62,7 @@ def write_stop_file(stop: str, reason: str) -> None:
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
-    """Return the result of a stop request, after waiting until the program has obeyed or failed to obey."""
+    """Return the result of a stop request, once the program has obeyed or failed to obey."""
     written_ns, give_up_s = _modified_ns(stop) or 0, time.monotonic() + TAKEN_S
     while _modified_ns(stop) is not None:
         if time.monotonic() > give_up_s:

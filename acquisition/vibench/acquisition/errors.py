@@ -39,7 +39,7 @@ class BrokenPromise(InstrumentError):
 
 
 class SettingRefused(InstrumentError):
-    """The instrument uses another value than the requested one, as reading the setting back has shown."""
+    """The instrument uses a value other than the requested one, as read back from it."""
 
 
 class DriveLate(AcquisitionError):

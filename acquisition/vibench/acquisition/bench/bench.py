@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Characters accepted from a lock file: any user may write to it, and an error shows its text."""
+"""Number of characters read from a lock file, whose text errors quote: any user may write to the file."""
 
 
 class BenchLock:
@@ -144,15 +144,15 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Return the virtual rig, loaded by name: a real bench must not load or need the simulation."""
+    """Return the virtual rig, loaded by name, as a real bench must neither load nor need the simulation."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
 
 class RigPower:
-    """Switches a virtual rig on and off, or locks a real one. Use it in a ``with``.
+    """Power of a virtual rig, or locks of a real one. Use it in a ``with`` block.
 
-    Its rig time and its script of faults continue while a bench is closed and opened again.
+    Rig time and fault script continue while a bench is closed and opened again.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -243,10 +243,10 @@ class BenchKind(StrEnum):
 
 
 class Bench:
-    """The open instruments of a rig. Use it in a ``with``, or `close` it.
+    """The open instruments of a rig. Use it in a ``with`` block, or `close` it.
 
-    Leaving the ``with`` silences generator and analogue output first, then closes everything. After an error
-    inside the ``with``, that error is raised; errors during leaving are added to it as notes.
+    Leaving the block silences generator and analogue output first, then closes everything. An error inside
+    the block is raised again; errors that occur while leaving are added to it as notes.
     """
 
     def __init__(
@@ -267,7 +267,7 @@ class Bench:
         self.controller = controller
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
-        """Bench check that admitted this bench to measurements; see `vibench.acquisition.check`."""
+        """Bench check by which this bench was admitted to measurements; see `vibench.acquisition.check`."""
         self._power = power
         self._closing = closing
 
@@ -304,7 +304,7 @@ class Bench:
             self._power.aim(Role.M0_VELOCITY)
 
     def idle(self, duration_s: float) -> None:
-        """Wait ``duration_s`` without sampling; on a virtual rig at free pace only simulated time passes."""
+        """Wait ``duration_s`` without sampling; on a virtual rig at free pace, only simulated time passes."""
         self._power.idle(duration_s)
 
     def close(self) -> None:
@@ -332,12 +332,12 @@ def open_bench(
         The rig, or the path of its TOML file. With a ``[virtual]`` table the simulated instruments
         are started as well, and stopped when the bench is left.
     confirm
-        Function that confirms settings made by hand; see `knobs`. None: ask at the terminal; for a
-        virtual rig, confirm without asking.
+        Function that confirms settings made by hand; see `knobs`. If None, ask at the terminal; a virtual rig
+        is confirmed without asking.
     calibration
         Whether an expired calibration is refused; calibrations of a virtual rig never expire.
     power
-        `RigPower` that stays on when this bench is closed; None: closing the bench releases the rig.
+        `RigPower` that stays on when this bench is closed. If None, closing the bench releases the rig.
 
     Raises
     ------

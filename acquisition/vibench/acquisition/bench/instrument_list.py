@@ -17,7 +17,7 @@ class InstrumentList:
     """Names for ``generator.resource``. USB numbers in them may be decimal: 1689::851 is an AFG1022."""
     daq_devices: tuple[FoundDevice, ...]
     remarks: tuple[str, ...]
-    """Reasons why VISA or DAQmx could not be searched."""
+    """Reasons why a search by VISA or DAQmx failed."""
 
 
 def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
@@ -28,7 +28,7 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
     visa_library
         ``"@py"`` for pyvisa-py, empty for the system's VISA.
     server
-        Address of a DAQmx device server, ``"host:port"``; None: the driver on this computer.
+        Address of a DAQmx device server, ``"host:port"``; None for the driver on this computer.
     """
     remarks: list[str] = []
     resources: tuple[str, ...] = ()

@@ -18,9 +18,9 @@ class Verdict(StrEnum):
 
     OK = "ok"
     WARN = "warn"
-    """Find the cause of the deviation; measurements may be less accurate."""
+    """Warning: find the cause of the deviation, as measurements may be less accurate."""
     FAIL = "fail"
-    """Do not switch the drive on before the cause is removed."""
+    """Failure: do not switch the drive on before the cause is removed."""
 
 
 _ORDER = (Verdict.OK, Verdict.WARN, Verdict.FAIL)
@@ -45,7 +45,7 @@ class Finding(FrozenModel):
 
 @dataclass(frozen=True)
 class Bounds:
-    """Limits of a deviation: ok up to ``well``, a warning up to ``fail``, above that a FAIL."""
+    """Bounds on a deviation: ok up to ``well``, a warning up to ``fail``, and a FAIL above."""
 
     well: float
     fail: float
@@ -91,7 +91,7 @@ class BenchReport(FrozenModel):
         return max((finding.verdict for finding in self.findings), key=_ORDER.index, default=Verdict.OK)
 
     def __getitem__(self, name: str) -> Finding:
-        """Return the finding of that name; raises KeyError, whose text lists the existing names."""
+        """Return the finding ``name``; raises KeyError, whose text lists the existing names."""
         for finding in self.findings:
             if finding.name == name:
                 return finding
@@ -115,7 +115,7 @@ def _line(cells: tuple[str, ...], widths: list[int]) -> str:
 
 
 _PACE = {"pace", "speed", "faults"}
-"""Settings of a virtual rig that do not count as a changed configuration."""
+"""Settings of a virtual rig whose change does not count as a changed configuration."""
 _HOUR = timedelta(hours=1)
 _DAY = timedelta(days=1)
 

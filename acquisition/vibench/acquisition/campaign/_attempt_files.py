@@ -23,7 +23,7 @@ from ..recording import (
 
 @dataclass(frozen=True)
 class KeptRecording:
-    """State of one attempt's recording of a campaign's point, as read from the file of that attempt."""
+    """State of the recording of one attempt at a point, as read from its file."""
 
     path: Path
     state: RecordingState | None
@@ -89,7 +89,7 @@ def next_attempt(folder: Path, name: str) -> Path:
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Return the complete recording of a point; without one, the last damaged recording; without any, None.
+    """Return the complete recording of a point, or else its last damaged recording, or else None.
 
     Raises RecordingError when a recording is complete but was measured with another plan.
     """

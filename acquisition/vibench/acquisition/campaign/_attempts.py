@@ -25,7 +25,7 @@ class CoolingPause:
     """Pause before every recording of a session except the first.
 
     A stop ends the pause at once; a hold extends the pause until it is released. The journal does not change
-    meanwhile: if the campaign is killed during the pause, it resumes with the next point.
+    during the pause: a campaign that is killed then resumes with the next point.
     """
 
     def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
@@ -53,14 +53,14 @@ class CoolingPause:
 
 
 Reopen = Callable[[], Bench]
-"""Function that closes a bench with a lost instrument and opens it again; may raise AcquisitionError."""
+"""Function that closes and reopens a bench with a lost instrument; may raise AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
 """Interval between two searches for a lost instrument, and pause before another attempt [s]."""
 
 
 class Attempts:
-    """Measures points on a bench, with as many attempts as the policy allows."""
+    """Measurement of points on a bench, with as many attempts as the policy allows."""
 
     def __init__(
         self,

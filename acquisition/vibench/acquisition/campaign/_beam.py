@@ -24,7 +24,7 @@ def rig_at(rig: Rig, measurement: Measurement) -> Rig:
 
 
 class BeamMover:
-    """Moves the beam between two recordings at different points, while the generator is off."""
+    """Mover of the beam between recordings at different points, while the generator is off."""
 
     def __init__(self, command: CommandMessenger | None, switch: StopSwitch, say: CampaignListener) -> None:
         """``command`` moves the beam of a real rig; without a command, the operator moves it."""
@@ -34,7 +34,7 @@ class BeamMover:
         self._at: ScanPoint | None = None
 
     def ask(self, bench: Bench, measurement: Measurement) -> None:
-        """Hold the campaign if the operator must move the beam, until it is released or stopped."""
+        """If the operator must move the beam, hold the campaign until it is released or stopped."""
         point = measurement.point
         moves_itself = bench.rig.virtual is not None or bench.rig.plays_back or self._command is not None
         if point is None or point == self._at or moves_itself:

@@ -18,7 +18,7 @@ class Instrument(FrozenModel):
 
 
 class BenchIdentity(FrozenModel):
-    """Properties of a bench that must not change during a campaign without confirmation."""
+    """Properties of a bench that must not change during a campaign unless the change is confirmed."""
 
     rig: Rig
     instruments: dict[str, Instrument]

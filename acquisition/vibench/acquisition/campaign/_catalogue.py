@@ -1,4 +1,4 @@
-"""Catalogue of all recordings in a folder and its subfolders; unchanged files are not opened again.
+"""Catalogue of all recordings in a folder and its subfolders, which does not reopen unchanged files.
 
 The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. If it is deleted, it
 is created again.
@@ -39,7 +39,7 @@ from ..recording import (
 from ._journal import JournalPoint, JournalPointState, journal_exists, read_journal
 
 UNREADABLE = "unreadable"
-"""State of a file that is damaged or not a recording; ``reason`` of the entry states what is wrong."""
+"""State of a file that is damaged or not a recording; the entry's ``reason`` states what is wrong."""
 DAMAGED = "damaged"
 """State of a recording that can be opened but differs from its seal (checksum)."""
 UNCHECKED = "samples not checked"
@@ -58,7 +58,7 @@ class CatalogueEntry:
     """State of the recording: value of `recording.RecordingState`, or ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``samples not checked``, or problems found: ended early, near full scale, samples lost."""
+    """``samples not checked``, or the problems found: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
@@ -265,7 +265,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
 
 
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
-    """Return a value that changes with any write to the file, and with its seals in journals.
+    """Return a value that changes with any write to the file, or with the seals of the file in journals.
 
     The value includes the file system's time of change, which programs cannot set back.
     """

@@ -34,7 +34,7 @@ from ._bench_identity import BenchIdentity
 
 
 class ReasonCode(StrEnum):
-    """Reason for the state of a point; includes all values of `plan.Retryable`."""
+    """Reason for the state of a point; all values of `plan.Retryable` are included."""
 
     NOT_YET = "not_yet"
     """The measurement of the point has not started yet."""
@@ -102,7 +102,7 @@ class AfterFailure(StrEnum):
 
 
 class ChangedBench(StrEnum):
-    """What to do when a campaign is resumed on another bench than the bench at its start."""
+    """What to do when a campaign is resumed on a bench that differs from the one at its start."""
 
     REFUSE = "refuse"
     ACCEPT = "accept"
@@ -121,7 +121,7 @@ class PointOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class PointResult:
-    """Result of one recording of a campaign, with its reason."""
+    """Result of one recording of a campaign, with the reason for it."""
 
     name: str
     outcome: PointOutcome
@@ -159,11 +159,11 @@ class FinishedPoint:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """All completed points in the order of the campaign, including ``point``; the same after a resume."""
+    """All completed points in the order of the campaign, including ``point``, also from before a resume."""
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
-"""Called after every point with the open recording; returns measurements to make next, or none."""
+"""Function called after every point with the open recording; returns measurements to make next, or none."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
@@ -230,7 +230,7 @@ FROM points ORDER BY place
 
 
 def journal_exists(path: Path) -> bool:
-    """Return whether ``path`` is a journal; a database without any committed transaction is not."""
+    """Return whether ``path`` is a journal; a database without a committed transaction is not."""
     if not path.is_file():
         return False
     with sentences(path), closing(open_read_only(path)) as connection:
@@ -315,7 +315,7 @@ class JournalPoint:
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
-    """Return the points in a journal; the campaign may be running. Changes nothing.
+    """Return the points in a journal, and change nothing; the campaign may be running.
 
     Raises RecordingError when the file does not exist or is not a journal.
     """
@@ -416,7 +416,7 @@ class Journal(ClosedOnLeaving):
 
     @property
     def bench(self) -> BenchIdentity:
-        """The bench at the start of the campaign, or the bench accepted last after a change."""
+        """The bench at the start of the campaign, or the last changed bench that was accepted."""
         command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
         with sentences(self.path):
             (identity,) = self._connection.execute(command).fetchone()

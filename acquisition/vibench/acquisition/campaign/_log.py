@@ -38,7 +38,7 @@ class CampaignEventKind(StrEnum):
     FAULT = "fault"
     """An attempt failed, or a fault ended the campaign."""
     DAMAGED = "damaged"
-    """A complete recording is missing or differs from its seal (checksum); the point is measured again."""
+    """A complete recording is missing or differs from its seal (checksum); its point is measured again."""
     RETRY = "retry"
     RESTING = "resting"
     """Pause between two recordings."""
@@ -73,7 +73,7 @@ LOG_SUFFIX = ".log.jsonl"
 
 
 class CampaignLog(ClosedOnLeaving):
-    """Appends events to the log file; each line is flushed before the next step.
+    """Writer of events to the log file; each line is flushed before the next step.
 
     If a line cannot be written (full disk), the campaign continues, because it needs only the journal.
     """
@@ -108,13 +108,13 @@ STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
 """Interval of status lines between events [s]; this gives half a megabyte per night."""
 LEFT_ALONE_S = 1.0
-"""Longest wait at closing until the last lines are written [s]."""
+"""Longest wait when closing, until the last lines are written [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
-    """Appends a status line at every event, and every few seconds while a point runs.
+    """Writer of a status line at every event, and every few seconds while a point runs.
 
-    Another thread writes the lines, so that a network folder that hangs cannot delay a stop of the drive.
+    Another thread writes the lines, so that an unresponsive network folder cannot delay a stop of the drive.
     """
 
     def __init__(
@@ -130,7 +130,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Sum of planned points and pauses before the running point, by the rig's clock [s]."""
+        """Planned duration of all points and pauses before the running point, by the rig's clock [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
@@ -204,7 +204,7 @@ class MailSettings(FrozenModel):
 
 
 class MailMessenger:
-    """Sends each notice by mail."""
+    """Messenger that sends each notice by mail."""
 
     def __init__(self, settings: MailSettings) -> None:
         self._settings = settings
@@ -253,7 +253,7 @@ class Messenger(Protocol):
 
 @dataclass(frozen=True)
 class CommandMessenger:
-    """Runs a command without a shell; the command reads the notice as JSON from its standard input."""
+    """Messenger that runs a command without a shell; the command reads the notice as JSON from its input."""
 
     arguments: tuple[str, ...]
 

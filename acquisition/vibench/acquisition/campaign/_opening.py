@@ -68,7 +68,7 @@ def find_recordings(
 ) -> dict[str, KeptRecording]:
     """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
 
-    After a stop request the samples of further recordings are not checked; the next resume checks them.
+    After a stop request, the samples of further recordings are left unchecked until the next resume.
     Damaged recordings are returned too. So are recordings whose seal is in no journal of the folder: the
     campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
@@ -166,7 +166,7 @@ def planned_recordings(
     """Return all recordings of a campaign, and which of them exist already; change nothing.
 
     Raises RecordingError when recordings exist and ``existing`` refuses that, or a complete recording was
-    made by another plan.
+    made with another plan.
     """
     points = campaign.points()
     match existing:
@@ -190,7 +190,7 @@ def open_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    """Return the campaign's journal: a new journal, or the existing journal updated from the folder.
+    """Return the campaign's journal: a new one, or the existing one updated from the folder.
 
     Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
     or the journal belongs to another plan. Raises CheckFailed when the bench differs from the one at the

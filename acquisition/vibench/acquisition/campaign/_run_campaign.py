@@ -60,7 +60,7 @@ from ._opening import make_folder, open_journal, planned_recordings, require_all
 
 
 class CampaignRunner:
-    """Measures the points of a campaign, and further points that are requested after a result."""
+    """Measurement of the points of a campaign, and of further points that are requested after a result."""
 
     def __init__(
         self,
@@ -220,7 +220,7 @@ def run_campaign(
     All points are checked against the limits of the rig before the first one starts. The journal records
     what was done, what failed and why. A killed campaign continues with ``existing="resume"`` at its first
     unfinished point. Ctrl-C ramps the running measurement down and ends the campaign. Returns one result per
-    recording made, kept or failed; fewer than planned if the campaign was stopped.
+    recording made, kept or failed; these are fewer than planned if the campaign was stopped.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def run_campaign(
     on_progress, on_result, on_event
         Functions called after every block, after every recording, and at every event.
     switch
-        Holds the running measurement or ends the campaign, from another thread.
+        Switch by which another thread holds the running measurement or ends the campaign.
     after
         Function called after every point that is done; the measurements that it returns are made next, in
         this session or after a resume.
@@ -291,7 +291,7 @@ def run_campaign(
 
 @contextmanager
 def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
-    """Open and lock the log, so that no other program runs the same campaign meanwhile."""
+    """Open and lock the log, so that no other program can run the same campaign."""
     with CampaignLog(folder / f"{campaign.name}{LOG_SUFFIX}") as log, ExitStack() as mark:
         try:
             mark.enter_context(sole_use(log.path))
@@ -304,11 +304,11 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Simulated time before a virtual rig's bench is reopened; its fault script may reconnect cables [s]."""
+"""Simulated time before a virtual bench is reopened [s], in which its fault script may reconnect cables."""
 
 
 class ReconnectingBench:
-    """Opens a bench, and reopens it without asking to confirm knobs again. Use it in a ``with`` statement."""
+    """Opener of a bench, which reopens it without asking for knobs again. Use it in a ``with`` statement."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
@@ -319,7 +319,7 @@ class ReconnectingBench:
 
     @property
     def bench(self) -> Bench:
-        """The open bench; it raises an error if the bench is not open."""
+        """The open bench; raises an error if the bench is not open."""
         if self._bench is None:
             raise AcquisitionError("the bench is not open: use 'with ReconnectingBench(...) as kept'")
         return self._bench
@@ -375,12 +375,12 @@ class ReconnectingBench:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Size of a finished recording relative to its growing file, for 24-bit white noise; less for dwells."""
+"""Size of a finished recording relative to the growing one, for 24-bit white noise; smaller for dwells."""
 
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """Duration and disk space of those recordings of a campaign that do not exist yet."""
+    """Duration and disk space of the recordings of a campaign that do not exist yet."""
 
     recordings: int
     """Number of recordings that the campaign must still make."""

@@ -1,7 +1,7 @@
 """Admission of a bench, which requires a recent passed check of the same configuration.
 
-The last check of each rig is a JSON file in the user's state folder. The next check reports changes of gains
-since then in decibels, and of the clock in ppm.
+The last check of each rig is a JSON file in the user's state folder. The next check reports later changes of
+gains in decibels, and of the clock in ppm.
 """
 
 import hashlib
@@ -44,7 +44,7 @@ _HASH_DIGITS = 8
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
     """Return the path of a rig's last check; the file name contains the rig's name and a hash of it.
 
-    With ``passed``, the path of the last check that did not fail.
+    With ``passed``, return the path of the last check that did not fail.
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
     digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
@@ -60,7 +60,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed_check(rig: Rig) -> CheckResult | None:
-    """Return the last check without FAIL of a rig in its current configuration; None if there is none."""
+    """Return the last check without FAIL of a rig in its current configuration; None without such a check."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each
@@ -100,7 +100,7 @@ def _write(result: CheckResult, *, passed: bool) -> None:
 DRIFT_DB = Bounds(0.5, 3.0)
 """Bounds on the drift of a gain between two checks of an unchanged configuration [dB]."""
 CLOCK_PPM = Bounds(20.0, inf)
-"""Bounds on the drift of the ratio of two clocks [ppm]; oscillators age by some ppm per year."""
+"""Bounds on the drift of the ratio of two clocks [ppm]; oscillators age by a few ppm per year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "the configuration has not changed: look for a changed knob, a bad cable, a loose sensor or a failing "
@@ -165,7 +165,7 @@ def check_bench(
     *,
     new_reference: bool = False,
 ) -> CheckResult:
-    """Check a bench, compare with its last passed check, and store the result; see `bench_report`.
+    """Check a bench, compare it with its last passed check, and store the result; see `bench_report`.
 
     Parameters
     ----------
@@ -174,11 +174,11 @@ def check_bench(
     folder
         Folder for recordings; the free space of its disk is checked.
     clock
-        Returns the current time.
+        Function that returns the current time.
     switch
         Switch by which another thread can stop the check.
     new_reference
-        Do not compare with the last passed check; changes since then are accepted.
+        Whether to skip the comparison with the last passed check; changes since then are accepted.
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed_check(bench.rig)
@@ -200,11 +200,11 @@ def require_fresh(
     """Admit a bench by its last check or a new check, and return that check for the recordings.
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
-    rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is that of the
+    rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is for the
     recordings; another thread can stop the new check by ``switch``.
 
-    Raises CheckFailed when the last check is missing, too old, failed or for another configuration (nothing
-    was played then), or when the new check fails. Raises InstrumentError when an instrument fails.
+    Raises CheckFailed when the last check is missing, too old, failed or made for another configuration (then
+    nothing was played), or when the new check fails. Raises InstrumentError when an instrument fails.
     """
     if bench.rig.plays_back:
         return None

@@ -31,15 +31,15 @@ _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
 """Bounds on the rms of a silent channel relative to its full scale."""
 _MEDIAN_OF_NORMAL = 0.6745
-"""Median magnitude of a normal variable, divided by its standard deviation."""
+"""Ratio of median magnitude to standard deviation of a normal variable."""
 _IN_MOMENTS = 0.2
-"""Noise counts as bursts if the rms estimated from its median is below this fraction of its total rms."""
+"""Fraction of the total rms: if the rms estimated from the median is below it, noise counts as bursts."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Bounds on the time for one verified change of a generator setting [s]; stopping takes as long."""
+"""Bounds on the time for one verified change of a generator setting [s]; a stop takes as long."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Bounds on the recording time for which the disk has space [h]; negated, because a longer time is better."""
+"""Bounds on the recording time for which the disk has space [h], negated as a longer time is better."""
 
 
 def bench_report(
@@ -48,7 +48,7 @@ def bench_report(
     """Check a bench before measurements and return the findings; the generator is silent afterwards.
 
     All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
-    ``bench`` must not be sampling; ``folder`` is that of the recordings; another thread can stop the check by
+    ``bench`` must not be sampling; ``folder`` is for the recordings; another thread can stop the check by
     ``switch``, within a block of samples. ``amplitude_vpp`` is by default at most 2 % of the amplitude limit,
     and too small for contact [V].
 

@@ -1,4 +1,4 @@
-"""Check of the whole signal chain with one sine: presence, level and phase in each channel."""
+"""Check of the whole signal chain with one sine: its presence, level and phase in each channel."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _WINDOWS = 20
 
 @dataclass(frozen=True)
 class SineFit:
-    """Sine fitted to samples by least squares."""
+    """Sine, fitted to samples by least squares."""
 
     amplitude: float
     uncertainty: float
@@ -87,9 +87,9 @@ WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Bounds on a channel's phase deviation from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""Bounds on m0's phase deviation: never a FAIL, because the model of the specimen is less accurate."""
+"""Bounds on m0's phase deviation; it is never a FAIL, as the model of the specimen is less accurate."""
 LEFT_OVER = Bounds(0.02, 0.05)
-"""Bounds on the fraction of the drive voltage that remains with the output off."""
+"""Bounds on the fraction of the drive voltage that remains when the output is off."""
 
 AMPLIFIER_GAIN = "amplifier gain"
 DRIVE_CLOCK = "drive's clock"

@@ -1,4 +1,4 @@
-"""Options of the contract tests, in an entry point: ``--pyargs`` loads a conftest too late for options."""
+"""Options of the contract tests, in an entry point: with ``--pyargs``, a conftest is loaded too late."""
 
 import pytest
 

@@ -32,7 +32,7 @@ def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first shipped virtual bench; None if it does not name the instrument."""
+    """Return the given bench, or the first shipped virtual one; None if it does not name the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in plug_ins_of(rig)[kind] else None
@@ -47,7 +47,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in with this name; refuse a name without any bench."""
+    """Return a bench for each kind of plug-in with this name; refuse a name that no bench contains."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
@@ -93,7 +93,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
 
 @pytest.fixture
 def bench(rig: Rig) -> Iterator[Bench]:
-    """Open the bench again for each test. Its manual settings (knobs) count as confirmed by the user."""
+    """Open the bench anew for each test. Its manual settings (knobs) count as confirmed by the user."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
 

@@ -1,4 +1,4 @@
-"""Requirements of every converter: sample without gaps, count from zero, and refuse what it cannot do."""
+"""Requirements of every converter: sample without gaps, count from zero, refuse impossible settings."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Requirements of every function generator: play as set, refuse what it cannot do, and end silent."""
+"""Requirements of every function generator: play as set, refuse what it cannot do, and end in silence."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Requirements of every sensor: a name, and valid data for the conversion to volts."""
+"""Requirements of every sensor: a name, and valid values for the conversion to volts."""
 
 from math import isfinite
 

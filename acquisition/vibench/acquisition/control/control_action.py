@@ -19,13 +19,13 @@ class ControlAction:
     """The next phase to play, and the notes to write at its first sample."""
 
     phase: Phase | None
-    """Phase to play; None to write the notes only, without sampling."""
+    """Phase to play; None to only write the notes, without sampling."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """Samples of a phase of the run, from its beginning or from its last gap to its end."""
+    """Samples of a phase of the run, from its beginning or its last gap to its end."""
 
     first_sample: int
     volts: Samples
@@ -55,13 +55,13 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band as a fraction of the tolerance. Smaller errors stay, as every correction disturbs the motion."""
+"""Dead band relative to the tolerance. Smaller errors are left, as every correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
 """Fraction of the base's level error [dB] that one correction removes; the specimen responds slowly."""
 _BATCHES = 8
-"""Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean, as successive periods of chaos are not independent."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def measured_level(base: Phasors) -> MeasuredLevel:
 
 @dataclass(frozen=True)
 class LevelControl:
-    """Quasi-static control of the base level, with one correction per measurement."""
+    """Quasi-static control of the base level, with one correction after each measurement."""
 
     level: BaseLevel
     most_vpp: float
@@ -101,7 +101,7 @@ class LevelControl:
     """Smallest amplitude setting that the generator accepts [Vpp]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next generator setting [Vpp]; unchanged if the level error is small or may be chance."""
+        """Return the next generator setting [Vpp]; unchanged if the level error is small or may be random."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

@@ -33,7 +33,7 @@ class FeedbackChannels:
     response_delay_s: float
     """Delay of m0's sensor, for which all its phase angles are corrected [s]."""
     base_cut_hz: float
-    """-3 dB frequency of the base channel's AC coupling, whose effect is corrected; 0 for DC [Hz]."""
+    """-3 dB frequency of the base channel's AC coupling, whose effect is corrected [Hz]; 0 for DC."""
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
@@ -66,7 +66,7 @@ class FeedbackChannels:
     def transmissibility(
         self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0
     ) -> complex:
-        """Return the displacement of m0 over that of the base; zero if the base does not move.
+        """Return the ratio of m0's displacement to the base's; zero if the base does not move.
 
         Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental,
         and ``harmonic`` times the phase of the base is subtracted from its phase.
@@ -113,11 +113,11 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
 
 
 _REMEMBERED_S = 0.1
-"""Duration of stored samples [s]; a drop-out is recognised and bridged from the motion before it."""
+"""Duration of stored samples [s], the motion from which a later drop-out is recognised and bridged."""
 
 
 class BridgedRows:
-    """Bridges drop-outs in a stream of samples; holds back samples in which a drop-out may begin."""
+    """Bridge over drop-outs in a stream of samples; it holds back samples in which a drop-out may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
@@ -149,12 +149,12 @@ class BridgedRows:
 
 
 LEAST_ANSWER = 0.05
-"""Measured over modelled base acceleration below which the feedback loop is taken to be open. A specimen at
+"""Ratio of measured to modelled base acceleration below which the loop counts as open. A specimen at
 resonance may reduce the motion of a light table to about 0.2 of the linear model."""
 
 
 def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
-    """Raise LimitExceeded to ramp the run down if the fundamental ``acceleration`` is too small [m/s2]."""
+    """Raise LimitExceeded, to ramp down, if the fundamental ``acceleration`` [m/s2] is too small."""
     modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(

@@ -27,13 +27,13 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor by which each of `RUNGS` steps lowers the generator setting; in total to about 1/9."""
+"""Factor by which each of `RUNGS` steps lowers the generator setting, in total to about 1/9."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
 def decay_motion(loop: SineLoop) -> Controller[None]:
-    """Lower the generator setting in steps, wait, and raise it again to its earlier value."""
+    """Lower the generator setting in steps, wait, and raise the setting to its earlier value."""
     now = loop.setting
     for rung in range(1, RUNGS + 1):
         loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
@@ -45,7 +45,7 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""Most brackets (frequency intervals) per jump; if the motion leaves its branch early, a new one starts."""
+"""Most brackets (frequency intervals) per jump; a new one starts if the motion leaves its branch early."""
 
 
 class _Return(Enum):
@@ -56,7 +56,7 @@ class _Return(Enum):
 
 
 class _Pace(Enum):
-    """How the frequency is moved along a branch to the end of the branch."""
+    """Way in which the frequency moves along a branch to its end."""
 
     GLIDE = auto()
     STEP = auto()
@@ -81,7 +81,7 @@ class _JumpSearch:
             self.after = point
 
     def shorten(self, place: int, point: SettledPoint) -> None:
-        """Shorten the branch: the motion left it at index ``place``, where ``point`` was measured."""
+        """Shorten the branch, which the motion left at index ``place``, where ``point`` was measured."""
         del self.branch[place:]
         self.after = point
 
@@ -108,7 +108,7 @@ class JumpLocator:
         Return the point reached there, and whether it is on the new branch behind a jump.
 
         A steep slope is no jump: across it, the change of the response shrinks with the bracket. If both
-        branches exist at the frequency of ``after``, the motion may end on either; the note states which.
+        branches exist at the frequency of ``after``, the motion may end on either; the note states on which.
         """
         search = _JumpSearch(list(points), after, JumpSide.AFTER)
         found, why = yield from self._bisect(search)
@@ -173,7 +173,7 @@ class JumpLocator:
     def _find_departure(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward. Return index and state where the motion has left the branch; None if it stays."""
+        """Go forward. Return index and state where the motion left the branch; None if it stayed on it."""
         for place in steps:
             found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):

@@ -1,4 +1,4 @@
-"""Equalised noise at the base: the gain from drive to base at every line determines the next drive."""
+"""Equalised noise at the base: the gains from drive to base, line by line, determine the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt
@@ -18,9 +18,9 @@ from .feedback_channels import LEAST_ANSWER
 from .sine_loop import SineLoop
 
 _NEWEST = 0.5
-"""Weight of the newest gains in the average with earlier gains; due to impacts, single gains scatter."""
+"""Weight of the newest gains in the average with earlier gains; single gains scatter due to impacts."""
 _MOST_CHANGE = 4.0
-"""Largest factor by which the squared gain of a spectral line changes between two realisations."""
+"""Largest factor by which the squared gain of a spectral line may change between two realisations."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Equaliser:
         return densities
 
     def require_below_abort(self, densities: MeasuredDensities) -> None:
-        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at a spectral line."""
+        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at any spectral line."""
         most = 10 ** (self._plan.abort_db / 10)
         lines = [("base", "(m/s2)2/Hz", densities.base, self._plan.density)]
         if self._plan.response_limits:
@@ -115,7 +115,7 @@ class Equaliser:
                 )
 
     def off_db(self, densities: MeasuredDensities, level_db: float) -> Samples:
-        """Return the measured base density over the target of this realisation, per spectral line [dB]."""
+        """Return the ratio of measured base density to this realisation's target, per spectral line [dB]."""
         return np.asarray(10 * np.log10(np.maximum(densities.base, 1e-300) / self.target) - level_db)
 
     def _density(self, values: Samples) -> Samples:

@@ -1,4 +1,4 @@
-"""The phase-locked loop that follows a resonance, and its estimate of the mode."""
+"""The phase-locked loop that follows a resonance, and the loop's estimate of the mode."""
 
 from dataclasses import dataclass, field, replace
 from math import exp, hypot, log, pi, radians
@@ -12,7 +12,7 @@ from .settling_controller import SettledState
 _GAIN = 0.3
 """Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If a look leaves more than ``_SLOW`` of a phase error, the gain grows by ``_GROWTH``, up to
+"""If more than ``_SLOW`` of a phase error is left after a look, the gain grows by ``_GROWTH``, up to
 ``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
@@ -20,11 +20,11 @@ _WIDER = np.linspace(-0.25, 0.25, 15)
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
 """Trial changes of ln(half-width) for super- and subharmonics: their first half-width is rough."""
 _SURE_RAD = radians(12.0)
-"""Unexplained phase drift that weighs as much in the fit as a half-width changed by the factor e."""
+"""Unexplained phase drift that weighs as much in the fit as a change of the half-width by the factor e."""
 _STEEPER = 0.5
 """Largest assumed relative change of ``bend_hz`` from one level to the next."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms unexplained phase drift above which the specimen counts as having changed to another motion."""
+"""Rms of the unexplained phase drift above which the specimen is taken to have changed to another motion."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class LearntMode:
     """Properties of a mode, as estimated by the phase-locked loop."""
 
     narrowest_hz: float
-    """Half-width in the first search: a lower bound, because contacts and hard springs only widen a resonance
-    (zero for a super- or subharmonic)."""
+    """Half-width in the first search (zero for a super- or subharmonic). It is a lower bound, because
+    contacts and hard springs only widen a resonance."""
     half_width_hz: float
     bend_hz: float = 0.0
     """Change of the resonance frequency [Hz] when the base level grows by the factor e; 0 if unknown."""
@@ -48,7 +48,7 @@ class TrackedPlace:
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """Estimate of the mode. None until the loop has locked at a level: then the next level is searched."""
+    """Estimate of the mode; None until the loop has locked at a level, so that the next one is searched."""
 
 
 class PhaseLaw:
@@ -75,7 +75,7 @@ class PhaseLaw:
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """Base level to which the present amplitude of the motion belongs when settled [m/s2]."""
+        """Base level at which a settled motion has the present amplitude [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []
@@ -153,7 +153,7 @@ class PhaseLaw:
 
 
 _NEAR_DEG = 35.0
-"""Largest phase error on the straight part of the phase curve, which gives the slope [degrees]."""
+"""Largest phase error on the straight part of the phase curve, from which the slope is taken [degrees]."""
 _FEWEST = 2
 _NEAREST = 3
 """Number of measurements nearest to the resonance that determine a frequency-dependent slope of the phase."""
@@ -255,7 +255,7 @@ class PhaseSearch:
 
 
 def _secant(low: PhaseError, high: PhaseError) -> float:
-    """Return the secant's zero, kept away from both ends of the bracket so that the bracket shrinks."""
+    """Return the zero of the secant, kept away from both ends of the bracket so that the bracket shrinks."""
     share = low.error_deg / (low.error_deg - high.error_deg)
     edge = 0.05
     return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)

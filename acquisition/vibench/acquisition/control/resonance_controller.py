@@ -1,4 +1,4 @@
-"""Track a phase resonance from level to level: a search at first, then a phase-locked loop follows it."""
+"""Track a phase resonance from level to level: first by a search, then by a phase-locked loop."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Mode:
 def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
     """Fit one mode: T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2, with real a and complex b.
 
-    Return None with too few points, a damping within its uncertainty, or a frequency outside the points.
+    Return None for too few points, a damping within its uncertainty, or a frequency outside the points.
 
     The polynomial on the right contains the residue of the mode, the base motion itself and the flanks of
     other modes. An error common to all phases only rotates this polynomial. The method is Levy's linear
@@ -92,7 +92,7 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest remaining change of a locked motion, in phase tolerances; 0.5 for super- and subharmonics."""
+"""Largest remaining change of a locked motion, in phase tolerances; it is 0.5 for super- and subharmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
@@ -121,7 +121,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
 def _go_on(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
 ) -> Controller[TrackedPlace | None]:
-    """Follow the resonance to the next level and record there; None if the loop lost the resonance."""
+    """Follow the resonance to the next level and record there; return None if the loop lost the resonance."""
     level, law = plan.held_levels[number], PhaseLaw(plan, last, mode)
     change = _first_change(loop, level, last)
     begin_hz = law.next_hz(last.frequency_hz, last.base_m_per_s2 * change)
@@ -176,8 +176,8 @@ def _lock(
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
     """Return the factor of the first change of the setting towards a new level.
 
-    A specimen reduces the motion of a light table, but only after the specimen's motion has grown. Until then
-    the base follows the whole change of the setting, so the first change must be smaller.
+    A specimen reduces the motion of a light table, but only once the specimen's own motion has grown. Until
+    then the base follows the whole change of the setting, so the first change must be smaller.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
     share = min(1.0, bare_vpp / loop.setting.setting_vpp)
@@ -279,7 +279,7 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
 
 
 def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Return whether this may be the tracked motion; a subharmonic never repeats every drive period."""
+    """Return whether this may be the tracked motion; a subharmonic does not repeat after one drive period."""
     return plan.subharmonic == 1 or found.judgement.period != 1
 
 

@@ -1,4 +1,4 @@
-"""Wait until a motion has settled, while the base is brought to its level and held there."""
+"""Wait until a motion has settled, while feedback brings the base to its level and holds it there."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class LocatedJump:
 
 
 Seek = Generator[float, SettledPoint, LocatedJump]
-"""Yields the next frequency, approached along the branch before the jump; receives its settled point."""
+"""Generator that yields the next frequency on the branch before the jump and receives its settled point."""
 
 
 def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
@@ -83,7 +83,7 @@ def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> Jump
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:
-    """Return the larger over the smaller response; 1 for equal responses, infinite if only one is zero."""
+    """Return the ratio of larger to smaller response; 1 if both are equal, infinite if only one is zero."""
     if min(one.response, other.response) <= 0.0:
         return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
@@ -92,9 +92,9 @@ def ratio(one: SettledPoint, other: SettledPoint) -> float:
 def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Return whether a point is on the same branch as an earlier point at the same frequency.
 
-    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so half
-    of it in decibels is the limit. Repeated measurements of a chaotic motion scatter more than those of a
-    periodic one: their limit is the whole factor.
+    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so the
+    limit is half of this factor in decibels. Repeated measurements of a chaotic motion scatter more than
+    those of a periodic one: their limit is the whole factor.
     """
     if point.period != expected.period:
         return False
@@ -105,7 +105,7 @@ _SURE = 2.0
 _SAME_LEVEL = 0.004
 """Relative tolerance of the level if settling is judged by a single order of the response."""
 _PROMPT = 0.7
-"""Exponent below 1 that reduces a correction made while the specimen still responds to the one before."""
+"""Exponent below 1 that reduces a correction while the specimen still responds to the last correction."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class SettledState:
 
     @property
     def transmissibility(self) -> complex:
-        """Displacement of m0 over displacement of the base, at the drive frequency."""
+        """Ratio of the displacements of m0 and base at the drive frequency."""
         return self.harmonics[self.drives - 1]
 
     @property
@@ -163,7 +163,7 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Waits until the motion at one frequency has settled, or the longest allowed wait is over."""
+    """Wait until the motion at one frequency has settled, or the longest allowed wait is over."""
 
     loop: SineLoop
     rule: Settling
@@ -373,7 +373,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Extend the range of frequencies at which the level is out of tolerance; None if it is in tolerance."""
+    """Extend the range of frequencies with the level out of tolerance; None if the level is in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

@@ -21,7 +21,7 @@ from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
 from .steadiness import ORDERS, Periods, Phasors, Stroboscope
 
 _SURE = 4.0
-"""Ratio of a gain's trend to the trend's standard uncertainty, above which the trend is extrapolated."""
+"""Ratio of the gain's trend to its standard uncertainty above which the trend is extrapolated."""
 _FEWEST = 3
 """Smallest number of drive steps from which the trend of the gain and its scatter are estimated."""
 
@@ -30,15 +30,15 @@ _FEWEST = 3
 class _Answer:
     time_s: float
     gain: complex
-    """Measured base acceleration over the acceleration that the rig's linear model predicts."""
+    """Ratio of measured base acceleration to the prediction of the rig's linear model."""
     level: complex
-    """Measured base acceleration over its target acceleration."""
+    """Ratio of measured to target base acceleration."""
 
 
 class GainEstimator:
     """Recent gain from generator setting to base motion, relative to the linear model of the rig.
 
-    In a chaotic motion the fundamental of a few periods is mostly chance, so recent steps (the track) are
+    In a chaotic motion the fundamental of a few periods is mostly random, so recent steps (the track) are
     averaged. If the gain changes steadily, as near a resonance, a line through these steps is extrapolated.
     """
 
@@ -49,7 +49,7 @@ class GainEstimator:
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
         """Add the base phasors of a step, shape (periods,) [m/s2].
 
-        ``modelled`` is the base acceleration that the linear model predicts, ``target`` that to be held.
+        ``modelled`` is the base acceleration predicted by the linear model, ``target`` the one to be held.
         """
         if not len(base):
             return
@@ -65,7 +65,7 @@ class GainEstimator:
 
     @property
     def level(self) -> float:
-        """Mean amplitude of the base over the averaged steps of the drive, as a fraction of its target."""
+        """Amplitude of the base, averaged over recent steps of the drive, as a fraction of its target."""
         return float(abs(np.mean([each.level for each in self._answers]))) if self._answers else 1.0
 
     def gain_at(self, time_s: float) -> float:
@@ -89,14 +89,14 @@ class GainEstimator:
 
 @dataclass(frozen=True)
 class DriveSetting:
-    """Drive frequency of the generator, and amplitude setting (peak to peak)."""
+    """Drive frequency and amplitude setting (peak to peak) of the generator."""
 
     frequency_hz: float
     setting_vpp: float
 
 
 class SineLoop:
-    """Sets the drive, and evaluates the motion once per period."""
+    """Loop that sets the drive and evaluates the motion once per period."""
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self.measurement = measurement
@@ -111,8 +111,8 @@ class SineLoop:
         self.drives = 1
         """Number of drive periods in one period of the motion; set before anything is played."""
         self.settling_order: int | None = None
-        """Only order of the response by which settling is judged; None for all orders. Set before anything
-        is played."""
+        """The only order of the response by which settling is judged; None for all orders. It is set before
+        anything is played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
         """Smallest amplitude setting of the generator [Vpp]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
@@ -216,7 +216,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up to the setting that the model predicts for ``level``; if None, to the plan's setting."""
+    """Ramp up to the setting that the model predicts for ``level``, or to the plan's setting for None."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 
@@ -283,7 +283,7 @@ def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
-    """Change frequency and setting. If a level is held, ``most_change`` limits the setting's factor."""
+    """Change frequency and setting. If a level is held, ``most_change`` limits the change of the setting."""
     if level is not None:
         now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)

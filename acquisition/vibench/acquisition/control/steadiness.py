@@ -16,7 +16,7 @@ from ..recording import Steadiness
 # estimated from the recorded drive, gives the beginning of each drive period in the converter's time.
 
 _MEMORY = 40
-"""Number of blocks to whose phases a line is fitted; the slope of the line gives the drive frequency."""
+"""Number of blocks whose phases are fitted by a line; the slope of the line gives the drive frequency."""
 
 
 class DriveClock:
@@ -77,7 +77,7 @@ ORDERS = 5
 
 @dataclass(frozen=True, eq=False)
 class Periods:
-    """Fourier coefficients of the motion, one row per period of one or several drive periods.
+    """Fourier coefficients of the motion, one row per period, which is one or several drive periods long.
 
     Phases are relative to an upward zero crossing of the drive, so that the coefficient of a sine is real. If
     a period has several drive periods, the crossing of any of them may be the reference.
@@ -164,8 +164,8 @@ class Stroboscope:
 def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phasors:
     """Return the Fourier coefficients over each period that begins at ``starts`` (in fractional samples).
 
-    Between two samples the integral is interpolated by a cubic with its values and slopes at both. A period
-    therefore need not be a whole number of samples. ``turns`` are cycles per sample.
+    Between two samples, the integral is interpolated by a cubic from its values and slopes at both samples. A
+    period therefore need not be a whole number of samples. ``turns`` are cycles per sample.
     """
     sample = np.arange(len(signal))
     low = np.minimum(starts.astype(np.int64), len(signal) - 2)
@@ -200,7 +200,7 @@ _FEWEST_TURNS = 2
 _SURE = 2.0
 """Number of standard uncertainties by which a value must differ from its limit."""
 _CERTAIN = 5.0
-"""Number of standard errors above which a mean is not explained by noise."""
+"""Number of standard errors above which noise does not explain a mean."""
 _BLOCKS = 12
 """Number of blocks compared by a test of stationarity."""
 _SIGNIFICANCE = 0.01 / 8
@@ -215,7 +215,7 @@ last change.
 
 @dataclass(frozen=True)
 class Judgement:
-    """Whether and how a series of periods has settled; values are relative to the motion's rms."""
+    """Judgement whether and how a series of periods has settled; values are relative to the motion's rms."""
 
     steadiness: Steadiness
     period: int
@@ -225,7 +225,7 @@ class Judgement:
     scatter_u: float
     """Standard uncertainty of the scatter, relative to the motion's rms."""
     noise: float
-    """Part of the scatter that noise of the channel explains; a smaller scatter cannot be measured."""
+    """Part of the scatter explained by noise of the channel; a smaller scatter cannot be measured."""
     remaining: float
     """Extrapolated change of the cluster means still to come; for an aperiodic motion, their last change."""
 
@@ -234,7 +234,7 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
     """Return the judgement of a motion's newest periods by the criteria of ``rule``.
 
     ``points`` are the Fourier coefficients of each drive period, shape (periods, orders); ``noise`` is the
-    rms of all orders together without drive, in the unit of the points.
+    total rms of all orders without drive, in the unit of the points.
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)
@@ -302,7 +302,7 @@ def _differ(points: Phasors, period: int, allowed: float) -> bool:
 
 
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Extrapolate the change of a mean as a geometric series; return the last change if it may be chance."""
+    """Extrapolate the change of a mean as a geometric series; return the last change if it may be random."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
@@ -321,7 +321,7 @@ def _limit(figures: Judgement, tolerance: float) -> float:
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
-    """Return the judgement from block statistics: stationary if blocks show neither trend nor step."""
+    """Return the judgement from block statistics: stationary if the blocks show neither trend nor step."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
     # Use order 1, or the only order if a single one is judged.
