@@ -1,4 +1,4 @@
-"""A running acquisition: the conversion, and the buffer between the device and the reader."""
+"""A running acquisition: the conversion, and the buffer between device and reader."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ MOST_SAMPLES = 1 << 27
 """Largest number of values in a buffer or a read: 1 GiB."""
 
 LEAST_PRETRIGGER = 2
-"""Smallest number of samples that can be stored before, and after, a reference trigger."""
+"""Smallest number of samples that can be stored before a reference trigger, and after one."""
 
 
 @dataclass
@@ -23,14 +23,14 @@ class Timing:
     """Configuration of sample clock and triggers."""
 
     kind: SampleTimingType | None = None
-    """Type of sample timing; None: the device's default."""
+    """Type of sample timing; None for the device's default."""
     requested_hz: float = 1000.0
     mode: AcquisitionType = AcquisitionType.FINITE
     samples: int = 1000
     """Samples to acquire; for a continuous task, the smallest buffer size."""
     clock_source: str = ""
     trigger_source: str = ""
-    """Terminal of the start trigger; empty: sampling begins when the task is started."""
+    """Terminal of the start trigger; if empty, sampling begins when the task is started."""
     reference_source: str = ""
     """Terminal of the reference trigger, around which a finite task stores samples; empty: no trigger."""
     pretrigger: int = 0
@@ -67,7 +67,7 @@ class Stream:
 
     @property
     def is_done(self) -> bool:
-        """Whether all samples of the task are transferred, or no more will be."""
+        """Whether all samples of the task are transferred, or no more will follow."""
         return self.transferred >= self.total or self.failure is not None
 
     def reaches(self, count: int) -> bool:
@@ -75,7 +75,7 @@ class Stream:
         return self.transferred >= count
 
     def time_of(self, count: float) -> float:
-        """Return the rig time at which ``count`` samples are transferred [s]; infinite for more than all."""
+        """Return the rig time at which ``count`` samples are transferred [s]; infinite if there are fewer."""
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     def due(self, now_s: float) -> int:
@@ -98,9 +98,9 @@ class Acquisition(Stream):
         *,
         loses_samples: bool,
     ) -> None:
-        """Begin an acquisition; with ``pretrigger`` samples before a reference trigger, or 0 without one.
+        """Begin an acquisition, with ``pretrigger`` samples before a reference trigger (0 without a trigger).
 
-        ``loses_samples``: whether new samples overwrite the oldest in a full buffer; if not, it grows.
+        ``loses_samples``: whether new samples overwrite the oldest in a full buffer, which else grows.
         """
         super().__init__(rate_hz, began_s, math.inf if pretrigger else total)
         self.position = 0
@@ -136,7 +136,7 @@ class Acquisition(Stream):
 
     @property
     def enough_before_s(self) -> float:
-        """Rig time at which enough samples before a trigger are stored [s]; infinite once they are stored."""
+        """Rig time at which enough samples are stored for a trigger [s]; infinite once this is the case."""
         kept = self._pretrigger
         return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
 

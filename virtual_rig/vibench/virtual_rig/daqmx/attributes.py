@@ -32,7 +32,7 @@ from .errors import DaqmxRefusal, member, unsupported_value
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)
-"""Major, minor and update number. From 24.5 on, nidaqmx asks the driver how many samples "all" means."""
+"""Major, minor and update number. From 24.5 on, nidaqmx asks the driver how many samples "all" stands for."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Group:
         }
 
     def find(self, subject: Any, request: Any) -> tuple[str, Attribute]:
-        """Return name and property of the number in a request (-200197 if the object does not have it)."""
+        """Return name and property for the number in a request (-200197 if the object lacks the property)."""
         number = int(request.attribute_raw or request.attribute)
         name = self.names.get(number, f"0x{number:X}")
         attributes = self.attributes(subject)
@@ -263,7 +263,7 @@ GROUPS = {
         is_set_at_rest=True,
     ),
 }
-"""Groups, keyed by their part of the call names in the protocol."""
+"""Groups of properties, keyed by their part of the call names in the protocol."""
 
 
 # Tables from call to property, and from value to message
@@ -273,7 +273,7 @@ _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
 
 
 def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Fields]]:
-    """Return the calls that get and set properties of these groups, by their names in the protocol."""
+    """Return the calls that get and set properties of these groups, by name in the protocol."""
     calls: dict[str, Callable[[Any], Fields]] = {}
     for method in SERVICE.methods:
         found = _CALL.match(method.name)

@@ -52,7 +52,7 @@ class DaqmxSystem:
         return self.tasks[name]
 
     def create(self, request: Any) -> Fields:
-        """Create a task, or attach to an existing one; an empty name selects an unused name."""
+        """Create a task, or attach to an existing task; an empty name selects an unused one."""
         name, behavior = request.session_name, request.initialization_behavior
         if behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_ATTACH_TO_EXISTING:
             self.task(name)
@@ -192,7 +192,7 @@ TASK_CALLS: Mapping[str, TaskCall] = {
     # The client has already closed the event stream; nothing else needs to be undone.
     "UnregisterEveryNSamplesEvent": lambda *_: None,
 }
-"""Calls on a task, keyed by their names in the protocol; `DATA_CALLS` has the calls that transfer samples."""
+"""Calls on a task, keyed by their names in the protocol; calls that transfer samples are in `DATA_CALLS`."""
 # fmt: on
 
 
@@ -204,8 +204,8 @@ _BY_OTHERS = math.inf
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    A listener waits for rig time like a reader. With time on demand, the listener advances time, and
-    continues when the announced samples have been read.
+    Like a reader, a listener waits for rig time. With time on demand, it advances time, and continues when
+    the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"

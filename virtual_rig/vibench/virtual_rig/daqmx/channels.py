@@ -12,7 +12,7 @@ from .devices import AnalogInputs, AnalogOutputs, Device, expand
 from .errors import DaqmxRefusal, unsupported_value
 
 _SLACK = 1 + 1e-9
-"""Relative tolerance for limits of a channel, which may have rounding errors."""
+"""Relative tolerance for limits of a channel, as these may have rounding errors."""
 
 
 @dataclass
@@ -32,7 +32,7 @@ class InputChannel(_VoltageChannel):
 
     terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
     coupling: Coupling | None = None
-    """Input coupling; None: the device's default (AC with excitation, DC without)."""
+    """Input coupling; None for the device's default (AC with excitation, DC without)."""
     excitation: ExcitationSource = ExcitationSource.NONE
     excitation_a: float = 0.0
 
@@ -57,7 +57,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def range_v(self) -> float:
-        """Smallest full scale that contains the expected values [V]; NaN if no full scale does."""
+        """Smallest full scale that covers the expected values [V]; NaN if none does."""
         wanted_v = max(abs(self.minimum), abs(self.maximum))
         return next((each for each in self.side.ranges_v if wanted_v <= each * _SLACK), float("nan"))
 
@@ -105,7 +105,7 @@ class OutputChannel(_VoltageChannel):
         return self.device.outputs
 
     def verify(self) -> None:
-        """Refuse limits that the device cannot output."""
+        """Refuse limits beyond the voltages that the device can output."""
         if self.minimum >= self.maximum:
             raise unsupported_value("AO_Min", self.minimum, f"below AO_Max = {self.maximum:g}")
         range_v = self.side.range_v

@@ -70,7 +70,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Return the number of unread samples per channel; if all are read, time on demand advances."""
+    """Return the number of unread samples per channel; time on demand advances if none is unread."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -79,7 +79,7 @@ def available(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples. Time on demand advances if none was read since the last query."""
+    """Return the number of unread samples. Time on demand advances if no read followed the last query."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -213,7 +213,7 @@ def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) ->
 
 
 _SECONDS_1904_TO_1970 = 2_082_844_800
-"""Seconds from 1904, where NI's time stamps start, to 1970."""
+"""Seconds from 1904, the origin of NI's time stamps, to 1970."""
 
 
 def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:

@@ -52,15 +52,15 @@ class AnalogInputs:
     bits: int
     couplings: tuple[Coupling, ...]
     iepe_currents_a: tuple[float, ...]
-    """Possible excitation currents besides 0 [A]; empty: the inputs have no excitation."""
+    """Possible excitation currents besides 0 [A]; empty if the inputs have no excitation."""
     terminals: tuple[TerminalConfiguration, ...]
     """Possible couplings; the first is the default."""
     untimed: SampleTimingType
-    """Timing of a task without a sample clock: delta-sigma converters run the clock at its default rate."""
+    """Timing of a task without a sample clock; delta-sigma converters then use their default clock rate."""
     detects_overloads: bool = False
     """Whether the device reports clipped inputs."""
     is_multiplexed: bool = False
-    """Whether the inputs of a task share one converter, and therefore share its highest rate."""
+    """Whether the inputs of a task share one converter, and thus its highest rate."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Device:
 
     @property
     def clock_name(self) -> str:
-        """The device whose timing engine is used: the chassis of a module, else the device itself."""
+        """The device whose timing engine is used: for a module its chassis, else the device itself."""
         return self.chassis or self.name
 
     @property
@@ -186,7 +186,7 @@ class Catalogue:
     def physical(
         self, names: str, side: Callable[[Device], tuple[str, ...]]
     ) -> tuple[tuple[str, Device], ...]:
-        """Return each channel in a list of names and ranges, as its device spells it, with the device.
+        """Return each channel in a list of names and ranges, with its device and as spelled by this device.
 
         ``side`` returns the inputs or the outputs of a device. -200220, -200170 or -200096 for unknown names.
         """

@@ -1,4 +1,4 @@
-"""Errors of the simulated DAQmx driver: code, sentence, and number of transferred samples."""
+"""Errors of the simulated DAQmx driver: code, explanation, and number of transferred samples."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -82,7 +82,7 @@ class Faults:
         self._rules += (rule,)
 
     def remove(self, rule: Fault | ServerGone) -> None:
-        """Remove a rule. A server that answers again after that has lost its tasks."""
+        """Remove a rule. If the server answers again as a result, it has lost its tasks."""
         self._restart_is_due |= rule in self._rules and isinstance(rule, ServerGone)
         self._rules = tuple(other for other in self._rules if other is not rule)
 

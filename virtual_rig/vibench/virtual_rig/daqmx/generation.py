@@ -13,7 +13,7 @@ from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""Lead of samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
+"""Lead of the samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
 
 
 class OutputBuffer:
@@ -32,7 +32,7 @@ class OutputBuffer:
 
     @property
     def buffered(self) -> int:
-        """Number of samples in the buffer, which a regeneration repeats."""
+        """Number of samples in the buffer; a regeneration repeats them."""
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
@@ -51,7 +51,7 @@ class OutputBuffer:
 
 
 class Generation(Stream):
-    """A running generation: played samples, and samples that wait in the buffer and in the device."""
+    """A running generation: samples played, and samples that wait in the buffer and in the device."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class Generation(Stream):
         """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(outputs), 0))
-        """Number of samples in the device's memory; a repeated buffer is not transferred ahead."""
+        """Number of samples in the device's memory; a repeated buffer is not transferred in advance."""
         self._most_in_memory = 0 if self.repeats else device.memory
         self._fetched = 0
         self._recent = np.empty((len(outputs), 0))

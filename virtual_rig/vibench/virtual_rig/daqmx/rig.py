@@ -17,26 +17,26 @@ from .errors import DaqmxRefusal
 from .generation import Generation
 
 QUESTION_S = 0.1
-"""Rig time added by a query of progress when nothing else advances time [s].
+"""Rig time that a query of progress adds when nothing else advances time [s].
 
-Without it, a program that polls the number of samples would never end."""
+Without this time, a program that polls the number of samples would never end."""
 
 FAILED_CALL_S = 0.5
-"""Rig time added each time that a call fails again, with time on demand [s].
+"""Rig time added by each repeated failure of a call, with time on demand [s].
 
-Without it, a temporary fault would never end for a program that retries."""
+Without this time, a temporary fault would never end for a program that retries."""
 
 TICK_S = 0.02
 """Interval of updates in real time while a task runs [s], well below the usual read times."""
 SLICE_S = 0.1
-"""Longest rig time computed without releasing the lock [s], and the interval of updates without a task."""
+"""Longest rig time computed without releasing the lock [s]; also the interval of updates without a task."""
 
 YIELD_S = 1e-4
 """Pause between two slices while the rig lags behind the clock [s]."""
 
 
 class Rig:
-    """Advances the world and all running tasks together.
+    """Rig that advances the world and all running tasks together.
 
     ``changed`` guards tasks and trigger lines. The world has its own lock, because other threads use it too.
     """
@@ -68,7 +68,7 @@ class Rig:
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
-        """Advance in slices: feed the outputs, acquire the inputs, then advance the rest.
+        """Advance in slices: feed the outputs, acquire the inputs, then advance all other parts.
 
         If the world fails, all running tasks and waiting calls end.
         """
@@ -168,7 +168,7 @@ class OnDemandPace:
     def ask(self, rig: "Rig", until_s: float, is_there: Callable[[], bool], deadline_s: float) -> bool:
         """Advance time at once; wait only for events from other calls, such as a trigger.
 
-        ``until_s`` is the rig time at which ``is_there()`` is expected, infinite if other calls decide;
+        ``until_s`` is the rig time at which ``is_there()`` is expected (infinite if other calls decide);
         ``deadline_s`` is a time of the monotonic clock. Return whether ``is_there()`` became true.
         """
         if is_there():
@@ -179,12 +179,12 @@ class OnDemandPace:
         return _wait(rig, is_there, deadline_s)
 
     def pass_time(self, rig: "Rig", duration_s: float) -> None:
-        """Advance by ``duration_s``, so that a polling program does not wait for ever."""
+        """Advance by ``duration_s``, so that a polling program does not wait forever."""
         rig.advance_to(rig.now_s + duration_s)
 
 
 class WallPace:
-    """WALL: rig time follows a clock at ``speed``; late readers lose samples, early readers wait.
+    """Pace WALL: rig time follows a clock at ``speed``; late readers lose samples, early readers wait.
 
     If the world is computed too slowly, samples come late but stay correct.
     """

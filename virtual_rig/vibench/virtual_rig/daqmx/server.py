@@ -52,14 +52,14 @@ class TokenCheck(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships wit
 
 
 LOOPBACK = "127.0.0.1:0"
-"""Default address: only for this computer, because the server has no passwords, and with a free port."""
+"""Default address: any free port, open only to this computer because the server has no passwords."""
 
 LAST_PORT = 65_535
 _WORKERS = 64
 """Number of threads; each blocking read and each event listener needs one."""
 
 LONGEST_REQUEST_BYTES = 64_000_000
-"""Largest request: eight million output samples, which is 40 s at the highest rate."""
+"""Largest request: eight million output samples, or 40 s at the highest rate."""
 _NO_LIMIT = -1
 _OPTIONS = (
     ("grpc.max_receive_message_length", LONGEST_REQUEST_BYTES),
@@ -78,7 +78,7 @@ class DaqServer:
     world
         The signals at the converters.
     pace
-        Passing of rig time; by default on demand.
+        Pace of rig time; by default, time passes on demand.
     address
         ``"host:port"``; port 0 selects a free one, see `DaqServer.address`.
     catalogue
@@ -86,7 +86,7 @@ class DaqServer:
     handlers
         Further gRPC services on the same port.
     token
-        Token required for every call; None accepts everyone who can reach the port.
+        Token required for every call; with None, anyone who can reach the port is accepted.
 
     Raises ConfigurationError when the address cannot be used.
     """
@@ -126,14 +126,14 @@ class DaqServer:
         self._server.start()
 
     def __enter__(self) -> Self:
-        """Return the server, which runs from its creation on."""
+        """Return the server, which has been running since its creation."""
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def let_pass(self, duration_s: float) -> None:
-        """Advance rig time without a request of a client."""
+        """Advance rig time without a client's request."""
         with self._rig.changed:
             self._rig.advance_to(self._rig.now_s + duration_s)
 
@@ -221,7 +221,7 @@ def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
 
 
 def _require_address(address: str) -> None:
-    """Refuse text other than ``host:port``: gRPC would map port numbers above the limit to other ports."""
+    """Refuse text other than ``host:port``; gRPC would map port numbers above the limit to other ports."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(

@@ -22,7 +22,7 @@ from .rig import Rig
 
 
 class TdmsLog:
-    """TDMS file of the runs of a task; each run replaces the file. Needs npTDMS."""
+    """TDMS file of a task's runs, each of which replaces the file. Needs npTDMS."""
 
     def __init__(self, path: Path, group: str) -> None:
         if find_spec("nptdms") is None:
@@ -84,7 +84,7 @@ class Task:
         self.timing = Timing()
         self.log: TdmsLog | None = None
         self.output_size = 0
-        """Size of the output buffer in samples per channel; 0: as large as the first writes."""
+        """Size of the output buffer in samples per channel; if 0, as large as the first writes."""
         self.regeneration = RegenerationMode.ALLOW_REGENERATION
         self.inputs: list[InputChannel] = []
         self.outputs: list[OutputChannel] = []

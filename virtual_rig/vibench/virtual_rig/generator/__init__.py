@@ -1,4 +1,4 @@
-"""The simulated AFG1022: SCPI messages in, replies out, and the exact mean voltage at its terminal.
+"""The simulated AFG1022: SCPI messages in, replies out, and exact mean voltages at the terminal.
 
 The simulation has the instrument's commands, settings, waveform memories and status. Its output is a timeline
 of signals on its own clock, so block sizes do not affect the samples. Sources are the IVI driver tkafg1k,

@@ -84,8 +84,8 @@ class AFG1022(ScpiInstrument):
         """Return the mean voltage at channel 1's terminal over ``count`` intervals, shape (count,) [V].
 
         The first interval begins at ``start_s`` [s of rig time], which must not decrease from call to call.
-        The load is that of ``Terminal``. Commands act at the rig time of their arrival, or at the end of the
-        part already rendered if that is later.
+        The load is the one in ``Terminal``. Commands act at the rig time of their arrival, or at the end of
+        the part already rendered if that is later.
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)
@@ -106,7 +106,7 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Make the other channel follow this channel's frequency, or stop doing so."""
+        """Make the other channel follow this channel's frequency, or no longer follow it."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)
@@ -118,7 +118,7 @@ class AFG1022(ScpiInstrument):
             self._replace(SOUNDING_CHANNEL, sounding)
 
     def reset(self) -> None:
-        """Restore the defaults, except a load that only the panel can set."""
+        """Restore the defaults, except for a load that only the panel can set."""
         self.frequencies_are_locked = False
         for channel in self._channels:
             self._replace(channel, self._power_on)
@@ -147,7 +147,7 @@ class AFG1022(ScpiInstrument):
     # Faults
 
     def stick_output_relay(self, *, is_stuck: bool) -> None:
-        """Make ``OUTP OFF`` ineffective, although it is accepted and reported as off; or repair the relay."""
+        """Make ``OUTP OFF`` ineffective (it is accepted, and off is reported), or repair the relay."""
         now_s = self.clock()
         with self.lock:
             self._output.relay_is_stuck = is_stuck
@@ -164,14 +164,14 @@ class AFG1022(ScpiInstrument):
 
 
 def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings with a mode switched on or off; SCPI has a separate switch for each mode."""
+    """Return settings with a mode switched on or off; in SCPI, each mode has its own switch."""
     if wanted:
         return replace(settings, mode=mode)
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
 
 
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings without a mode that is not simulated: a mode can be switched off, but not on (-241)."""
+    """Return settings without a mode that is not simulated: this can be switched off, but not on (-241)."""
     if wanted:
         raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)
@@ -194,7 +194,7 @@ def _write_shape(generator: AFG1022, channel: int, parameter: bytes) -> None:
 
 
 def _whole_degrees(parameter: bytes) -> int:
-    """Return the phase of ``31DEG`` or of radians in whole degrees, truncated; it must not be negative."""
+    """Return the phase in whole degrees, truncated, from ``31DEG`` or radians; it must not be negative."""
     full_turn_deg = 360.0
     angle, unit = scpi.number_and_unit(parameter)
     if unit not in ("", "RAD", "DEG"):

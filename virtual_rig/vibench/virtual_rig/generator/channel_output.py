@@ -1,4 +1,4 @@
-"""Output of one channel: converts changes of settings to signals of its timeline."""
+"""Output of one channel, which converts changes of settings to signals of a timeline."""
 
 import math
 from dataclasses import dataclass, replace
@@ -64,7 +64,7 @@ _WORDS = {
     "PRNO": NOISE,
     "DC": DC,
 }
-"""Shapes that need no waveform memory; PRNO is the spelling in public drivers."""
+"""Shapes that need no waveform memory; PRNO (noise) is the spelling in public drivers."""
 _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, NOISE: 25e6, DC: 1e6}
 
 
@@ -89,7 +89,7 @@ class Trigger(StrEnum):
 
 @dataclass(frozen=True)
 class ChannelSettings:
-    """All settings of one channel; defaults are the state after ``*RST``."""
+    """All settings of one channel; the defaults are the state after ``*RST``."""
 
     relay: Relay = Relay.OPEN
     declared_load_ohm: float = OUTPUT_RESISTANCE_OHM
@@ -158,7 +158,7 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 
 
 class ChannelOutput(Timeline):
-    """Output that plays the settings; a change of settings acts at its rig time."""
+    """Output that plays the settings; a change acts at the rig time of its command."""
 
     def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False
@@ -169,7 +169,7 @@ class ChannelOutput(Timeline):
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
         """Apply new settings at a rig time.
 
-        The phase is continuous unless the start phase was changed. If noise is selected, the previous shape
+        The phase is continuous unless the start phase has changed. If noise is selected, the previous shape
         continues. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
         at_s, own_s = self.effective(now_s)
@@ -187,7 +187,7 @@ class ChannelOutput(Timeline):
         self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a waiting burst or sweep; without a waiting one, or during a burst, do nothing.
+        """Start a waiting burst or sweep; do nothing during a burst, or if none is waiting.
 
         A gated burst never starts, because nothing is connected to the gate input.
         """

@@ -1,4 +1,4 @@
-"""Phase of a generator as a function of its own time: steady or swept.
+"""Phase of a generator, steady or swept, as a function of the generator's own time.
 
 Phase is in cycles, time in seconds of the generator's clock. Frequencies are integer microhertz, the
 instrument's resolution. Whole seconds thus give an exact fraction of a cycle, and the phase does not drift
@@ -18,7 +18,7 @@ UHZ_PER_HZ = 1_000_000
 CURVATURE_TOLERANCE_CYCLES = 1e-6
 """Largest deviation of the phase from a straight line within a piece."""
 FINEST_SPLIT = 256
-"""Maximum number of pieces per interval; only sweeps above about 1e9 Hz/s would need more pieces."""
+"""Maximum number of pieces per interval; only sweeps above about 1e9 Hz/s would need more."""
 NO_TIMES: Samples = np.empty(0)
 
 
@@ -64,7 +64,7 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """One triggered sweep and a hold at the stop frequency; before and after, the start frequency."""
+    """One triggered sweep and a hold at the stop frequency; the start frequency before and after these."""
 
     start_hz: float
     stop_hz: float

@@ -23,7 +23,7 @@ Query = Callable[..., bytes]
 
 @dataclass(frozen=True)
 class Command:
-    """One command; without ``write`` it is query-only, without ``ask`` write-only."""
+    """One command: query-only without ``write``, write-only without ``ask``."""
 
     header: str
     """Header of the command in the notation of manuals, see `header_pattern`."""
@@ -134,13 +134,13 @@ class Quirks:
     """
 
     first_identity_after_clear_is_empty: bool = True
-    """The first ``*IDN?`` after ``*CLS`` answers an empty line."""
+    """The first ``*IDN?`` after ``*CLS`` returns an empty line."""
     high_impedance_has_ohm_sign: bool = True
-    """``OUTP:IMP?`` at high impedance answers ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
+    """``OUTP:IMP?`` at high impedance returns ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
     unknown_is_syntax_error: bool = True
-    """An unknown command queues -102; an unknown query also answers an empty line (else -113, no reply)."""
+    """An unknown command queues -102; an unknown query also returns an empty line (else -113, no reply)."""
     out_of_range_becomes_default: bool = True
-    """A number out of range silently sets the parameter's default (else -222 and no change)."""
+    """A number out of range silently sets the default of the parameter (else -222 and no change)."""
     panel_load_ohm: float | None = None
     """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (one driver's report); else None."""
 
@@ -159,8 +159,8 @@ class ScpiInstrument:
     Parameters
     ----------
     clock
-        Returns the rig time of a command's arrival [s]. It is called outside the instrument's lock, as it may
-        take a lock that is held while the output is rendered.
+        Function that returns the rig time of a command's arrival [s]. It is called outside the instrument's
+        lock, as it may take a lock that is held while the output is rendered.
     identity
         Reply to ``*IDN?``.
     commands
@@ -200,12 +200,12 @@ class ScpiInstrument:
             return Reply(data, delay_s)
 
     def report(self, code: scpi.ErrorCode) -> None:
-        """Queue an error of the interface, such as an unread reply, or a read without a query before it."""
+        """Queue an error of the interface, such as an unread reply or a read without a preceding query."""
         with self.lock:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; if the host's read times out, the host's next read receives this reply."""
+        """Delay the next reply; if the read of the host times out, its next read receives this reply."""
         with self.lock:
             self._next_delay_s = delay_s
 
@@ -215,7 +215,7 @@ class ScpiInstrument:
             self._next_is_corrupted = True
 
     def identity(self) -> bytes:
-        """Return the identity; with the quirk, the reply is empty at the first query after ``*CLS``."""
+        """Return the identity; with the quirk, the first query after ``*CLS`` has an empty reply."""
         is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
         return b"" if is_empty else self._identity.encode("ascii")
 
@@ -319,7 +319,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
     device
         The instrument; several clients may use it at once.
     port
-        0 selects a free one; see ``port`` and ``resource_name``.
+        Port number; 0 selects a free one. See ``port`` and ``resource_name``.
     """
 
     daemon_threads = True  # each client has a thread, which does not keep the process alive
@@ -349,7 +349,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
 
 
 class _Session(socketserver.BaseRequestHandler):
-    """One client of the socket: collects bytes until a message is complete, and answers the message."""
+    """One client of the socket, whose bytes are collected until a message is complete and answered."""
 
     server: ScpiSocket
 

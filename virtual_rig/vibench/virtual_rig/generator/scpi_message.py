@@ -58,7 +58,7 @@ BYTE = 255
 
 
 _OPERATION_COMPLETE, _POWER_ON = 1, 128
-"""Bits of the standard event status register (IEEE 488.2-1992, 11.5.1); `Status` has the error bits."""
+"""Bits of the standard event status register (IEEE 488.2-1992, 11.5.1); error bits are in `Status`."""
 
 
 class Status:
@@ -121,7 +121,7 @@ def mnemonic_matches(word: str, mnemonic: str) -> bool:
 
 
 def short_form(mnemonic: str) -> str:
-    """Return the capitals of a mnemonic, with which the instrument replies."""
+    """Return the capitals of a mnemonic, which the instrument uses in replies."""
     return "".join(letter for letter in mnemonic if not letter.islower())
 
 
@@ -131,7 +131,7 @@ NEWLINE = ord("\n")
 BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
 LONGEST_MESSAGE = 1 << 22
-"""Largest message [bytes] (assumed); the longest useful message, a million-point waveform, has 2 MB."""
+"""Largest message [bytes] (assumed); the longest useful one, a waveform of a million points, has 2 MB."""
 DIGITS = frozenset(b"0123456789")
 
 
@@ -229,7 +229,7 @@ def units(message: bytes) -> list[Unit]:
 
 
 def _trim(piece: bytes) -> bytes:
-    """Remove white space around a header or parameter, but leave the data bytes of a block unchanged."""
+    """Remove white space around a header or parameter, but do not change the data bytes of a block."""
     piece = piece.lstrip(b" \t\r")
     length = (block_length(piece, 0) or 0) if piece.startswith(b"#") else 0
     return piece[:length] if length > 1 else piece.rstrip(b" \t\r")
@@ -284,7 +284,7 @@ def number(parameter: bytes, units: Mapping[str, float]) -> float:
 
 
 def _finite(value: float) -> float:
-    """Refuse an overflow: -123, the exponent is too large (SCPI-1999, volume 2, 21.8.9)."""
+    """Refuse an overflow with -123, exponent too large (SCPI-1999, volume 2, 21.8.9)."""
     if not math.isfinite(value):
         raise ScpiError(ErrorCode.EXPONENT_TOO_LARGE)
     return value
@@ -349,10 +349,10 @@ _POWER_ON_POINTS = 1000
 
 
 class ArbitraryMemory:
-    """Edit memory and further memories by name; stored waveforms are immutable."""
+    """Edit memory and further memories, by name; stored waveforms are immutable."""
 
     def __init__(self, points: tuple[int, int], top_code: int) -> None:
-        """``points`` are the fewest and the most points of a waveform."""
+        """``points`` are the smallest and largest number of points of a waveform."""
         self.top_code = top_code
         self._points = points
         self._waveforms: dict[str, Codes] = {}

@@ -37,12 +37,12 @@ class Sine:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Square wave: 1 for the first ``duty`` of the cycle, then -1."""
+    """Square wave: 1 for the fraction ``duty`` of the cycle, then -1."""
 
     duty: float = 0.5
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean, from the part of the range for which the output is high."""
+        """Return the mean, computed from the part of the range in which the output is high."""
         end = start + span
         cycles = np.floor(end)
         high = cycles * self.duty + np.minimum(end - cycles, self.duty) - np.minimum(start, self.duty)
@@ -54,7 +54,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Triangle:
-    """A ramp with 50 % symmetry: 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
+    """A ramp with 50 % symmetry: from 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the mean: the middle value if the range contains no corner, else from the integral."""
@@ -120,11 +120,11 @@ NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Number of noise samples per block; each block has its own seed."""
 _CONTINUES = 1e-3
-"""Largest gap between a block's start and the end of the block before it, in intervals."""
+"""Largest gap between the start of a block and the end of the block before, in intervals."""
 
 
 class Relay(Enum):
-    """The relay between the generator and its terminal."""
+    """State of the relay between the generator and its terminal."""
 
     OPEN = "open"
     CLOSED = "closed"
@@ -175,7 +175,7 @@ class Terminal:
     """Properties of the output that no command changes."""
 
     load_ohm: float = 15e3
-    """Actual load (``math.inf``: none); by default the amplifier's input."""
+    """Actual load (``math.inf`` for none); by default the amplifier's input."""
     clock_error_ppm: float = 0.0
     """Error of the generator's clock relative to rig time [ppm]."""
     noise_v_per_rt_hz: float = 50e-9
@@ -219,9 +219,9 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> tuple[float, float]:
-        """Return when a command from ``time_s`` acts, in rig time and in the generator's own time.
+        """Return the time at which a command of ``time_s`` acts, in rig time and in the generator's own time.
 
-        It does not act before the end of the rendered part.
+        A command does not act before the end of the rendered part.
         """
         at_s = max(time_s, self._end_s, self._since_s[-1])
         return at_s, float(self.terminal.own_time(np.asarray(at_s)))
@@ -252,7 +252,7 @@ class Timeline:
         return volts * self.terminal.divider
 
     def _edges(self, start_s: float, interval_s: float, count: int) -> Samples:
-        """Return the interval limits, on one grid for consecutive blocks."""
+        """Return the limits of the intervals; consecutive blocks share one grid."""
         expected_s = self._origin_s + self._rendered * self._interval_s
         if interval_s != self._interval_s or abs(start_s - expected_s) > _CONTINUES * interval_s:
             self._origin_s, self._interval_s, self._rendered = start_s, interval_s, 0

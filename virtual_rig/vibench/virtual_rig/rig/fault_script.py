@@ -51,7 +51,7 @@ def nothing_to_heal() -> None:
 class RigFaults:
     """Faults of a running virtual rig: each method starts a fault and returns a function to end it.
 
-    A scripted fault has the name and parameters of its method. Thread-safe.
+    A scripted fault has the name and parameters of its method. The class is thread-safe.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class RigFaults:
         return self._until(self._cable.wake)
 
     def jump_clock(self, by_s: float) -> Heal:
-        """Shift the generator's clock, forwards if positive [s], and thus the phase of its output."""
+        """Shift the generator's clock (forwards if positive) [s], and thus the phase of the output."""
         self._generator.jump_clock(by_s)
         return nothing_to_heal
 
@@ -117,7 +117,7 @@ class RigFaults:
         return self._until(lambda: self._generator.stick_output_relay(is_stuck=False))
 
     def turn_amplifier_gain(self, gain_db: Annotated[float, Field(ge=-60, le=60)]) -> Heal:
-        """Set the amplifier's gain to a value other than the configured one."""
+        """Set the amplifier's gain to a value other than the configured gain."""
         self._world.set_amplifier_gain_db(gain_db)
         return self._until(lambda: self._world.set_amplifier_gain_db(self._world.configured_gain_db))
 
@@ -188,12 +188,12 @@ class RigFaults:
 
 
 class ScriptedFault(FrozenModel):
-    """Start and duration of a fault, and the parameters of the method of `RigFaults` that ``fault`` names."""
+    """Start and duration of a fault, and parameters of the method of `RigFaults` named by ``fault``."""
 
     at_s: NonNegativeFloat
     """Start of the fault in rig time since switch-on [s]."""
     for_s: PositiveFloat | None = None
-    """Duration in rig time [s]; absent: the fault is permanent, or ends by itself."""
+    """Duration in rig time [s]; if absent, the fault is permanent or ends by itself."""
     fault: str
 
     def begin(self, rig: RigFaults) -> Heal:
@@ -204,7 +204,7 @@ class ScriptedFault(FrozenModel):
 
 
 def _script_model(fault: Callable[..., Heal]) -> type[ScriptedFault]:
-    """Return the model of a fault in a script; the parameters of the fault's method are its keys."""
+    """Return the model of a fault in a script, whose keys are the parameters of the fault's method."""
     keys = {
         name: (each.annotation, ... if each.default is each.empty else each.default)
         for name, each in signature(fault).parameters.items()
@@ -218,7 +218,7 @@ def _script_model(fault: Callable[..., Heal]) -> type[ScriptedFault]:
 
 
 DISK_FAULTS = frozenset({"fill_disk", "slow_disk"})
-"""Faults of the recording program instead of the rig."""
+"""Faults that affect the recording program instead of the rig."""
 
 _SCRIPTED = [
     method
@@ -240,6 +240,6 @@ class FaultScript(FrozenModel):
 def load_fault_script(path: Path | str) -> FaultScript:
     """Return the faults of a TOML file, or of a shipped script by its name (``"night"``).
 
-    Raises ConfigurationError with file, key, what was given and what is allowed.
+    Raises ConfigurationError with file, key, given value and allowed values.
     """
     return load_toml(file_path(path, "hardware_configs/faults"), FaultScript)

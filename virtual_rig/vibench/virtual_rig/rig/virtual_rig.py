@@ -38,7 +38,7 @@ class DiskFaults(Enum):
     """Whether a script may cause disk faults."""
 
     PLAYED = auto()
-    """Allowed: this process records, so the script's disk faults act on its recording."""
+    """Allowed: this process records, so disk faults of the script act on its recording."""
     REFUSED = auto()
     """Not allowed: another process records, and this one cannot cause faults on its disk."""
 
@@ -46,8 +46,8 @@ class DiskFaults(Enum):
 class VirtualRig:
     """All simulated instruments of a rig, available within the ``with`` statement.
 
-    A pyvisa program of this process finds the generator at ``visa_resource``, a nidaqmx program the converter
-    at ``daq_address``. Programs of other processes find both at ``daq_address``: the generator after
+    In this process, pyvisa finds the generator at ``visa_resource``, and nidaqmx finds the converter at
+    ``daq_address``. Programs of other processes find both at ``daq_address``: the generator after
     ``plug_in_remote(daq_address)``, or without it at ``socket_resource``.
 
     Parameters
@@ -55,8 +55,8 @@ class VirtualRig:
     rig
         A rig with a ``[virtual]`` section.
     address
-        ``"host:port"`` of the server; port 0 selects a free one. Loopback by default; otherwise every call
-        needs `token`.
+        ``"host:port"`` of the server; port 0 selects a free one. Loopback by default; for other hosts, every
+        call needs `token`.
     quirks
         Peculiarities of the generator's firmware. With a load of 50 ohm set at its front panel, the voltage
         at the amplifier is twice the commanded one.
@@ -97,7 +97,7 @@ class VirtualRig:
             ),
         )
         self.controller = _controller(rig, lambda: self.world.time_s)
-        """The simulated controller of a fast loop; None if the rig has no fast loop."""
+        """The simulated controller of a fast loop; None if the rig has no such controller."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self.visa_resource = self._usb.identification.resource_name

@@ -1,11 +1,11 @@
 """A USB bus in memory; any program that uses pyvisa-py or PyUSB finds its devices.
 
-For a generator in another process, one line before (or after) pyvisa opens its resource manager is enough::
+For a generator in another process, one line is enough, before or after pyvisa opens its resource manager::
 
     from vibench.virtual_rig import plug_in_remote
     plug_in_remote("127.0.0.1:31763")
 
-It needs no libusb. While this module's bus is installed, PyUSB sees it *instead of* the machine's own
+This needs no libusb. While this module's bus is installed, PyUSB sees it *instead of* the machine's own
 USB devices; only a new process sees the machine's devices again.
 """
 
@@ -70,7 +70,7 @@ def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
 
 
 def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
-    """Return a handler that prefixes the response with the outcome of the transfer."""
+    """Return a handler that puts the outcome of the transfer before the response."""
 
     def serve(request: bytes, context: grpc.ServicerContext) -> bytes:
         try:
@@ -156,7 +156,7 @@ class _Handle:
 
 
 class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
-    """A PyUSB backend (``usb.backend.IBackend``) whose devices are objects of this process."""
+    """A PyUSB backend (``usb.backend.IBackend``), whose devices are objects of this process."""
 
     def __init__(self) -> None:
         self._ports: list[_Port] = []
@@ -176,7 +176,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
             self._ports.append(_Port(device, next(self._addresses)))
 
     def unplug(self, device: UsbDevice) -> None:
-        """Disconnect a device; programs that use it get ENODEV. Allowed if it is not connected."""
+        """Disconnect a device, so that programs get ENODEV; do nothing if it is not connected."""
         with self._lock:
             self._ports = [port for port in self._ports if port.device is not device]
 
@@ -252,7 +252,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         alt: int,  # noqa: ARG002 - there is one
         config: int,  # noqa: ARG002 - there is one
     ) -> SimpleNamespace:
-        """Return the endpoint bulk out or bulk in (table 9-13); IndexError past the last."""
+        """Return the endpoint bulk-OUT or bulk-IN (table 9-13); IndexError for a number past the last."""
         return SimpleNamespace(
             bLength=_ENDPOINT_BYTES,
             bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
@@ -391,7 +391,7 @@ def plug_in(device: UsbDevice) -> None:
 
 
 def unplug(device: UsbDevice) -> None:
-    """Disconnect a device from the virtual bus. Allowed if it is not connected."""
+    """Disconnect a device from the virtual bus; do nothing if it is not connected."""
     _BUS.unplug(device)
 
 

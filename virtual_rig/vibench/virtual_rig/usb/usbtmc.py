@@ -1,4 +1,4 @@
-"""The USB test-and-measurement class for an instrument: messages in bulk transfers.
+"""The USB test-and-measurement class of an instrument: messages in bulk transfers.
 
 Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings refer to
 USBTMC. Waiting is not simulated: a transfer that would exceed the host's timeout fails at once.
@@ -76,15 +76,15 @@ TRANSFER_NOT_IN_PROGRESS = 0x81
 """Values of the first byte of the response to a class request (table 16)."""
 
 _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
-"""Reply to GET_CAPABILITIES: USBTMC 1.0 without options, USB488 1.0 with 488.2, reserved bytes."""
+"""Reply to GET_CAPABILITIES: USBTMC 1.0 without options, USB488 1.0 with 488.2, and reserved bytes."""
 
 
 @dataclass
 class _Flight:
-    """Pending data between host and instrument, lost when the cable or the instrument was out of order."""
+    """Pending data between host and instrument; they are lost if the cable or the instrument fails."""
 
     message: bytes = b""
-    """Parts received so far of an incomplete message."""
+    """Parts of an incomplete message that were received so far."""
     reply: bytes = b""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
@@ -97,7 +97,7 @@ class _Flight:
 
 
 class UsbTmcInstrument:
-    """An instrument at a USB cable that can be disconnected."""
+    """An instrument on a USB cable, which can be disconnected."""
 
     def __init__(self, device: AFG1022, usb_ids: tuple[int, int] = AFG1022_IDS) -> None:
         self._device = device
@@ -132,7 +132,7 @@ class UsbTmcInstrument:
     # Transfers
 
     def bulk_out(self, data: bytes) -> None:
-        """Receive one bulk-OUT transfer: a part of a message, or a request for a reply (3.2)."""
+        """Receive one bulk-OUT transfer: part of a message, or a request for a reply (3.2)."""
         with self._lock:
             self._check_cable()
             if len(data) < HEADER.size:

@@ -1,6 +1,6 @@
 """The analogue world between the generator's terminal and the converter's inputs, on a grid of time.
 
-It simulates amplifier, shaker and specimen in one loop of the native engine (`vibench.sim.shaker`), sensors,
-cables, input stages, anti-alias filter and seeded noise. Quantities are means over a step, in SI units. The
-converter's clock defines rig time. This package does not depend on SCPI or DAQmx.
+One loop of the native engine (`vibench.sim.shaker`) simulates amplifier, shaker and specimen. Sensors,
+cables, input stages, anti-alias filter and seeded noise are included. Quantities are means over a step, in SI
+units. The converter's clock defines rig time. This package does not depend on SCPI or DAQmx.
 """

@@ -37,12 +37,12 @@ _DROOP_BAND = 0.23
 _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
-"""Table rows per output sample. Linear interpolation between rows has an error 110 dB below the signal."""
+"""Rows of the table per output sample. The error of linear interpolation is 110 dB below the signal."""
 _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest channel delay for which the filter needs no future means [steps]; negative: an advance."""
+"""Smallest channel delay for which the filter needs no future means [steps]; negative for an advance."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Decimator:
     """Filter that computes samples of one channel from means over the world's steps."""
 
     ratio: float
-    """Time steps per sample; whole numbers compute faster."""
+    """Number of time steps per sample; the computation is faster for whole numbers."""
     start_step: int
     delay_steps: float
     """Part of the sensor's delay that is not yet included in the means."""
@@ -92,7 +92,7 @@ class Decimator:
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
-    """Return the filter of one channel: ``ratio`` steps per sample, starting and delayed by these steps."""
+    """Return the filter of one channel, with ``ratio``, start and delay in steps."""
     delay = max(delay_steps, EARLIEST_STEPS)
     centre = Decimator(ratio, start_step, delay, np.zeros((1, 1))).centre(0)
     if ratio == round(ratio):
@@ -104,7 +104,7 @@ def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
-    """Return the number of steps before a conversion that its first sample needs."""
+    """Return the number of steps before the start of a conversion that the first sample needs."""
     filter_span = GROUP_DELAY_SAMPLES * max(ratio, 1.0) + _half_width_steps(ratio)
     return ceil(filter_span + max(delay_steps, 0.0)) + 2 * _LANES
 
@@ -146,11 +146,11 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder [ohm]; an excitation current causes a voltage at it."""
+"""Output resistance of generator, divider and decoder [ohm]; an excitation current causes a voltage on it."""
 COMPLIANCE_V = 19.0
 """Voltage of an open input with excitation [V]."""
 OVER_RANGE = 1.02
-"""Level at which the modulator clips, relative to the range; counts are limited to the range."""
+"""Level at which the modulator clips, relative to the range; counts are limited to the range itself."""
 
 
 def clip_v(range_v: float) -> float:
@@ -226,10 +226,10 @@ class ConverterInput:
         noise_v: float,
         noise: NoiseStream,
     ) -> None:
-        """Begin at a step of the world, after the signals of the steps in ``history``.
+        """Begin at a step of the world, after the steps whose signals are in ``history``.
 
-        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay of the present
-        cable.
+        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay that belongs to
+        the present cable.
         """
         self.has_clipped = False
         self._stage = stage

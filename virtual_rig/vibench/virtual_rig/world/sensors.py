@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Random numbers per page: short pages need more generator calls, long pages give more unused numbers."""
+"""Random numbers per page: short pages need more generator calls, long pages leave more numbers unused."""
 
 
 class NoiseStream:
@@ -55,7 +55,7 @@ class NoiseStream:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A constant output level during some steps, which replaces the signal."""
+    """A constant output level that replaces the signal during some steps."""
 
     first_step: int
     stop_step: int
@@ -67,12 +67,12 @@ class Disturbance:
 class RandomDropouts:
     """Times at which speckle interrupts the laser signal: a Poisson process.
 
-    The decoder then follows noise instead of the carrier. In a drop-out the output has a random, constant
-    level; the durations are exponentially distributed.
+    The decoder then follows noise instead of the carrier. During a drop-out, the output has a random,
+    constant level; the durations are exponentially distributed.
     """
 
     MEAN_S = 30.0 / 102_400
-    """Mean duration of a drop-out [s]: about 0.3 ms, which is assumed."""
+    """Mean duration of a drop-out [s]; about 0.3 ms is assumed."""
 
     def __init__(self, per_s: float, stream: NoiseStream, grid: TimeGrid = USUAL_GRID) -> None:
         """Create drop-outs, on average ``per_s`` per second."""
@@ -104,7 +104,7 @@ class RandomDropouts:
 _FIT_BAND = 0.2
 """Upper end of the fit, relative to the grid's rate: the pass band of a converter at half that rate."""
 _FIT_FLOOR = 1e-2
-"""Lower end of the fit; below it, the gain is determined by the exact gain at zero frequency."""
+"""Lower end of the fit; below this, the exact gain at zero frequency determines the gain."""
 _FIT_POINTS = 64
 _ZEROS = 6
 """Number of numerator weights that are fitted."""
@@ -128,7 +128,7 @@ def low_pass(
 ) -> LowPass:
     """Return the response of a sensor with a bandwidth (one pole, -3 dB) and a mounted resonance, if given.
 
-    The default damping ratio is a typical value of piezoelectric sensors, assumed.
+    The default damping ratio is assumed; it is typical of piezoelectric sensors.
     """
     poles: tuple[complex, ...] = ()
     if bandwidth_hz is not None:
@@ -176,7 +176,7 @@ LONGEST_DELAY_S = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class SensorParts:
-    """Data to convert the motion over some steps to sensor volts."""
+    """Data needed to convert the motion over some steps to sensor volts."""
 
     filter: RecursiveFilter
     noise: FloatArray
@@ -217,7 +217,7 @@ class MotionSensor:
         grid: TimeGrid = USUAL_GRID,
         dropouts: RandomDropouts | None = None,
     ) -> None:
-        """Create a sensor; ``noise_rms`` is the rms noise of a mean over a step, in the channel's SI unit."""
+        """Create a sensor; ``noise_rms`` is the rms noise of means over a step, in the channel's SI unit."""
         if config.delay_s > LONGEST_DELAY_S:
             raise ConfigurationError(
                 f"delay_s = {config.delay_s} s of the {config.model} ({role.value}): the virtual rig can "
@@ -238,7 +238,7 @@ class MotionSensor:
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Return the data to convert the motion over the next steps; the IEPE bias is not included."""
+        """Return the data needed to convert the motion over the next steps, without the IEPE bias."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
         dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
         disturbed = dropouts + self._demanded

@@ -7,7 +7,7 @@ from enum import Enum, IntEnum, StrEnum
 from vibench.acquisition.rig import Rig, Role
 
 SECOND_DEVICE = "Dev1"
-"""The second converter of the virtual system, connected to the same cables by T-pieces."""
+"""Second converter of the virtual system, connected to the same cables by T-pieces."""
 
 
 class Signal(IntEnum):
@@ -54,7 +54,7 @@ class Cable:
     behind: Behind
     signal: int = Signal.DRIVE
     attenuation: float = 1.0
-    """Volts at the source per volt at the input of the converter."""
+    """Ratio of the voltage at the source to the voltage at the converter's input."""
     delay_steps: float = 0.0
 
 

@@ -52,9 +52,9 @@ class AnalogueOutput:
         """Start of the first queued sample in steps, including fractions."""
 
     def queue(self, volts: FloatArray, sample_rate_hz: float, now_step: int) -> None:
-        """Append samples; they start now if no sample is left to play.
+        """Append samples, which start now if no other sample is left to play.
 
-        If the rate differs, samples that are left to play also change to the new rate.
+        If the rate differs, samples that are still to be played also change to the new rate.
         """
         left = self.queued_samples(now_step)
         if left == 0:
@@ -67,7 +67,7 @@ class AnalogueOutput:
         self._queue = np.concatenate([self._queue, np.asarray(volts, dtype=np.float64)])
 
     def queued_samples(self, now_step: int) -> int:
-        """Return the number of samples in the queue whose end has not been played."""
+        """Return the number of samples in the queue that have not been played to their end."""
         ended = int(max(now_step - self._begin_step, 0.0) / self._steps_per_sample + _ROUNDING)
         return max(len(self._queue) - ended, 0)
 
@@ -90,13 +90,13 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""Tolerance, in samples, for samples that end at a step."""
+"""Tolerance for samples that end exactly at a step [samples]."""
 
 
 LOWEST_RATE_HZ = 500.0
 """Lowest sample rate of a conversion, whose filter needs a tenth of a second of history [Hz]."""
 HIGHEST_RATE_HZ = 250e3
-"""Highest sample rate of a conversion [Hz]; above the grid's rate, samples are interpolated."""
+"""Highest sample rate of a conversion [Hz]; samples at rates above the grid's are interpolated."""
 
 _STRETCH_STEPS = 8192
 """Time steps per block: enough to amortise the cost of a call, few enough for the processor's cache."""
@@ -114,7 +114,7 @@ class ClosedLoop(Protocol):
 
     @property
     def is_on(self) -> bool:
-        """Whether the loop, or its delayed output, drives the amplifier; if not, `move` is not called."""
+        """Whether the loop or its delayed output drives the amplifier; if not, `move` is not called."""
 
     def move(
         self,
@@ -128,8 +128,8 @@ class ClosedLoop(Protocol):
     ) -> int:
         """Advance the shaker from a step of the world with the loop closed; return the number of steps.
 
-        ``noise`` is the amplifier's noise [V]; ``sensors`` describes the sensors of base and m0. On entry
-        ``signals`` contains the amplifier input from other sources, on return all signals.
+        ``noise`` is the amplifier's noise [V]; ``sensors`` describes the sensors of base and m0. On entry,
+        ``signals`` contains the amplifier input from other sources; on return, all signals.
         """
 
 
@@ -137,8 +137,8 @@ class World:
     """The simulated rig; its time advances only on request.
 
     Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
-    for bit, for any block sizes. Thread-safe; `time_s` takes no lock, so an instrument may read it while it
-    is rendered.
+    for bit, for any block sizes. The class is thread-safe. `time_s` takes no lock, so an instrument may read
+    it while being rendered.
     """
 
     def __init__(
@@ -197,16 +197,16 @@ class World:
             self._compute_to(self._step + steps)
 
     def at(self, time_s: float, action: Callable[[], None]) -> None:
-        """Schedule an action at a rig time, rounded to steps; a past time means the next step."""
+        """Schedule an action at a rig time, rounded to steps; for a past time, the next step is used."""
         with self._turn:
             heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._scheduled), action))
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Start a conversion now.
 
-        Rates from 500 Hz to 250 kHz are possible, on a coarser grid up to half its rate; integer ratios to
-        the grid's rate are faster. All inputs share the delay of a delta-sigma converter: 40 samples, or 40
-        grid steps if longer. Raises ConfigurationError for other rates.
+        Rates from 500 Hz to 250 kHz are possible, or up to half the rate of a coarser grid; integer fractions
+        of the grid's rate are faster. All inputs share the delay of a delta-sigma converter: 40 samples, or
+        40 grid steps if longer. Raises ConfigurationError for other rates.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
@@ -275,7 +275,7 @@ class World:
             self._cables[physical_channel] = self._plan.get(physical_channel, OPEN_INPUT)
 
     def disconnect(self, physical_channel: str) -> None:
-        """Disconnect an input; then it measures zero, or the voltage of its sensor supply."""
+        """Disconnect an input, which then measures zero, or the voltage of its sensor supply."""
         with self._turn:
             self._cables[physical_channel] = OPEN_INPUT
 
