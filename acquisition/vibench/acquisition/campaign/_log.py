@@ -174,7 +174,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _remaining_time(self) -> timedelta:
-        """Return the planned remaining time, scaled by real over planned time of this session [s]."""
+        """Return the planned remaining time, scaled by this session's ratio of real to planned time [s]."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
@@ -300,7 +300,7 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Sends notices of faults, damaged recordings and the end of the campaign; failures are only logged."""
+    """Sender of notices of faults, damaged recordings and the campaign's end; failures are only logged."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener

@@ -332,7 +332,7 @@ class ReconnectingBench:
     def reopen(self) -> Bench:
         """Close the bench, open it again and return it; confirmed manual settings (knobs) stay valid.
 
-        Raises AcquisitionError when an instrument is still missing. The bench is then closed; call again.
+        Raises AcquisitionError when an instrument is still missing. The bench is then closed; try again.
         """
         before, self._bench = self._bench, None
         if before is not None:

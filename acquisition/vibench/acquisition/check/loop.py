@@ -245,7 +245,7 @@ class LoopCheck:
         )
 
     def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
-        """Compare a channel's phase relative to the drive with the model; 180 degrees off: a wrong sign."""
+        """Compare a channel's phase relative to the drive with the model; 180 degrees mean a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]

@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return m0's velocity per signal of its sensor; 0 at 0 Hz except for a velocity sensor."""
+        """Return m0's velocity over its sensor's signal; 0 at 0 Hz except for a velocity sensor."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))

@@ -152,7 +152,7 @@ class JumpLocator:
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        First glide forward fast. If the motion leaves the branch, repeat in steps to find the frequency.
+        First glide forward fast. If the motion leaves the branch, repeat in steps to find out where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -181,7 +181,7 @@ class JumpLocator:
         return None
 
     def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back in growing steps until the motion is on the branch. Return the index there, else None."""
+        """Go back in growing steps until the motion is on the branch. Return that index, or None."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():

@@ -82,7 +82,7 @@ class PhaseLaw:
         """Frequency [Hz], phase error [rad] and base level [m/s2] of each look (measurement)."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look (measurement). Return its phase error [rad] and the relative change still to come."""
+        """Add a look (measurement). Return its phase error [rad] and the motion's relative change to come."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi

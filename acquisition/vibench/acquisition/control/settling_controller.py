@@ -123,7 +123,7 @@ class SettledState:
     """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Hold
     harmonics: tuple[complex, ...]
-    """Displacement of m0 at 1 to 4 times its repetition rate, over that of the base at drive frequency."""
+    """Displacement of m0 at 1 to 4 times its repetition rate, over the base's at the drive frequency."""
     drives: int = 1
     """Number of drive periods in one period of m0."""
 
@@ -261,7 +261,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Return whether the base level is well known, and is in tolerance or limited by ``most_vpp``."""
+        """Return whether the base level is well known, and either in tolerance or limited by ``most_vpp``."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target

@@ -31,7 +31,7 @@ from ._overload import overload_ranges
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of each call once a call had no reply [s], so that a run ends in a bounded time."""
+"""Time limit of each call after a call without a reply [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
@@ -405,7 +405,7 @@ class DaqmxDigitizer:
                 rows[:, first : first + count] = target
 
     def _overloaded_roles(self) -> frozenset[str]:
-        """Return the channels that the device reports as overloaded during the run; not all devices can."""
+        """Return the channels that the device reports as overloaded during the run, if it can report them."""
         if not self._tells_overloads:
             return frozenset()
         stream = self._open_task().in_stream

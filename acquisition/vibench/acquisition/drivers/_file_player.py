@@ -17,8 +17,8 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` is its path. If the plan of the recording is run, check and segments have the
-    same sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. If the recording's plan is run, check and segments have the same
+    sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     waiting_samples = 0
@@ -36,7 +36,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError for a wrong seal, channel, scale or sample rate."""
+        """Open the recording; raises ConfigurationError if its seal, a channel, scale or rate is wrong."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(

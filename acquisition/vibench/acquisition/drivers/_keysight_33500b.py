@@ -82,7 +82,7 @@ class Keysight33500B(AFG1022X):
             self.burst = "OFF"
 
     def _end_modes(self) -> None:
-        """End sweep, burst and modulation; set amplitudes to peak to peak; switch the waveform filter off."""
+        """End sweep, burst and modulation; use peak-to-peak amplitudes; switch the waveform filter off."""
         self.sweep = self.burst = self.am = self.fm = self.pm = self.fsk = self.pwm = "OFF"
         self.amplitude_unit = "VPP"
         self.output_filter = "OFF"

@@ -224,7 +224,7 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.measure(request))
 
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Pause or end the run, and disarm an armed campaign; refuse a pause in which the drive would end."""
+        """Pause or end the run, and disarm an armed campaign; refuse a pause that would end the drive."""
         if level is StopLevel.HOLD and (refusal := self._engine.switch.refusal_to_hold()):
             raise EngineError(f"{refusal}. The run continues; stop it with ramp, abort or off")
         self._stop(StopRequest(Cause.OPERATOR, level, reason))

@@ -22,7 +22,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     most_steps: ClassVar[int] = 600
-    """Largest number of steps: four events per step and four for searches fit into a recording's table."""
+    """Largest number of steps: a recording's table has room for their events."""
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None

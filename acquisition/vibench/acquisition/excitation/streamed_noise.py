@@ -77,7 +77,7 @@ def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> S
 class StreamedNoise(BandNoise):
     """Band-limited Gaussian noise of any length, on an analogue output.
 
-    The rms value is half the amplitude setting over the crest factor of 4.5. The band edges are -6 dB points.
+    The rms value is half the setting divided by the crest factor of 4.5. The band edges are -6 dB points.
     """
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.NOISE,)

@@ -271,7 +271,7 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
-    """Return the phase of one ramp up or down (``state``) of the signal ``play``, as long as planned."""
+    """Return the phase of one ramp up or down (``state``) of the signal ``play``, of planned length."""
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 

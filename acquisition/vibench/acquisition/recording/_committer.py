@@ -222,7 +222,7 @@ class TableWriter:
 
 
 Number = int | float | str
-"""Values stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
+"""Value stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
 
 
 @dataclass(frozen=True)

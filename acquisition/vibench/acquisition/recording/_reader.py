@@ -326,7 +326,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file. Later reads are then compared with that check."""
+        """Whether this process has checked the whole file; if so, later reads are compared with it."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
@@ -476,7 +476,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return samples, state and reason of a ``.part``; without a running program it is "interrupted"."""
+    """Return samples, state and reason of a ``.part``; without a running program, it is "interrupted"."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

@@ -106,7 +106,7 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest frequency with correct levels on a grid [Hz]; None without limit (default grid)."""
+    """Return the highest frequency with correct levels on a grid [Hz]; None (no limit) by default."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)

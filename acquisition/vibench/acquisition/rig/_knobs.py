@@ -94,7 +94,7 @@ class Channel:
     units_per_volt: float
     """Physical units per volt at the converter's input."""
     full_scale_v: float
-    """Largest usable voltage at the input: the smaller of the sensor's largest output and the range [V]."""
+    """Largest usable voltage at the input: the smaller of the sensor's output limit and the range [V]."""
     range_v: float
     coupling: str
     iepe_current_a: float
@@ -223,7 +223,7 @@ def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ..
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet, replacing an older sheet; raises ConfigurationError when ``path`` is another file."""
+    """Save a sheet, replacing an older sheet; raises ConfigurationError if ``path`` is no sheet."""
     if path.exists():
         load_knob_sheet(path)
     save_toml(sheet, path)

@@ -91,7 +91,7 @@ class RigModel:
         return inf if without else min(specimen.gaps_m)
 
     def transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return complex ``quantity`` per volt at the generator's terminal, shape of ``frequency_hz``.
+        """Return the complex ``quantity`` per volt at the terminal, in the shape of ``frequency_hz``.
 
         Valid without collisions; the time dependence is exp(+i omega t). 0 Hz is allowed; only a
         direct-coupled amplifier gives a static deflection of the table.
@@ -103,7 +103,7 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck_motion)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return ``quantity`` per metre of p imposed by the stops, complex, shape of ``frequency_hz``."""
+        """Return the complex ``quantity`` per metre of p that stops impose, shape as ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(

@@ -68,8 +68,8 @@ class BaseTracker:
 class SpecimenTracker:
     """Displacement of m0 relative to the base, which stretches the springs.
 
-    If m0's sensor needs fewer integrations than the base acceleration, high-pass filters replace the others,
-    so that both motions have the same phase.
+    If m0's sensor needs fewer integrations than the base acceleration, high-pass filters replace the missing
+    ones, so that both motions have the same phase.
     """
 
     def __init__(self, sample_rate_hz: float, role: Role = Role.M0_VELOCITY) -> None:

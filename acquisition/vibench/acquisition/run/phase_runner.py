@@ -365,7 +365,7 @@ class PhaseRunner:
     def _listen(self) -> Iterator[Progress]:
         """Continue to record until the measured drive is silent, but no longer than `LONGEST_S`.
 
-        A drive that is still measured is switched off again, and its amplitude lowered, at growing intervals.
+        While a drive is measured, it is switched off again and its amplitude lowered, at growing intervals.
         """
         give_up_s, wait_s = self.loop.elapsed_s + LONGEST_S, LOWER_AFTER_S
         yield from self._read(LISTEN_S)

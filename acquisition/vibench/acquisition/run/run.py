@@ -396,7 +396,7 @@ def _run_controller(runner: PhaseRunner, controller: Controller[None]) -> Iterat
 
 
 def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress, by default of ``on_progress``."""
+    """Ignore the progress; the default for ``on_progress``."""
 
 
 def run_measurement(

@@ -249,7 +249,7 @@ _LONGEST_ROUND_S = 0.1
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Switches the drive off if the run stops reading; reserves a thread, memory and the stop request.
+    """Guard that switches the drive off if the run stops reading; thread, memory and stop are reserved.
 
     The run calls the guard when its drive starts and after every block. The drive counts as on until its
     output has been read back as off.

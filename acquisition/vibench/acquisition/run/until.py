@@ -36,7 +36,7 @@ _ASK_S = 0.05
 class UntilWatch(ClosedOnLeaving):
     """Repeated analysis of a growing recording, until the error bounds are small enough.
 
-    A stretch is a part of the recording with one result. Process and thread start before anything plays. The
+    A stretch is a part of the recording with one result. The process and a thread start before any drive. The
     run queues requests, reads results and never waits. If the process fails, the longest time is recorded.
     """
 
@@ -88,7 +88,7 @@ class UntilWatch(ClosedOnLeaving):
             self._beside.wait(_ASK_S)
 
     def phases(self, measurement: Measurement) -> Iterator[Phase]:
-        """Yield the phases of the measurement; recordings end early when error bounds are small enough."""
+        """Yield the phases of the measurement; they end early once error bounds are small enough."""
         for phase in phases(measurement):
             is_result = phase.segment is not None and phase.segment.label in self._labels
             if not isinstance(phase.play, Waveform):

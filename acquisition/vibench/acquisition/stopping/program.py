@@ -244,7 +244,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 def unconfirmed_programs() -> tuple[Program, ...]:
     """Return the programs that ended here without confirming silence, even before the last boot.
 
-    `note_open_bench` forgets them. Raises AcquisitionError in the same cases as `announced_programs`.
+    `note_open_bench` removes them. Raises AcquisitionError in the same cases as `announced_programs`.
     """
     dead = (each for _, each in _announcements(Program) if not each.is_alive)
     return tuple(each for each in dead if each.computer == platform.node() or not each.computer)

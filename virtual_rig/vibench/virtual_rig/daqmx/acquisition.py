@@ -32,7 +32,7 @@ class Timing:
     trigger_source: str = ""
     """Terminal of the start trigger; if empty, sampling begins when the task is started."""
     reference_source: str = ""
-    """Terminal of the reference trigger, around which a finite task stores samples; empty: no trigger."""
+    """Terminal of the reference trigger, around which a finite task stores samples; empty without one."""
     pretrigger: int = 0
     """Samples per channel stored before the reference trigger."""
 
@@ -75,7 +75,7 @@ class Stream:
         return self.transferred >= count
 
     def time_of(self, count: float) -> float:
-        """Return the rig time at which ``count`` samples are transferred [s]; infinite if there are fewer."""
+        """Return the rig time at which ``count`` samples are transferred [s]; infinite beyond the total."""
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     def due(self, now_s: float) -> int:

@@ -87,7 +87,7 @@ class Faults:
         self._rules = tuple(other for other in self._rules if other is not rule)
 
     def take_restart(self) -> bool:
-        """Return whether the server has restarted since the last call, and so has lost its tasks."""
+        """Return whether the server has restarted, and so lost its tasks, since the last call."""
         is_due, self._restart_is_due = self._restart_is_due, False
         return is_due
 

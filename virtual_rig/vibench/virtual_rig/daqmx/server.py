@@ -231,7 +231,7 @@ def _require_address(address: str) -> None:
 
 
 class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
-    """The methods of the service; prepared at the first call, because programs use about thirty of 451."""
+    """The methods of the service; each is prepared at its first call, as programs use about 30 of 451."""
 
     def __init__(self, unary: dict[str, Handler], listening: dict[str, Handler]) -> None:
         self._unary = unary

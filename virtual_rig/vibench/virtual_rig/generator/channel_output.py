@@ -221,7 +221,7 @@ class ChannelOutput(Timeline):
         return self._course(settings, (running.phase(own_s) + turn) % 1.0, own_s)
 
     def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
-        """Return the mode's phase over time; it equals ``phase`` [cycles] at the time ``own_s``."""
+        """Return the mode's phase as a function of time, with ``phase`` [cycles] at ``own_s``."""
         if settings.mode is RunMode.SWEEP:
             return self._sweep(settings, phase, own_s, math.inf)
         return SteadyPhase.with_phase(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)

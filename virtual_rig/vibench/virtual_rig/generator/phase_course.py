@@ -107,7 +107,7 @@ class SweptPhase:
         return _fraction(cycles[:-1]), np.diff(cycles)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
-        """Return begin and end of sweep and hold, and times during the sweep where the phase is curved."""
+        """Return start and end of sweep and hold, and times in the sweep where the phase is curved."""
         end_of_sweep_s = self.begin_s + self.sweep_s
         corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
         corners = corners[(corners > begin_s) & (corners < end_s)]

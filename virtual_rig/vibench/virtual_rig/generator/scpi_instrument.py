@@ -210,7 +210,7 @@ class ScpiInstrument:
             self._next_delay_s = delay_s
 
     def corrupt_next_reply(self) -> None:
-        """Corrupt the next reply: change every second byte from the first on, except the reply's end."""
+        """Corrupt the next reply: change every second byte, starting with the first, but not its end."""
         with self.lock:
             self._next_is_corrupted = True
 

@@ -147,7 +147,7 @@ class RigFaults:
         return self._until(lambda: self._world.connect(channel))
 
     def overrun(self) -> Heal:
-        """Make reads fail as if the converter's buffer had been overwritten before it was read."""
+        """Make reads fail as if samples in the buffer had been overwritten before they were read."""
         code = DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE.value
         return self._in_force(*(Fault(call, code) for call in _READS))
 

@@ -97,7 +97,7 @@ class VirtualRig:
             ),
         )
         self.controller = _controller(rig, lambda: self.world.time_s)
-        """The simulated controller of a fast loop; None if the rig has no such controller."""
+        """The simulated controller of a fast loop; None if the rig has no fast loop."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self.visa_resource = self._usb.identification.resource_name

@@ -361,7 +361,7 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
     """Context that converts a device's OSError to the errors of PyUSB's own backends.
 
-    A generator is not used: from Python 3.13 on its frame keeps the handle of a session that failed to open.
+    It is no generator: from Python 3.13 on, its frame would keep the handle of a session that failed to open.
     """
 
     def __enter__(self) -> None:

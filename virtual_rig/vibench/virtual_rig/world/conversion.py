@@ -55,7 +55,7 @@ class Decimator:
     delay_steps: float
     """Part of the sensor's delay that is not yet included in the means."""
     table: FloatArray
-    """Shape (rows, weights): one row for an integer ratio, else one row per fraction of a step, plus one."""
+    """Shape (rows, weights): one row for an integer ratio, else one more than the fractions of a step."""
 
     @property
     def reach(self) -> int:
@@ -177,7 +177,7 @@ class InputStage:
         return self._cables.get(self.configured.physical_channel, OPEN_INPUT)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Return volts at the converter, and whether each clips, for signals of shape (signals, steps)."""
+        """Return volts at the converter, and which of them clip, for signals of shape (signals, steps)."""
         offset_v, gain = _operating_point(self.configured, self.cable)
         signal = signals[self.cable.signal]
         match self.configured.coupling:

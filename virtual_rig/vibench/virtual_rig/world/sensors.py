@@ -204,8 +204,8 @@ class SensorParts:
 class MotionSensor:
     """A sensor in front of an input: vibrometer, accelerometer, displacement probe or force cell.
 
-    The motion passes bandwidth or resonance, white noise, drop-outs, conversion to volts and clipping at full
-    scale, in this order. The converter's filter applies the rest of the sensor's delay (``delay_steps``).
+    The order of the effects: bandwidth or resonance, white noise, drop-outs, conversion to volts, clipping at
+    full scale. The converter's filter applies the rest of the sensor's delay (``delay_steps``).
     """
 
     def __init__(

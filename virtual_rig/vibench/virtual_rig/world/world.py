@@ -106,7 +106,7 @@ class TerminalVoltage(Protocol):
     """The generator's voltage at the amplifier's input."""
 
     def render(self, start_s: float, interval_s: float, count: int) -> FloatArray:
-        """Return the mean terminal voltage over each of ``count`` intervals [V]; calls go forward in time."""
+        """Return the mean terminal voltage over each of ``count`` intervals [V]; times must not decrease."""
 
 
 class ClosedLoop(Protocol):
