@@ -163,7 +163,7 @@ class SettledState:
 
 @dataclass(frozen=True)
 class SettlingController:
-    """Wait until the motion at one frequency has settled, or the longest allowed wait is over."""
+    """Wait until the motion at one frequency has settled, or until the longest allowed wait is over."""
 
     loop: SineLoop
     rule: Settling

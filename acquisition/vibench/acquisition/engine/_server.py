@@ -50,7 +50,7 @@ class _Waiting:
 
 
 class Admission:
-    """Accepts connections, and passes on those that show the token."""
+    """Acceptor of connections, which passes on those that show the token."""
 
     def __init__(
         self, listening: socket.socket, token: str, admitted: Admitted, make_room: Callable[[], None]
@@ -212,7 +212,7 @@ class _Viewer:
 
 
 class Server:
-    """Answers requests through a request handler; every connection needs the token."""
+    """Server that answers requests through a request handler; every connection needs the token."""
 
     def __init__(self, handler: RequestHandler, host: str = LOOPBACK) -> None:
         self._handler = handler

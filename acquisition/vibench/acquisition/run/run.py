@@ -341,7 +341,7 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _log_bounds(self, loop: AcquisitionLoop) -> None:
-        """Log the error bounds of each finished result; the reason of the run's end repeats the last."""
+        """Log the error bounds of each finished result; the reason why the run ended repeats the last."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)

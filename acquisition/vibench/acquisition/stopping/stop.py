@@ -19,7 +19,7 @@ class StopLevel(StrEnum):
     RAMP = "ramp"
     """Ramp down with the half-cosine ramp of the plan."""
     ABORT = "abort"
-    """Ramp down in three periods of the loaded shaker on its suspension, the shortest ramp without shock."""
+    """Ramp down in three periods of the loaded shaker on its suspension: the shortest ramp without shock."""
     OFF = "off"
     """Switch the output off at once, with a step."""
 

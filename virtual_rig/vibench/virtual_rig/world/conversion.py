@@ -92,7 +92,7 @@ class Decimator:
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
-    """Return the filter of one channel, with ``ratio``, start and delay in steps."""
+    """Return the filter of one channel, with ``ratio`` [steps per sample], start and delay [steps]."""
     delay = max(delay_steps, EARLIEST_STEPS)
     centre = Decimator(ratio, start_step, delay, np.zeros((1, 1))).centre(0)
     if ratio == round(ratio):
