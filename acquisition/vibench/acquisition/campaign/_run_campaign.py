@@ -308,7 +308,7 @@ LOOK_AGAIN_S = 1.0
 
 
 class ReconnectingBench:
-    """Opener of a bench, which reopens it without asking for knobs again. Use it in a ``with`` statement."""
+    """Bench that can be reopened without asking for knobs again. Use it in a ``with`` statement."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)

@@ -24,7 +24,7 @@ class SteppedLevel(FixedSine):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["stepped_level"] = "stepped_level"
     lowest_vpp: AmplitudeVpp
-    """Lower bound of the levels. Reached only by whole steps down from ``amplitude_vpp`` [Vpp]."""
+    """Lower bound of the levels, included if whole steps down from ``amplitude_vpp`` reach it [Vpp]."""
     step_vpp: PositiveFloat
     """Difference of neighbouring levels [Vpp]; keep it small, because each change disturbs the motion."""
     direction: Direction = Direction.UP_THEN_DOWN

@@ -223,7 +223,7 @@ def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ..
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet, replacing an older sheet; raises ConfigurationError if ``path`` is no sheet."""
+    """Save a sheet over an older one, if any; raises ConfigurationError for a file of another kind."""
     if path.exists():
         load_knob_sheet(path)
     save_toml(sheet, path)

@@ -53,7 +53,7 @@ class BaseMotion:
 
 
 class BaseTracker:
-    """Integrator of the base acceleration, twice, each time with a second-order high-pass filter."""
+    """Double integrator of the base acceleration, with a second-order high-pass for each integration."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._to_velocity = _integrator(sample_rate_hz)

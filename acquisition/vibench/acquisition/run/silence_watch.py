@@ -191,7 +191,7 @@ class SilenceWatch:
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
     def begin(self, sample: int) -> None:
-        """Start the measurement of silence; the stop was noticed before the next sample."""
+        """Start the measurement of silence; the stop was noticed before sample number ``sample``."""
         self._begin, self._last_loud, self._residue_v = sample, sample - 1, inf
 
     def take(self, block: Block) -> None:
