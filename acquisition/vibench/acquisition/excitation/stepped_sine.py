@@ -124,7 +124,7 @@ class FrequencySteps(AbstractExcitation):
 
 
 class SteppedSine(FrequencySteps):
-    """A list of frequencies; each is played until the motion has settled, then recorded as a segment.
+    """A list of frequencies; at each, the motion settles and is then recorded as a separate segment.
 
     The phase is continuous from one frequency to the next and the amplitude is constant. The specimen
     therefore stays on its branch.

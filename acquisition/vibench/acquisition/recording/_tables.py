@@ -39,7 +39,7 @@ class EventKind(StrEnum):
 
 
 REJECTED = "average rejected"
-"""Text of a mark that excludes from the results the last noise realisation begun before the mark."""
+"""Text of a mark that excludes from the results the last noise realisation that began earlier."""
 
 
 @dataclass(frozen=True)
