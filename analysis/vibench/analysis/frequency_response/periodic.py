@@ -33,7 +33,7 @@ _CONVERGED = 1e-9
 _LARGEST_OFFSET = 200e-6
 """Largest relative offset between two clocks, for oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
-"""Minimum share of the mean power of a drive's periods that is in the mean period if the drive repeats."""
+"""Minimum ratio of the power of the mean period to the mean power of all periods if the drive repeats."""
 
 
 @dataclass(frozen=True)
