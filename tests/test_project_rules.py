@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_612,
-    "analysis": 33_487,
-    "cli": 5_116,
-    "extensions": 2_679,
-    "gui": 12_146,
+    "acquisition": 28_272,
+    "analysis": 33_159,
+    "cli": 5_081,
+    "extensions": 2_617,
+    "gui": 12_099,
     "native": 6_625,
-    "sim": 20_328,
-    "studies": 3_224,
-    "virtual_rig": 6_977,
+    "sim": 20_266,
+    "studies": 3_205,
+    "virtual_rig": 6_949,
 }
 """Lines of Python, stubs, templates and C++, without the C++ test program; budgets only decrease."""
 
