@@ -79,7 +79,7 @@ def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
             (usb, "import pyvisa", f'generator = {opened}("{rig.visa_resource}")'),
         ),
         (
-            f"The generator, for any other program: {rig.socket_resource}, each line ending in a newline:",
+            f"The generator at {rig.socket_resource}, for other programs (end each line with a newline):",
             ("import pyvisa", f'generator = {opened}("{rig.socket_resource}", {ends})'),
         ),
     )

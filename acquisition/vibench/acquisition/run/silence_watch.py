@@ -268,7 +268,7 @@ class DriveGuard(ClosedOnLeaving):
         self._is_heard = is_heard
         reason = (
             f"the run read no samples for {STANDSTILL_BLOCKS * BLOCK_S:g} s; its output was switched off. "
-            "Find what slows down this computer or its disk, then start again"
+            "Find out what slows down this computer or its disk, then start again"
         )
         self._standstill = StopRequest(Cause.FAULT, StopLevel.OFF, reason)
         self._blocks = self._seen = 0

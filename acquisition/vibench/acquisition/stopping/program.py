@@ -48,7 +48,7 @@ def engines_folder() -> Path:
 
 
 class KeptStops:
-    """Stop files addressed to one process."""
+    """The stop files that are addressed to one process."""
 
     def __init__(
         self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path

@@ -174,7 +174,7 @@ class OrbitSigns:
 
     @property
     def has_pair_on_circle(self) -> bool:
-        """Whether the pair of Floquet multipliers whose product is closest to one is complex."""
+        """Whether the two Floquet multipliers with the product closest to 1 are a complex pair."""
         pairs = list(itertools.combinations(self.multipliers, 2))
         first, _ = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
         return bool(abs(first.imag) > COMPLEX_PART)

@@ -278,7 +278,7 @@ def solve_closed_form(scene: Scene, motion: LinearMotion, question: Question) ->
     if Observable.SPECTRUM in scene.observe:
         found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
-        # End after whole drive periods, as integrated motions do.
+        # End after a whole number of drive periods, as integrated motions do.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         found = replace(found, duration_s=duration_s, final_state=state_of(motion.state(duration_s)))
     return found

@@ -163,7 +163,7 @@ def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> 
 
 def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
     """Return the modal form for undamped modes that are coupled by damping."""
-    # In the coordinates q and q' / omega, the condition number stays small if slow and fast modes are mixed.
+    # In the coordinates q and q' / omega, slow and fast modes together do not raise the condition number.
     values, vectors = np.linalg.eig(
         np.block(
             [
