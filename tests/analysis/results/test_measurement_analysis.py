@@ -174,6 +174,16 @@ def test_a_scale_that_makes_the_response_absurd_is_reported(dwell_file, role, fa
     assert "check the scales or sensitivities of m0_velocity and base_acceleration" in found.text
 
 
+def test_a_small_force_is_not_taken_for_a_wrong_scale(dwell_file):
+    facts = analysis_of(dwell_file("weak")).facts
+    level = facts.level("m0_velocity")
+    small = replace(level.envelope, lower=1e-5 * level.envelope.lower, upper=1e-5 * level.envelope.upper)
+    force = replace(level, header=replace(level.header, role="base_force", quantity="force"), envelope=small)
+    levels = tuple(force if each is level else each for each in facts.channels)
+    found = measurement_checks(replace(facts, channels=levels, response="base_force"))
+    assert "Scales" not in {each.what for each in found}
+
+
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
 def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
     facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})

@@ -198,8 +198,7 @@ def _late(facts: RecordingFacts) -> Iterator[Check]:
 
 
 def _ranges(facts: RecordingFacts) -> Iterator[Check]:
-    weak = [each for each in facts.channels if each.share_of_range < _LEAST_SHARE_OF_RANGE]
-    for each in weak:
+    for each in (one for one in facts.channels if one.share_of_range < _LEAST_SHARE_OF_RANGE):
         text = f"{each.header.role} used {100 * each.share_of_range:.2g} % of its range; a smaller range fits"
         yield Check("Range", Verdict.NOTE, text)
 
@@ -208,7 +207,8 @@ def _scales(facts: RecordingFacts) -> Iterator[Check]:
     base, response = (facts.level(role) for role in (BASE, facts.response))
     order = {"velocity": 1, "displacement": 2}.get(response.header.quantity, 0)
     low, high = ((2 * pi * hz) ** order * response.span for hz in facts.measurement.excitation.band_hz)
-    if low > _FARTHEST * base.span > 0 or high * _FARTHEST < base.span:
+    is_absurd = low > _FARTHEST * base.span > 0 or high * _FARTHEST < base.span
+    if is_absurd and response.header.quantity != "force":
         text = (
             f"the mass moved about {low / base.span:.2g} times as far as the base; check the scales or "
             f"sensitivities of {facts.response} and {BASE}"
