@@ -105,7 +105,7 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
 def envelope_deviation(signal: Vector, period: float) -> float:
     """Return the relative rms deviation of a signal's fundamental from its mean and drift.
 
-    ``signal`` has at least about twenty periods, shape (samples,); ``period`` is that of the drive [samples].
+    ``signal`` spans about twenty drive periods or more, shape (samples,); ``period`` is one period [samples].
     """
     half = round(_HALF * period)
     turn = np.exp(-2j * np.pi * np.arange(len(signal)) / period)

@@ -238,7 +238,7 @@ def _silent(patience_s: float) -> EngineSilent:
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:
-    """Return an engine's error as an instance of its own class, or as EngineError if that is unknown."""
+    """Return an engine's error in its own class, or as EngineError if that class is unknown."""
     known = getattr(errors, kind, None)
     if isinstance(known, type) and issubclass(known, AcquisitionError):
         return known(sentence)

@@ -1,4 +1,4 @@
-"""Checks of what a command needs from the installation and the computer; errors say what to do."""
+"""Check that installation and computer provide what a command needs; errors say what to do."""
 
 import sys
 from collections.abc import Callable, Mapping

@@ -105,8 +105,8 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without errors and without other starts.
 
-    The motion is that of `solve_scene`, found in a third of the time or less. Chaos is integrated as long as
-    the scene's duration allows. With an automatic duration the run ends after whole drive periods.
+    The motion equals that of `solve_scene`, at a third of its computing time or less. Chaos is integrated as
+    long as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """
