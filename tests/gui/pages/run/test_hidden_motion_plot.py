@@ -1,6 +1,7 @@
 """The Run page's plot of the hidden motion estimated by a live twin."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from vibench.acquisition.engine import (
     TwinSwitch,
 )
 from vibench.acquisition.plan import RunState
+from vibench.analysis.live._view import SweepHistory
 from vibench.gui.pages.run.live_plots import HiddenMotionPlot, sweep_history
 from vibench.gui.pages.run.run_page import WatchCard
 
@@ -120,3 +122,11 @@ def test_averages_are_counted_and_the_current_average_can_be_rejected(context, q
 def test_response_ii_is_drawn_beside_its_prediction(context):
     plot = sweep_history(context.theme)
     assert set(plot.measured) <= set(plot.predicted)
+
+
+def test_a_full_history_still_shows_new_points(context):
+    plot = sweep_history(context.theme)
+    rows = np.arange(7 * 50.0).reshape(7, 50) + 1.0
+    for columns in (rows[:, :40], rows[:, 10:]):
+        plot.show_view(SimpleNamespace(history=lambda columns=columns: SweepHistory(*columns)))
+    assert plot.measured["response_i"].getData()[0] == pytest.approx(rows[1, 10:])

@@ -44,15 +44,16 @@ class SweepPlot(QWidget):
         self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], fill_opacity=0.15))
         self.predicted: Curves = {}
         self.measured: Curves = {}
-        self._shown = 0
+        self._newest_s: float | None = None
         fill_box(QVBoxLayout(self), plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw all responses measured so far, in the order of measurement."""
         history = view.history()
-        if len(history.time_s) == self._shown:
+        newest_s = history.time_s[-1] if len(history.time_s) else None
+        if newest_s == self._newest_s:
             return
-        self._shown = len(history.time_s)
+        self._newest_s = newest_s
         for name, curve in self.measured.items():
             curve.setData(history.frequency_hz, getattr(history, name))
 
@@ -63,7 +64,7 @@ class SweepPlot(QWidget):
 
     def clear(self) -> None:
         """Remove the measured points."""
-        self._shown = 0
+        self._newest_s = None
         for curve in self.measured.values():
             curve.clear()
 
