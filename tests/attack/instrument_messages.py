@@ -80,8 +80,8 @@ def broken_usb(chance: random.Random) -> tuple[str, bytes]:
         case "BulkIn":
             frame = struct.pack(">II", chance.choice(EDGES) % 2**32, chance.choice((0, 1, 2000, 2**32 - 1)))
         case "Control":
-            numbers = (chance.choice(EDGES) % 2**16 for _ in range(3))
-            frame = struct.pack(">BBHHH", 0xA1, chance.choice((1, 2, 3, 4, 5, 6, 7, 64, 128, 160)), *numbers)
+            numbers = (chance.choice(EDGES) % 2**16 for _ in range(2))
+            frame = struct.pack(">BHH", chance.choice((1, 2, 3, 4, 5, 6, 7, 64, 128, 160)), *numbers)
         case _:
             frame = bytes([chance.choice((0x81, 0x02, 0x83, 0))])
     return USB + method, mutate_bytes(frame, chance) if chance.random() < 0.4 else frame

@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition import InstrumentLost
 from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.usb.bus import RemoteUsbDevice, usb_service
-from vibench.virtual_rig.usb.usbtmc import Setup, UsbTmcInstrument
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 
 class Rig:
@@ -49,7 +49,7 @@ def test_the_proxy_passes_bulk_and_control_transfers_unchanged(rig, proxy):
     proxy.bulk_out(bytes([1, 1, 254, 0, 5, 0, 0, 0, 1, 0, 0, 0]) + b"*OPC?\0\0\0")
     proxy.bulk_out(bytes([2, 2, 253, 0, 64, 0, 0, 0, 0, 0, 0, 0]))
     assert proxy.bulk_in(64, 1000)[12:14] == b"1\n"
-    assert proxy.control(Setup(0xA2, 3, 5, 0x82, 2)) == bytes([0x81, 0])
+    assert proxy.control(3, 5, 2) == bytes([0x81, 0])
 
 
 def test_the_proxy_raises_the_errors_of_a_timeout_and_of_a_stall(proxy):

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.usb.usbtmc import Setup, UsbTmcInstrument
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 TIMEOUT_MS = 2000
-CLASS_IN_INTERFACE, CLASS_IN_ENDPOINT = 0xA1, 0xA2
 
 
 class Host:
@@ -43,8 +42,8 @@ class Host:
         self.write(message)
         return self.read()[0]
 
-    def control(self, request, value=0, length=64, kind=CLASS_IN_INTERFACE):
-        return self.device.control(Setup(kind, request, value, 0, length))
+    def control(self, request, value=0, length=64):
+        return self.device.control(request, value, length)
 
 
 @given(st.integers(1, 40))
@@ -109,14 +108,14 @@ def test_an_aborted_read_ends_with_a_short_packet_and_leaves_the_reply():
     host.generator.delay_next_reply(1.0)
     host.write(b"*OPC?")
     host.request(100)
-    assert host.control(3, value=host.tag, length=2, kind=CLASS_IN_ENDPOINT) == bytes([1, host.tag])
+    assert host.control(3, value=host.tag, length=2) == bytes([1, host.tag])
     assert host.device.bulk_in(64, TIMEOUT_MS) == b""
-    assert host.control(4, length=8, kind=CLASS_IN_ENDPOINT)[0] == 1
+    assert host.control(4, length=8)[0] == 1
     assert host.read()[0] == b"1\n"
 
 
 def test_aborting_a_read_that_was_not_started_is_refused():
-    assert Host().control(3, value=9, length=2, kind=CLASS_IN_ENDPOINT)[0] == 0x81
+    assert Host().control(3, value=9, length=2)[0] == 0x81
 
 
 def test_capabilities_state_488_2_without_remote_control_or_trigger():

@@ -31,7 +31,7 @@ import usb.util
 from vibench.acquisition import ConfigurationError, InstrumentLost
 from vibench.acquisition.rig import TOKEN_KEY, token_from_env
 
-from .usbtmc import BULK_IN, BULK_OUT, Identification, Setup, UsbTmcInstrument
+from .usbtmc import BULK_IN, BULK_OUT, NEVER_MS, Identification, UsbTmcInstrument
 
 # A USB cable through the network: a device served over gRPC, and its proxy on a bus. Methods take and return
 # bytes; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
@@ -41,11 +41,10 @@ SERVICE = "vibench.virtual.UsbDevice"
 CONNECT_TIMEOUT_S = 5.0
 NETWORK_MARGIN_S = 30.0
 """Time beyond the transfer's own timeout after which the device counts as lost [s]."""
-_NEVER_MS = 2**32 - 1
 
 _ERRNO = struct.Struct(">i")
 _READ = struct.Struct(">II")
-_SETUP = struct.Struct(">BBHHH")
+_CONTROL = struct.Struct(">BHH")
 
 _Method = Callable[[bytes], bytes]
 
@@ -61,7 +60,7 @@ def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
         "Identify": lambda _: json.dumps(astuple(device.identification)).encode(),
         "BulkOut": bulk_out,
         "BulkIn": lambda request: device.bulk_in(*_READ.unpack(request)),
-        "Control": lambda request: device.control(Setup(*_SETUP.unpack(request))),
+        "Control": lambda request: device.control(*_CONTROL.unpack(request)),
     }
     handlers = {
         name: grpc.unary_unary_rpc_method_handler(_handler(name, act)) for name, act in methods.items()
@@ -114,9 +113,9 @@ class RemoteUsbDevice:
         """Receive one transfer from the device."""
         return self._call("BulkIn", _READ.pack(length, timeout_ms), timeout_ms)
 
-    def control(self, setup: Setup) -> bytes:
+    def control(self, request: int, value: int, length: int) -> bytes:
         """Execute a class request of the device."""
-        return self._call("Control", _SETUP.pack(*astuple(setup)))
+        return self._call("Control", _CONTROL.pack(request, value, length))
 
     def close(self) -> None:
         """Close the connection; later transfers fail with ENODEV. Allowed at any time."""
@@ -127,7 +126,7 @@ class RemoteUsbDevice:
 
     def _call(self, name: str, request: bytes, timeout_ms: int = 0) -> bytes:
         """Call a method of the device; a lost server or connection counts as a disconnected device."""
-        deadline_s = None if timeout_ms == _NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
+        deadline_s = None if timeout_ms == NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
         try:
             answer = self._method(name)(request, timeout=deadline_s, metadata=self._metadata)
         except (grpc.RpcError, ValueError) as error:  # ValueError: the gRPC channel was closed on this side
@@ -320,18 +319,17 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         bmRequestType: int,
         bRequest: int,
         wValue: int,
-        wIndex: int,
+        wIndex: int,  # noqa: ARG002 - there is one interface
         data: array,  # type: ignore[type-arg]
         timeout: int,  # noqa: ARG002 - control transfers are instantaneous
     ) -> int:
         """Answer requests for string descriptors, and pass class requests to the device."""
         device = self._present(dev_handle)
-        setup = Setup(bmRequestType, bRequest, wValue, wIndex, len(data))
         incoming = usb.util.ctrl_direction(bmRequestType) == usb.util.CTRL_IN
         if bmRequestType & _REQUEST_TYPE_MASK == usb.util.CTRL_TYPE_STANDARD:
-            return _fill(data, _standard_reply(device, setup))
+            return _fill(data, _standard_reply(device, bRequest, wValue)[: len(data)])
         with _usb_errors():
-            reply = device.control(setup)  # no class request of pyvisa carries data
+            reply = device.control(bRequest, wValue, len(data))  # no class request of pyvisa carries data
         return _fill(data, reply) if incoming else len(data)
 
     def _present(self, handle: _Handle) -> UsbDevice:
@@ -342,15 +340,15 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         return handle.port.device
 
 
-def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
+def _standard_reply(device: UsbDevice, request: int, value: int) -> bytes:
     """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall other requests, which PyUSB does not use."""
-    kind, index = divmod(setup.value, 256)
+    kind, index = divmod(value, 256)
     found = device.identification
     texts = {_MAKER: found.maker, _PRODUCT: found.product, _SERIAL: found.serial}
     bodies = {0: _ENGLISH} | {number: text.encode("utf-16-le") for number, text in texts.items()}
-    if setup.request != _GET_DESCRIPTOR or kind != usb.util.DESC_TYPE_STRING or index not in bodies:
+    if request != _GET_DESCRIPTOR or kind != usb.util.DESC_TYPE_STRING or index not in bodies:
         raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
-    return (bytes([len(bodies[index]) + 2, kind]) + bodies[index])[: setup.length]
+    return bytes([len(bodies[index]) + 2, kind]) + bodies[index]
 
 
 def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]

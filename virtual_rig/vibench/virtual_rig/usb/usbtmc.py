@@ -43,17 +43,6 @@ class Identification:
         return f"USB0::0x{self.vendor_id:04X}::0x{self.product_id:04X}::{self.serial}::INSTR"
 
 
-@dataclass(frozen=True)
-class Setup:
-    """The setup packet of a control transfer (USB 2.0, 9.3)."""
-
-    request_type: int
-    request: int
-    value: int
-    index: int
-    length: int
-
-
 AFG1022_IDS = 0x0699, 0x0353
 """USB vendor and product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
@@ -173,13 +162,13 @@ class UsbTmcInstrument:
             self._flight.request = None
             return self._hand_over(length)
 
-    def control(self, setup: Setup) -> bytes:
-        """Answer a class request (USBTMC 4.2.1)."""
+    def control(self, request: int, value: int, length: int) -> bytes:
+        """Answer a class request (USBTMC 4.2.1) with at most ``length`` bytes."""
         with self._lock:
             self._check_cable()
-            if setup.request not in _REQUESTS:
+            if request not in _REQUESTS:
                 _fail(errno.EPIPE)
-            return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
+            return _REQUESTS[request](self, value & BYTE)[:length]
 
     # Internal functions
 
