@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.virtual_rig.world.conversion import EARLIEST_STEPS, GROUP_DELAY_SAMPLES, decimator, history_steps
+from vibench.virtual_rig.world.conversion import EARLIEST_STEPS, GROUP_DELAY_SAMPLES, Decimator, history_steps
 
 RATIOS = [1.0, 2.0, 4.0, 62.0, 2.32, 7.9]
 
@@ -18,7 +18,7 @@ def decimated_sine(ratio, delay_steps, cycles_per_sample, count=300):
     cycles_per_step = cycles_per_sample / ratio
     history = history_steps(ratio, delay_steps)
     means = means_of_a_sine(cycles_per_step, -history, history + int(np.ceil(count * ratio)))
-    samples = decimator(ratio, 0, delay_steps).convert(means, -history, 0, count)
+    samples = Decimator(ratio, 0, delay_steps).convert(means, -history, 0, count)
     steps = (np.arange(count) + 1 - GROUP_DELAY_SAMPLES) * ratio - delay_steps
     return samples, np.sin(2 * np.pi * cycles_per_step * steps)
 
@@ -48,14 +48,14 @@ def test_aliases_are_suppressed_by_more_than_80_db(ratio, cycles_per_sample):
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_decimation_keeps_a_constant_unchanged(ratio):
     history = history_steps(ratio, 0.0)
-    samples = decimator(ratio, 0, 0.3).convert(np.full(history + 1000, 2.5), -history, 0, int(1000 / ratio))
+    samples = Decimator(ratio, 0, 0.3).convert(np.full(history + 1000, 2.5), -history, 0, int(1000 / ratio))
     assert samples == pytest.approx(2.5, rel=1e-13)
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 300.0])
 def test_decimated_samples_use_no_future_input_and_miss_none(ratio, delay_steps):
-    filtered = decimator(ratio, 1000, delay_steps)
+    filtered = Decimator(ratio, 1000, delay_steps)
     assert filtered.first_step(0) >= 1000 - history_steps(ratio, delay_steps)
     for sample in range(50):
         last_step_known = 1000 + int(np.ceil((sample + 1) * ratio)) - 1
@@ -67,7 +67,7 @@ def test_decimated_samples_use_no_future_input_and_miss_none(ratio, delay_steps)
 def test_decimated_samples_do_not_depend_on_the_block_size(ratio, sizes):
     history, count = history_steps(ratio, 0.2), sum(sizes)
     means = np.random.default_rng(1).standard_normal(history + int(np.ceil(count * ratio)) + 1)
-    filtered = decimator(ratio, 0, 0.2)
+    filtered = Decimator(ratio, 0, 0.2)
     whole = filtered.convert(means, -history, 0, count)
     position, parts = 0, []
     for size in sizes:

@@ -2,8 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from math import ceil, floor
 
 import numpy as np
@@ -45,62 +43,46 @@ EARLIEST_STEPS = -4.0
 """Smallest channel delay for which the filter needs no future means [steps]; negative for an advance."""
 
 
-@dataclass(frozen=True)
 class Decimator:
     """Filter that computes samples of one channel from means over the world's steps."""
 
-    ratio: float
-    """Number of time steps per sample; the computation is faster for whole numbers."""
-    start_step: int
-    delay_steps: float
-    """Part of the sensor's delay that is not yet included in the means."""
-    table: FloatArray
-    """Shape (rows, weights): one row for an integer ratio, else one more than the fractions of a step."""
+    def __init__(self, ratio: float, start_step: int, delay_steps: float) -> None:
+        """Create a filter with ``ratio`` steps per sample; it is faster for integer ratios.
 
-    @property
-    def reach(self) -> int:
+        ``delay_steps`` is the part of the sensor's delay that is not yet included in the means.
+        """
+        self._ratio = ratio
+        self._delay_steps = max(delay_steps, EARLIEST_STEPS)
+        centre = self._centre(0)
+        if ratio == round(ratio):
+            fractions = np.array([centre - floor(centre)])
+        else:
+            rows = ceil(_PHASES_PER_SAMPLE / max(ratio, 1.0))
+            fractions = np.arange(rows + 1) / rows
+        table = _weights(ratio, fractions)
+        self.reach = int(table.shape[1])
         """Number of filter weights per sample."""
-        return int(self.table.shape[1])
+        self._oldest = start_step + _half_width_steps(ratio) + 2 - self.reach
+        self._work: Structure = native_engine().new(
+            "Decimation", table=table, reach=self.reach, ratio=ratio, begin=self._centre(-1)
+        )
 
-    def centre(self, sample: int) -> float:
+    def _centre(self, sample: int) -> float:
         """Return the position of a sample in steps, relative to the middle of the first mean."""
-        group_delay = GROUP_DELAY_SAMPLES * max(self.ratio, 1.0)
-        return (sample + 1) * self.ratio - group_delay - self.delay_steps - 0.5
+        group_delay = GROUP_DELAY_SAMPLES * max(self._ratio, 1.0)
+        return (sample + 1) * self._ratio - group_delay - self._delay_steps - 0.5
 
     def first_step(self, sample: int) -> int:
         """Return the number of the oldest step that a sample needs."""
-        return self.start_step + floor(self.centre(sample)) + self._newest_offset - self.reach + 1
-
-    @property
-    def _newest_offset(self) -> int:
-        return _half_width_steps(self.ratio) + 1
+        return self._oldest + floor(self._centre(sample))
 
     def convert(self, means: FloatArray, means_first_step: int, sample: int, count: int) -> FloatArray:
         """Return ``count`` samples from number ``sample`` on, shape (count,), from means."""
         engine, samples = native_engine(), np.empty(count)
-        origin = self.start_step - means_first_step + self._newest_offset - self.reach + 1
+        origin = self._oldest - means_first_step
         engine.fill(self._work, means=means, origin=origin, first=sample, samples=samples)
         engine.call("decimate", self._work)
         return samples
-
-    @cached_property
-    def _work(self) -> Structure:
-        """Filter data that all blocks of a conversion share."""
-        return native_engine().new(
-            "Decimation", table=self.table, reach=self.reach, ratio=self.ratio, begin=self.centre(-1)
-        )
-
-
-def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
-    """Return the filter of one channel, with ``ratio`` [steps per sample], start and delay [steps]."""
-    delay = max(delay_steps, EARLIEST_STEPS)
-    centre = Decimator(ratio, start_step, delay, np.zeros((1, 1))).centre(0)
-    if ratio == round(ratio):
-        fractions = np.array([centre - floor(centre)])
-    else:
-        rows = ceil(_PHASES_PER_SAMPLE / max(ratio, 1.0))
-        fractions = np.arange(rows + 1) / rows
-    return Decimator(ratio, start_step, delay, _weights(ratio, fractions))
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
@@ -233,7 +215,7 @@ class ConverterInput:
         """
         self.has_clipped = False
         self._stage = stage
-        self._filter = decimator(steps_per_sample, start_step, stage.cable.delay_steps)
+        self._filter = Decimator(steps_per_sample, start_step, stage.cable.delay_steps)
         self._noise_v = noise_v
         self._noise = noise
         self._count_v = volts_per_count(stage.configured.range_v)
