@@ -7,7 +7,6 @@ of the generator's own time, so block sizes do not affect the samples.
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +14,8 @@ from numpy.typing import NDArray
 from .phase_course import PhaseCourse, Samples, SteadyPhase
 from .scpi_message import Codes
 
-# Periodic shapes between -1 and 1 and their exact mean over any range of phase, in cycles. A mean over a
-# range of length zero is the value at that phase.
-
-
-class PeriodicShape(Protocol):
-    """A waveform with a period of one cycle."""
-
-    def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the means from phases ``start`` (0 <= start < 1) over ``span`` >= 0 cycles."""
+# Periodic shapes between -1 and 1, with their exact means from phases ``start`` (0 <= start < 1) over
+# ``span`` >= 0 cycles. A mean over no cycles is the value at that phase.
 
 
 @dataclass(frozen=True)
@@ -114,6 +106,8 @@ class Table:
         cycles, rest = np.divmod(points_passed, len(self.codes))
         return np.asarray(cycles * self._sums[-1] + self._sums[rest])
 
+
+PeriodicShape = Sine | Rectangle | Triangle | Table
 
 OUTPUT_RESISTANCE_OHM = 50.0
 NO_BLOCK = -1
