@@ -33,11 +33,6 @@ def task(daq):
     return task
 
 
-def test_the_reported_rate_is_the_actual_sampling_rate(task):
-    assert task.timing.samp_clk_rate == RATE_HZ
-    np.testing.assert_allclose(task.read(300), closed_form((1, 2, 3), 0, 300), atol=1e-9)
-
-
 @pytest.mark.parametrize("samples", [1, 512, 5120, 51200])
 def test_no_sample_is_lost_or_repeated_between_reads_of_any_size(task, samples):
     reader = AnalogMultiChannelReader(task.in_stream)
@@ -45,26 +40,6 @@ def test_no_sample_is_lost_or_repeated_between_reads_of_any_size(task, samples):
     for number in range(4):
         reader.read_many_sample(block, samples)
         np.testing.assert_allclose(block, closed_form((1, 2, 3), number * samples, samples), atol=1e-7)
-
-
-def test_a_long_run_keeps_its_read_position(daq):
-    task = daq.inputs("Dev1/ai1:2")
-    task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=51200)
-    reader = AnalogMultiChannelReader(task.in_stream)
-    reader.verify_array_shape = False
-    block = np.empty((2, 51200))
-    for _ in range(100):
-        reader.read_many_sample(block, 51200)
-    np.testing.assert_allclose(block, closed_form((1, 2), 99 * 51200, 51200, 51200.0), atol=1e-7)
-
-
-def test_two_runs_of_the_simulated_daq_are_equal_bit_for_bit(connect):
-    runs = []
-    for _ in range(2):
-        daq = connect()
-        task = daq.inputs("cDAQ1Mod1/ai0:1", 51200)
-        runs.append(np.hstack([task.read(700), task.read(READ_ALL_AVAILABLE)]))
-    assert np.array_equal(*runs)
 
 
 def test_samples_have_the_requested_layout(task, daq):

@@ -9,7 +9,6 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError, DaqReadError
 
 from tests.virtual_rig.conftest import daq_error, signal
-from vibench.virtual_rig.daqmx.rig import WallPace
 
 RATE_HZ, SAMPLES, BEFORE = 10_000.0, 300, 120
 
@@ -68,25 +67,6 @@ def test_a_task_waiting_for_its_trigger_can_be_stopped(daq, task):
     task.stop()
     reader.join(20.0)
     assert caught == [DAQmxErrors.RUNTIME_ABORTED_ROUTING]
-
-
-def test_a_reference_trigger_in_real_time_waits_for_its_trigger_line(connect):
-    daq = connect(WallPace(speed=20.0))
-    task = daq.inputs("Dev1/ai1", RATE_HZ, samples=SAMPLES)
-    by_line(task)
-    task.start()
-    stop = threading.Event()
-
-    def raise_line():
-        while not stop.wait(0.05):
-            daq.server.edge("/Dev1/PFI1")
-
-    raiser = threading.Thread(target=raise_line)
-    raiser.start()
-    volts = task.read(SAMPLES)
-    stop.set()
-    raiser.join()
-    assert np.std(volts) > 1.0
 
 
 def test_unsupported_reference_triggers_are_refused(daq, task):

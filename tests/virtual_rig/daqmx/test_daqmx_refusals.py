@@ -32,13 +32,6 @@ def test_a_device_in_use_is_refused_with_the_name_of_its_task(daq, task):
     rival.start()
 
 
-def test_inputs_and_outputs_of_one_device_are_independent(daq, task):
-    task.start()
-    output = daq.outputs("Dev1/ao0", 1)
-    output.timing.cfg_samp_clk_timing(1000)
-    output.write(np.zeros(1000), auto_start=True)
-
-
 def test_a_task_without_channels_cannot_be_started_or_timed(daq):
     empty = daq.task()
     with daq_error(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK):
@@ -57,14 +50,6 @@ def test_a_running_task_cannot_be_changed(task):
     ):
         with daq_error(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING):
             change()
-
-
-def test_a_cleared_task_is_refused_as_invalid(daq):
-    task = Task("short", grpc_options=daq.options)
-    interpreter, handle = task._interpreter, task._handle
-    task.close()
-    with daq_error(DAQmxErrors.INVALID_TASK):
-        interpreter.start_task(handle)
 
 
 def test_a_second_task_of_the_same_name_is_refused_or_attached_as_the_grpc_option_says(daq, task):

@@ -2,11 +2,10 @@
 
 import threading
 
-import grpc
 import numpy as np
 import pytest
 from nidaqmx import Task
-from nidaqmx.constants import WAIT_INFINITELY, AcquisitionType
+from nidaqmx.constants import WAIT_INFINITELY
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
@@ -22,31 +21,6 @@ def restart(daq):
     gone = ServerGone()
     daq.server.faults.add(gone)
     daq.server.faults.remove(gone)
-
-
-def test_tasks_of_a_disconnected_client_remain_until_the_restart(daq):
-    leaked = Task("leaked", grpc_options=daq.options)
-    leaked.ai_channels.add_ai_voltage_chan("Dev1/ai0")
-    leaked.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
-    leaked.start()
-    leaked._close_on_exit, leaked._handle = False, None  # the client is gone, but its task remains
-    with Task("rival", grpc_options=daq.options) as rival:
-        rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
-        with pytest.raises(DaqError, match="held by task leaked"):
-            rival.start()
-    restart(daq)
-    task = daq.inputs("Dev1/ai0")
-    task.start()
-
-
-def test_a_second_grpc_service_can_share_the_port(connect):
-    echo = grpc.method_handlers_generic_handler(
-        "rig.Echo", {"Say": grpc.unary_unary_rpc_method_handler(lambda request, context: request[::-1])}
-    )
-    daq = connect(handlers=(echo,))
-    say = daq.options.grpc_channel.unary_unary("/rig.Echo/Say")
-    assert say(b"abc") == b"cba"
-    daq.task()
 
 
 def test_messages_of_many_megabytes_are_accepted(daq):
