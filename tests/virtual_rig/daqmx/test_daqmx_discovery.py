@@ -40,12 +40,6 @@ def test_missing_device_features_are_refused_by_name(system):
         _ = system.devices["Dev1"].pci_bus_num
 
 
-def test_a_device_can_be_given_the_name_in_a_configuration(connect):
-    daq = connect(catalogue=catalogue_with("NI 9234", "cDAQ2Mod5"))
-    system = System.remote(daq.options)
-    assert system.devices["cDAQ2Mod5"].product_type == "NI 9234"
-
-
 @pytest.mark.parametrize(("product", "name"), [("NI 9999", "Dev1"), ("NI 9234", "dev1")])
 def test_a_simulated_system_with_an_impossible_device_is_refused(product, name):
     with pytest.raises(ConfigurationError, match="nothing was started"):

@@ -14,7 +14,7 @@ from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.recording._disk import meet_trouble
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
-from vibench.virtual_rig.rig.fault_script import DISK_FAULTS, FaultScript, PlayedFault
+from vibench.virtual_rig.rig.fault_script import DISK_FAULTS, PlayedFault
 from vibench.virtual_rig.world.wiring import Coupling, Input
 
 ROOT = Path(__file__).parents[3]
@@ -223,7 +223,3 @@ class TestEffects:
             bench.digitizer.start()
             heard = [np.std(bench.digitizer.read(512).volts[0]) > 0.05 for _ in range(10)]
         assert heard == [True] * 3 + [False] * 3 + [True] * 4
-
-
-def test_an_empty_script_causes_no_faults():
-    assert FaultScript().faults == ()

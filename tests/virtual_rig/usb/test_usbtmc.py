@@ -1,4 +1,3 @@
-import errno
 import struct
 
 import pytest
@@ -125,11 +124,13 @@ def test_capabilities_state_488_2_without_remote_control_or_trigger():
     assert answer[14] & 0b111 == 0b100
 
 
-@pytest.mark.parametrize("damage", [b"", b"\x01\x01\x01\x00" + bytes(8), b"\x63\x01\xfe\x00" + bytes(8)])
-def test_a_malformed_transfer_stalls_the_endpoint(damage):
+@pytest.mark.parametrize(
+    "damage", [b"", b"\1\1\1\0" + bytes(8), b"\x63\1\xfe\0" + bytes(8), b"\x80\1\xfe\0" + bytes(8)]
+)
+def test_a_malformed_transfer_or_trigger_stalls_the_endpoint(start):
     host = Host()
     with pytest.raises(BrokenPipeError):
-        host.device.bulk_out(damage)
+        host.device.bulk_out(start and start + bytes(8))
     assert host.ask(b"*OPC?") == b"1\n"
 
 
@@ -137,22 +138,3 @@ def test_a_malformed_transfer_stalls_the_endpoint(damage):
 def test_an_unsupported_class_request_stalls(request_number):
     with pytest.raises(BrokenPipeError):
         Host().control(request_number)
-
-
-def test_a_trigger_message_stalls_the_endpoint():
-    host = Host()
-    with pytest.raises(BrokenPipeError):
-        host.device.bulk_out(host.header(128, 0, 0))
-
-
-def test_a_pulled_cable_blocks_messages_and_the_output_continues():
-    host = Host()
-    host.write(b"OUTP ON")
-    host.device.pull_cable()
-    for transfer in (lambda: host.write(b"OUTP OFF"), host.read, lambda: host.control(7)):
-        with pytest.raises(OSError, match="No such device") as error:
-            transfer()
-        assert error.value.errno == errno.ENODEV
-    assert host.generator.execute(b"OUTP?").data == b"1\n"
-    host.device.plug_cable()
-    assert host.ask(b"OUTP?") == b"1\n"

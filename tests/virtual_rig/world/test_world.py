@@ -109,33 +109,16 @@ def test_a_different_seed_gives_different_noise():
         assert np.std(one[row]) == pytest.approx(np.std(two[row]), rel=0.1)
 
 
-def test_every_sample_is_an_exact_multiple_of_the_converter_step():
-    volts = World(RIG, Tone(260.0, 3.0)).sample(INPUTS, 51_200.0).read(5000)
-    for row, configured in zip(volts, INPUTS, strict=True):
-        count_v = volts_per_count(configured.range_v)
-        assert np.array_equal(np.rint(row / count_v) * count_v, row)
-        assert len(np.unique(row)) > 1000
-
-
-def test_an_input_beyond_its_range_clips_and_reports_one_overload():
+def test_an_input_beyond_its_range_clips_and_reports_its_overload_once():
     world = World(QUIET, Tone(100.0, 12.0))
     sampler = world.sample((Input("cDAQ1Mod1/ai0", 5.0, Coupling.DC),), 51_200.0)
     volts = sampler.read(5000)
     assert np.max(volts) == 5.0 - volts_per_count(5.0)
     assert np.min(volts) == -5.0
-    assert sampler.overload_flags().tolist() == [True]
+    assert [sampler.overload_flags().tolist() for _ in range(2)] == [[True], [False]]
     within = World(QUIET, Tone(100.0, 1.0)).sample(INPUTS, 51_200.0)
     within.read(5000)
     assert within.overload_flags().tolist() == [False] * 4
-
-
-def test_reading_the_overloads_clears_them():
-    world = World(QUIET, Silence())
-    sampler = world.sample((Input("cDAQ1Mod1/ai2", 5.0, Coupling.DC, 0.002),), 51_200.0)
-    sampler.read(100)
-    assert sampler.overload_flags()[0]
-    world.disconnect("cDAQ1Mod1/ai2")
-    assert not sampler.overload_flags()[0]
 
 
 def test_conversions_at_different_rates_agree_at_equal_times():
@@ -260,15 +243,6 @@ def test_threads_sharing_a_simulated_rig_read_the_same_samples():
         thread.join()
     assert np.array_equal(results[0], alone)
     assert np.array_equal(results[1], alone)
-
-
-def test_closing_a_conversion_twice_is_allowed():
-    world = World(QUIET, Silence())
-    sampler = world.sample(INPUTS, 51_200.0)
-    sampler.close()
-    sampler.close()
-    world.advance(0.1)
-    assert world.time_s == pytest.approx(0.1, abs=STEP_S)
 
 
 class BrokenTerminal:
