@@ -8,7 +8,7 @@ from nidaqmx.errors import DaqError
 
 from tests.virtual_rig.conftest import daq_error
 from vibench.acquisition import AcquisitionError
-from vibench.virtual_rig.daqmx import acquisition as _acquisition
+from vibench.virtual_rig.daqmx import streams
 from vibench.virtual_rig.daqmx.rig import WallPace
 
 GIANT = 1 << 33
@@ -42,7 +42,7 @@ class NoTiming:
 
 
 def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
-    monkeypatch.setattr(_acquisition, "MOST_SAMPLES", 50_000)
+    monkeypatch.setattr(streams, "MOST_SAMPLES", 50_000)
     task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()
     daq.server.let_pass(4.0)

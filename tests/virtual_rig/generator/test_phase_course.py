@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.phase_course import Spacing, SteadyPhase, SweptPhase
+from vibench.virtual_rig.generator.terminal_voltage import Spacing, SteadyPhase, SweptPhase
 
 DAY_S = 86_400.0
 TIMES = st.floats(0, DAY_S)

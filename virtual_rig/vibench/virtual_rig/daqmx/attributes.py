@@ -23,12 +23,11 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 
 from ..world.wiring import Coupling
-from .acquisition import Acquisition, check_memory
 from .calls import DaqmxSystem, Fields
-from .channels import OutputChannel
 from .data_calls import count_available, default_samples
-from .devices import AnalogInputs, Device
+from .devices import AnalogInputs, Device, OutputChannel
 from .errors import DaqmxRefusal, member, unsupported_value
+from .streams import Acquisition, check_memory
 from .tasks import Task, TaskState
 
 DRIVER_VERSION = (24, 8, 0)

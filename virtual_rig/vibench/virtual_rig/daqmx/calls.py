@@ -26,11 +26,10 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .acquisition import Acquisition, Stream
-from .channels import InputChannel, OutputChannel, channel_names
-from .devices import Device
+from .devices import Device, InputChannel, OutputChannel, channel_names
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
 from .rig import QUESTION_S, Rig
+from .streams import Acquisition, Stream
 from .tasks import Task, TdmsLog
 
 Fields = Mapping[str, object]

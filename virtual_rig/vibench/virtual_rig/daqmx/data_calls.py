@@ -12,10 +12,10 @@ from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType, Wavef
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from .acquisition import Acquisition, Stream, check_memory
 from .calls import Fields, TaskCall, deadline, pick
 from .errors import DaqmxRefusal, unsupported_value
 from .rig import QUESTION_S
+from .streams import Acquisition, Stream, check_memory
 from .tasks import Task
 
 

@@ -11,10 +11,9 @@ from nidaqmx.error_codes import DAQmxErrors
 from vibench.acquisition import AcquisitionError
 
 from ..world.world import World
-from .acquisition import Acquisition
 from .devices import Catalogue
 from .errors import DaqmxRefusal
-from .generation import Generation
+from .streams import Acquisition, Generation
 
 QUESTION_S = 0.1
 """Rig time that a query of progress adds when nothing else advances time [s].

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 
-from .acquisition import LEAST_PRETRIGGER, Acquisition, Timing, check_memory
-from .channels import Channel, InputChannel, OutputChannel
-from .devices import AnalogInputs, AnalogOutputs, Device, expand
+from .devices import AnalogInputs, AnalogOutputs, Channel, Device, InputChannel, OutputChannel, expand
 from .errors import DaqmxRefusal, unsupported_value
-from .generation import Generation, OutputBuffer
 from .rig import Rig
+from .streams import LEAST_PRETRIGGER, Acquisition, Generation, OutputBuffer, Timing, check_memory
 
 
 class TdmsLog:

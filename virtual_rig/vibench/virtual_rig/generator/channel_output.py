@@ -5,16 +5,20 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from operator import attrgetter
 
-from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase
 from .scpi_message import ArbitraryMemory, ErrorCode, ScpiError, mnemonic_matches
 from .terminal_voltage import (
     OUTPUT_RESISTANCE_OHM,
+    UHZ_PER_HZ,
     Burst,
     PeriodicShape,
+    PhaseCourse,
     Rectangle,
     Relay,
     Signal,
     Sine,
+    Spacing,
+    SteadyPhase,
+    SweptPhase,
     Table,
     Terminal,
     Timeline,

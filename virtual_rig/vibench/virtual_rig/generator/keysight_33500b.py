@@ -21,8 +21,8 @@ from .afg1022 import (
     without_mode,
 )
 from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
-from .phase_course import Spacing
 from .scpi_instrument import Command, Quirks, choice, number, setting
+from .terminal_voltage import Spacing
 
 _MIDDLE = 32_767
 HIGHEST_RATE_HZ = 250e6

@@ -1,14 +1,16 @@
-"""A running acquisition: the conversion, and the buffer between device and reader."""
+"""Running acquisitions and generations, and the buffers between program and device."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, SampleTimingType
+from nidaqmx.constants import AcquisitionType, AOIdleOutputBehavior, RegenerationMode, SampleTimingType
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..world.conversion import Conversion, SampleQueue
+from ..world.world import World
+from .devices import AnalogOutputs
 from .errors import DaqmxRefusal
 
 MOST_SAMPLES = 1 << 27
@@ -181,3 +183,134 @@ class Acquisition(Stream):
         if self._is_open:
             self._is_open = False
             self._sampler.close()
+
+
+LEAD_S = 0.005
+"""Lead of the samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
+
+
+class OutputBuffer:
+    """Samples written by a program and not yet used by the device, shape (channels, size) [V]."""
+
+    def __init__(self, channels: int, size: int = 0) -> None:
+        """Create a buffer; with ``size`` 0, the buffer grows with the samples written before the start."""
+        self.is_sized = size > 0
+        self.written = 0
+        self._ring = np.zeros((channels, size))
+
+    @property
+    def size(self) -> int:
+        """Size of the buffer in samples per channel."""
+        return int(self._ring.shape[1])
+
+    @property
+    def buffered(self) -> int:
+        """Number of samples in the buffer; a regeneration repeats them."""
+        return min(self.written, self.size)
+
+    def grow(self, count: int) -> None:
+        """Enlarge the buffer by ``count`` samples, before the start of a task without a set buffer size."""
+        self._ring = np.concatenate([self._ring, np.zeros((self._ring.shape[0], count))], axis=1)
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        """Append samples, which may overwrite the oldest; the caller has checked the space."""
+        at = (self.written + np.arange(volts.shape[1])) % self.size
+        self._ring[:, at] = volts
+        self.written += volts.shape[1]
+
+    def cyclic(self, first: int, count: int) -> NDArray[np.float64]:
+        """Return ``count`` samples from number ``first`` on; the filled part repeats endlessly."""
+        return self._ring[:, (first + np.arange(count)) % self.buffered]
+
+
+class Generation(Stream):
+    """A running generation: samples played, and samples that wait in the buffer and in the device."""
+
+    def __init__(
+        self,
+        world: World,
+        outputs: tuple[str, ...],
+        rate_hz: float,
+        began_s: float,
+        total: float,
+        buffer: OutputBuffer,
+        regeneration: RegenerationMode,
+        device: AnalogOutputs,
+    ) -> None:
+        super().__init__(rate_hz, began_s, total)
+        self.buffer = buffer
+        self.delivered = 0
+        self._world = world
+        self._outputs = outputs
+        self.repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
+        """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
+        self._idle = device.idle
+        self._memory = np.empty((len(outputs), 0))
+        """Number of samples in the device's memory; a repeated buffer is not transferred in advance."""
+        self._most_in_memory = 0 if self.repeats else device.memory
+        self._fetched = 0
+        self._recent = np.empty((len(outputs), 0))
+        self._is_open = True
+
+    def has_room(self, samples: int) -> bool:
+        """Return whether ``samples`` can be written now; a repeated buffer can always be rewritten."""
+        if self.repeats:
+            return True
+        self._fetch(self.delivered + self._most_in_memory)
+        return samples <= self.buffer.size - (self.buffer.written - self._fetched)
+
+    def time_of_room(self, samples: int) -> float:
+        """Return the rig time at which ``samples`` can be written [s]."""
+        left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
+        return self.time_of(max(0, left)) - LEAD_S
+
+    def prepare(self, until_s: float) -> None:
+        """Pass samples to the world, up to rig time ``until_s`` plus a lead."""
+        if not self._is_open:
+            return
+        wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)
+        count = int(min(wanted, self.total, self._end)) - self.delivered
+        if count <= 0:
+            return
+        self._fetch(self.delivered + count)
+        block, self._memory = self._memory[:, :count], self._memory[:, count:]
+        for output, volts in zip(self._outputs, block, strict=True):
+            self._world.play(output, volts, self.rate_hz)
+        self.delivered += count
+        kept = math.ceil(LEAD_S * self.rate_hz) + 1
+        self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
+
+    def _fetch(self, until: int) -> None:
+        count = int(min(until, self.total, self._end)) - self._fetched
+        if count > 0:
+            self._memory = np.concatenate([self._memory, self.buffer.cyclic(self._fetched, count)], axis=1)
+            self._fetched += count
+
+    @property
+    def _end(self) -> float:
+        return math.inf if self.repeats and self.buffer.buffered else self.buffer.written
+
+    def advance_to(self, now_s: float) -> None:
+        """Update the number of played samples at rig time ``now_s``, and detect an underflow."""
+        if not self._is_open:
+            return
+        due = self.due(now_s)
+        self.transferred = int(min(due, self.total, self.delivered))
+        if due > self.delivered and self.delivered < self.total:
+            self.failure = DaqmxRefusal(
+                DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, samples_written=0
+            )
+        if self.is_done:
+            self.close()
+
+    def close(self) -> None:
+        """End the generation, and discard the samples not yet played; allowed at any time."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        for output in self._outputs:
+            self._world.silence(output)
+        if self._idle is AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE and self.transferred:
+            last = max(0, self._recent.shape[1] - 1 - (self.delivered - self.transferred))
+            for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
+                self._world.play(output, volts, self.rate_hz)
