@@ -10,7 +10,6 @@ from nidaqmx.constants import (
     FillMode,
     SampleTimingType,
     TaskMode,
-    WaveformAttributeMode,
 )
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
@@ -124,13 +123,6 @@ def test_a_waveform_contains_samples_times_name_and_unit(task):
     assert [(w.channel_name, w.units) for w in waveforms] == [
         (f"cDAQ1Mod1/ai{n}", "Volts") for n in (1, 2, 3)
     ]
-
-
-def test_a_waveform_has_at_most_the_requested_number_of_samples(task):
-    task.in_stream.waveform_attribute_mode = WaveformAttributeMode.NONE
-    waveform = task.read_waveform(8)[0]
-    assert not waveform.timing.has_start_time
-    assert not waveform.extended_properties
 
 
 def test_restarting_a_task_begins_at_sample_zero(task):

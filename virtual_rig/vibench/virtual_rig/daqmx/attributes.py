@@ -17,7 +17,6 @@ from nidaqmx.constants import (
     ExcitationSource,
     ExcitationVoltageOrCurrent,
     RegenerationMode,
-    SampleTimingType,
     UsageTypeAI,
 )
 from nidaqmx.error_codes import DAQmxErrors
@@ -120,11 +119,6 @@ def _start_terminal(task: Task) -> str:
     return terminal
 
 
-def _set_rate(task: Task, rate_hz: float) -> None:
-    task.timing.requested_hz = rate_hz
-    task.timing.kind = SampleTimingType.SAMPLE_CLOCK
-
-
 def _running_acquisition(task: Task) -> Acquisition:
     """Return the running acquisition of a device with overload detection."""
     if not (isinstance(task.side, AnalogInputs) and task.side.detects_overloads):
@@ -183,7 +177,7 @@ TASK: Attributes = {
     "DEVICES": Attribute(lambda task: ", ".join(device.name for device in task.devices)),
 }
 TIMING: Attributes = {
-    "SAMP_CLK_RATE": Attribute(lambda task: task.rate_hz, _set_rate),
+    "SAMP_CLK_RATE": Attribute(lambda task: task.rate_hz),
     "SAMP_TIMING_TYPE": Attribute(lambda task: task.kind),
 }
 TRIGGER: Attributes = {
@@ -250,8 +244,8 @@ GROUPS = {
         "Device", lambda system, request: [system.rig.catalogue.device(request.device_name)], lambda _: DEVICE
     ),
     "Task": Group("Task", _task, lambda _: TASK),
-    "Timing": Group("Timing", _task, lambda _: TIMING, is_set_at_rest=True),
-    "Trig": Group("Trigger", _task, lambda _: TRIGGER, is_set_at_rest=True),
+    "Timing": Group("Timing", _task, lambda _: TIMING),
+    "Trig": Group("Trigger", _task, lambda _: TRIGGER),
     "Read": Group("Read", _task, lambda _: READ),
     "Write": Group("Write", _task, lambda _: WRITE),
     "Buffer": Group("Buffer", _task, lambda _: BUFFER, is_set_at_rest=True),

@@ -24,7 +24,7 @@ from nidaqmx.constants import (
     VoltageUnits,
 )
 from nidaqmx.error_codes import DAQmxErrors
-from session_pb2 import Session, SessionInitializationBehavior
+from session_pb2 import Session
 
 from .devices import Device, InputChannel, OutputChannel, channel_names
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
@@ -51,21 +51,15 @@ class DaqmxSystem:
         return self.tasks[name]
 
     def create(self, request: Any) -> Fields:
-        """Create a task, or attach to an existing task; an empty name selects an unused one."""
-        name, behavior = request.session_name, request.initialization_behavior
-        if behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_ATTACH_TO_EXISTING:
-            self.task(name)
-        exists = name in self.tasks
-        if (
-            exists
-            and behavior == SessionInitializationBehavior.SESSION_INITIALIZATION_BEHAVIOR_INITIALIZE_NEW
-        ):
+        """Create a task; an empty name selects an unused one. Programs cannot share a task (-200089)."""
+        name = request.session_name
+        if name in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
         if not name:
             name = f"_unnamedTask<{self._unnamed}>"
             self._unnamed += 1
-        self.tasks.setdefault(name, Task(name, self.rig))
-        return {"task": Session(name=name), "new_session_initialized": not exists}
+        self.tasks[name] = Task(name, self.rig)
+        return {"task": Session(name=name), "new_session_initialized": True}
 
     def clear(self, request: Any) -> Fields:
         """End a task and delete it."""

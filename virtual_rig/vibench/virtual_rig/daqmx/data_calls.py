@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from ni.protobuf.types.waveform_pb2 import DoubleAnalogWaveform
-from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType, WaveformAttributeMode
+from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
@@ -241,21 +241,18 @@ def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDA
 
 def _read_waveforms(task: Task, request: Any) -> Fields:
     reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
-    mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
-    waveforms = [_waveform(task, row, reading, mode) for row in range(len(task.inputs))]
+    waveforms = [_waveform(task, row, reading) for row in range(len(task.inputs))]
     return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
 
 
-def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMode) -> DoubleAnalogWaveform:
-    waveform = DoubleAnalogWaveform(y_data=reading.volts[row])
-    if WaveformAttributeMode.TIMING in mode:
-        part_s, whole_s = math.modf(task.rig.wall_s(reading.began_s))
-        waveform.t0.seconds = int(whole_s) + _SECONDS_1904_TO_1970
-        waveform.t0.fractional_seconds = int(part_s * 2**64)
-        waveform.dt = 1 / task.rate_hz
-    if WaveformAttributeMode.EXTENDED_PROPERTIES in mode:
-        waveform.attributes["NI_ChannelName"].string_value = task.inputs[row].name
-        waveform.attributes["NI_UnitDescription"].string_value = "Volts"
+def _waveform(task: Task, row: int, reading: Reading) -> DoubleAnalogWaveform:
+    """Return the samples of one channel with start time, interval, name and unit."""
+    waveform = DoubleAnalogWaveform(y_data=reading.volts[row], dt=1 / task.rate_hz)
+    part_s, whole_s = math.modf(task.rig.wall_s(reading.began_s))
+    waveform.t0.seconds = int(whole_s) + _SECONDS_1904_TO_1970
+    waveform.t0.fractional_seconds = int(part_s * 2**64)
+    waveform.attributes["NI_ChannelName"].string_value = task.inputs[row].name
+    waveform.attributes["NI_UnitDescription"].string_value = "Volts"
     return waveform
 
 
