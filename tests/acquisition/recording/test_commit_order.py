@@ -2,16 +2,16 @@
 
 import hashlib
 import os
-import random
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from itertools import chain, combinations, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis import HealthCheck, Phase, given, settings, strategies as st
 
-from vibench.acquisition import Overload, open_recording
+from vibench.acquisition import Overload, RecordingError, open_recording
 from vibench.acquisition.recording import RecordingState, RecordingWriter, part_of
 from vibench.acquisition.recording._disk import PositionedFile
 from vibench.acquisition.recording._preallocate import ITEM_BYTES, preallocate
@@ -132,11 +132,22 @@ def sectors_of(write):
 
 
 @pytest.mark.thorough
-def test_a_recording_opens_whatever_unsynced_writes_survive_a_power_cut(tmp_path, traced):
+@pytest.mark.parametrize("has_syncs", [True, False])
+def test_only_synced_recordings_open_whatever_unsynced_writes_survive_a_power_cut(
+    tmp_path, traced, has_syncs
+):
     places, empty, trace, truth = traced
+    trace = [each for each in trace if has_syncs or each is not None]
     cut_file = CutFile(tmp_path / "cut.h5.part", empty)
 
-    @settings(max_examples=80, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(
+        max_examples=80,
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate],
+        report_multiple_bugs=False,
+    )
     @given(st.data())
     def survives(data):
         cut = data.draw(st.integers(0, len(trace)), label="operations before the cut")
@@ -157,10 +168,8 @@ def test_a_recording_opens_whatever_unsynced_writes_survive_a_power_cut(tmp_path
             assert recording.samples >= durable
             assert recording.samples >= written_samples(places, synced) - BLOCK
 
-    try:
+    with closing(cut_file), nullcontext() if has_syncs else pytest.raises((AssertionError, RecordingError)):
         survives()
-    finally:
-        cut_file.close()
 
 
 def require_truth(recording, truth):
@@ -175,44 +184,6 @@ def require_truth(recording, truth):
         assert (overload.channel, overload.first_sample) == ("m0_velocity", 5 * BLOCK * number)
     if recording.state is RecordingState.COMPLETE:
         assert (recording.reason, recording.samples) == ("done", BLOCKS * BLOCK)
-
-
-@pytest.mark.thorough
-def test_the_sample_count_never_exceeds_the_data_after_a_power_cut(traced):
-    places, empty, trace, truth = traced
-    chance = random.Random(3)
-    for _ in range(400):
-        cut = chance.randrange(len(trace))
-        last_sync = max((at for at in range(cut) if trace[at] is None), default=0)
-        image = bytearray(empty)
-        for write in trace[:last_sync]:
-            if write is not None:
-                image[write[0] : write[0] + len(write[1])] = write[1]
-        durable = valid_samples(places, image)
-        for page, content in pages_of(trace[last_sync:cut], image).items():
-            if chance.random() < 0.5:
-                image[page * PAGE : page * PAGE + len(content)] = content
-        samples = valid_samples(places, image)
-        assert samples >= durable
-        for row, base in enumerate(places.channels):
-            counts = np.frombuffer(image, "<i4", samples, base)
-            np.testing.assert_array_equal(counts, truth[row, :samples])
-
-
-def test_the_power_cut_model_detects_missing_syncs(traced):
-    places, empty, trace, truth = traced
-    careless = [each for at, each in enumerate(trace) if each is not None or at == len(trace) - 1]
-    chance = random.Random(3)
-    lies = 0
-    for _ in range(100):
-        image = bytearray(empty)
-        for page, content in pages_of(careless[: chance.randrange(len(careless))], image).items():
-            if chance.random() < 0.5:
-                image[page * PAGE : page * PAGE + len(content)] = content
-        samples = valid_samples(places, image)
-        counts = np.frombuffer(image, "<i4", samples, places.channels[-1])
-        lies += not np.array_equal(counts, truth[-1, :samples])
-    assert lies > 0
 
 
 def test_no_structure_of_the_file_is_written_after_the_start(traced):
@@ -293,19 +264,3 @@ def names_after(operations, durable):
         else:
             names.pop(operands[0], None)
     return names
-
-
-def valid_samples(places, image):
-    return int.from_bytes(image[places.n_valid : places.n_valid + 8], "little")
-
-
-def pages_of(writes, image):
-    """Return the pages that the writes would leave in the cache, by page number."""
-    cached = bytearray(image)
-    touched = set()
-    for write in writes:
-        if write is not None:
-            offset, data = write
-            cached[offset : offset + len(data)] = data
-            touched.update(range(offset // PAGE, (offset + len(data) - 1) // PAGE + 1))
-    return {page: bytes(cached[page * PAGE : (page + 1) * PAGE]) for page in sorted(touched)}
