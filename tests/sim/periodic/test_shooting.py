@@ -45,6 +45,14 @@ def test_the_orbit_without_contact_is_the_linear_response():
     assert orbit.response_i == pytest.approx(linear, rel=1e-5)
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
+def test_the_largest_p_between_rigid_stops_is_the_gap_within_the_stated_error(restitution):
+    orbit = periodic_orbit(gong2025(3e-5, contact=f"rigid:{restitution}"), Harmonic(130.0, 20e-6))
+    assert orbit.impacts > 0
+    difference = abs(orbit.response_i[3] - 45e-6 / 20e-6)
+    assert difference < orbit.error * orbit.response_ii[3]
+
+
 def test_shooting_finds_an_orbit_from_a_distant_state():
     drive = Harmonic(130.0, 20e-6)
     known = periodic_orbit(SPECIMEN, drive)

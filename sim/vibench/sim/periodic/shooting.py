@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike
 from ..engine.run import start_motion
 from ..motion.integrate import Trajectory, integrate
 from ..motion.poincare import flow_derivative
+from ..motion.response import steady_response
 from ..specimen.accuracy import Accuracy
 from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Complex, Floats, Table, Vector, Y, Z
+from ..specimen.state import Complex, Table, Vector, Y, Z
 from ..specimen.stops import member
 from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
@@ -139,7 +140,7 @@ FLOW_ERROR = 1e-10
 """Assumed integration error in a period at reference accuracy, over the state's scale; ten times the measured
 error (docs/accuracy.md)."""
 SAMPLES = 4096
-"""Samples per drive period from which responses are computed."""
+"""Samples per drive period from which the responses of y and z are computed."""
 SETTLING_PERIODS = 400
 """Length, in drive periods, of the run from rest whose end is the default initial guess."""
 
@@ -163,7 +164,8 @@ class PeriodicOrbit:
     defect: float
     """Closure error: final minus initial state over the state's scale."""
     error: float
-    """Error bound over the fundamental of p: closure and integration error times |(map - I)^-1|."""
+    """Error bound of the motion, and of the responses of x and p, over the fundamental of p: closure and
+    integration error times |(map - I)^-1|."""
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
@@ -245,11 +247,15 @@ def _damped_step(
 def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
     """Return the periodic motion from ``state`` with its responses; ``gone`` is the scaled closure error."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = np.full((mapping.periods * SAMPLES, 6), math.nan)  # the responses are NaN if the run failed
-    moved[: len(run.states)] = run.states[: len(moved)]
-    waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
+    moved = np.full((mapping.periods * SAMPLES, 3), math.nan)  # the responses are NaN if the run failed
+    moved[: len(run.states)] = run.states[: len(moved), :3]
+    length_s = mapping.periods / drive.frequency_hz
+    seen = steady_response(mapping.specimen, drive, Accuracy.REFERENCE, length_s, length_s, state)
     derivative = mapping.derivative(state, drive)
-    lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
+    lines = np.array(
+        [seen.line_x_m, *(phasors_of(moved[:, k])[mapping.periods] for k in (Y, Z)), seen.line_p_m]
+    )
+    largest = [seen.largest_x_m, *np.abs(moved[:, [Y, Z]]).max(axis=0), seen.largest_p_m]
     defect = size_of(gone)
     found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)) and np.all(np.isfinite(lines)))
     return PeriodicOrbit(
@@ -258,33 +264,11 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
         state=state,
         signs=_signs(mapping, drive, state, np.nan_to_num(derivative), run),
         defect=defect,
-        error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / lines[3]),
-        response_i=_largest(waves, rates, 1.0 / (SAMPLES * drive.frequency_hz)) / drive.amplitude_m,
-        response_ii=lines / drive.amplitude_m,
+        error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / abs(lines[3])),
+        response_i=np.array(largest) / drive.amplitude_m,
+        response_ii=np.abs(lines) / drive.amplitude_m,
         outcome=ShootingEnd.CONVERGED if found else ShootingEnd.NO_ORBIT,
     )
-
-
-def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
-    """Return the largest magnitudes, shape (n,), of sampled periodic waves, (m, n), also between samples.
-
-    Two samples of a wave and of its rate define a Hermite cubic; its slope is zero at the extremes.
-    """
-    found = np.abs(waves).max(axis=0)
-    ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
-    for column in range(waves.shape[1]):
-        turns = np.flatnonzero(rates[:, column] * rates_ahead[:, column] < 0.0)
-        start, end = waves[turns, column], ahead[turns, column]
-        first, last = step_s * rates[turns, column], step_s * rates_ahead[turns, column]
-        cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
-        with np.errstate(divide="ignore", invalid="ignore"):
-            root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
-            # Both extremes of each cubic, without cancellation; extremes outside the interval are ignored.
-            places = np.stack([-first / (square + root), -first / (square - root)])
-        inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
-        tops = start + inside * (first + inside * (square + inside * cubic))
-        found[column] = max(found[column], float(np.abs(tops).max(initial=0.0)))
-    return np.asarray(found, dtype=np.float64)
 
 
 def _missing(derivative: Table, gone: Vector) -> float:
