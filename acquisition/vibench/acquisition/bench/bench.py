@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Number of characters read from a lock file, whose text errors quote: any user may write to the file."""
+"""Number of characters read from a lock file. Errors quote them, and any user may write to the file."""
 
 
 class BenchLock:
@@ -127,7 +127,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 
 def _plain(resource: str) -> str:
-    """Return a VISA name without its optional parts, and with decimal numbers."""
+    """Return a VISA name without its optional parts, and with its numbers in decimal."""
     kind, *others = resource.upper().replace("::LOCALHOST::", "::127.0.0.1::").split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(
@@ -144,7 +144,7 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Return the virtual rig, loaded by name, as a real bench must neither load nor need the simulation."""
+    """Return the virtual rig; it is loaded by name because a real bench must not need the simulation."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
@@ -290,7 +290,7 @@ class Bench:
 
     @contextmanager
     def beam_on(self, role: Role) -> Iterator["Bench"]:
-        """Yield the bench with the beam on the mass of ``role``; later, a virtual rig moves it back to m0.
+        """Yield the bench with the beam on the mass of ``role``; a virtual rig's beam returns to m0 at exit.
 
         Raises ConfigurationError when the vibrometer of this rig cannot measure there.
         """

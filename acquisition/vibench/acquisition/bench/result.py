@@ -18,7 +18,7 @@ class Verdict(StrEnum):
 
     OK = "ok"
     WARN = "warn"
-    """Warning: find the cause of the deviation, as measurements may be less accurate."""
+    """Warning: find the cause of the deviation, because measurements may be less accurate."""
     FAIL = "fail"
     """Failure: do not switch the drive on before the cause is removed."""
 

@@ -1,4 +1,4 @@
-"""Many measurements, unattended: journal, attempts, reconnecting, notices, and the catalogue of a folder.
+"""Run many measurements unattended: journal, attempts, reconnecting, notices, catalogue of a folder.
 
 The state of every point is committed to an SQLite journal before and after each step, so a campaign that was
 killed resumes at its first unfinished point. Each attempt at a point is recorded in a separate file

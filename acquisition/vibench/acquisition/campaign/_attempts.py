@@ -24,8 +24,8 @@ from ._opening import require_same_bench
 class CoolingPause:
     """Pause before every recording of a session except the first.
 
-    A stop ends the pause at once; a hold extends the pause until it is released. The journal does not change
-    during the pause: a campaign that is killed then resumes with the next point.
+    A stop ends the pause at once; a hold extends the pause until the hold is released. The journal does not
+    change meanwhile: a campaign killed during a pause resumes with the next point.
     """
 
     def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
@@ -53,7 +53,7 @@ class CoolingPause:
 
 
 Reopen = Callable[[], Bench]
-"""Function that closes and reopens a bench with a lost instrument; may raise AcquisitionError."""
+"""Function that closes and reopens a bench that has lost an instrument; may raise AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
 """Interval between two searches for a lost instrument, and pause before another attempt [s]."""
@@ -216,7 +216,7 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Return a clause that names inputs near full scale in the segments ``labels``; empty without any."""
+    """Return a clause that names inputs near full scale in the segments ``labels``; empty if none."""
     if not path.exists():  # the user may have moved a complete recording already
         return ""
     with open_recording(path) as recording:

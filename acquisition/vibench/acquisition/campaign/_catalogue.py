@@ -1,4 +1,4 @@
-"""Catalogue of all recordings in a folder and its subfolders, which does not reopen unchanged files.
+"""Catalogue of all recordings in a folder and its subfolders; unchanged files are not reopened.
 
 The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. If it is deleted, it
 is created again.

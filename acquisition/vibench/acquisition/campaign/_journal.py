@@ -159,7 +159,7 @@ class FinishedPoint:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """All completed points in the order of the campaign, including ``point``, also from before a resume."""
+    """All completed points in the order of the campaign, including ``point`` and those before a resume."""
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
@@ -240,7 +240,7 @@ def journal_exists(path: Path) -> bool:
 
 
 def connect(path: Path) -> sqlite3.Connection:
-    """Return a database connection for writing, whose commits survive a kill and a power cut."""
+    """Return a database connection for writing; its commits survive a kill and a power cut."""
     with sentences(path), close_on_error(open_database(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")

@@ -108,7 +108,7 @@ STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
 """Interval of status lines between events [s]; this gives half a megabyte per night."""
 LEFT_ALONE_S = 1.0
-"""Longest wait when closing, until the last lines are written [s]."""
+"""Longest wait on closing for the last lines to be written [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
@@ -261,7 +261,7 @@ class CommandMessenger:
     def of(cls, command: str) -> "CommandMessenger":
         """Return the messenger for a command line, split as in a shell; no variables, wildcards or pipes.
 
-        Raises ConfigurationError when it is empty, a quotation mark is missing, or there is no such program.
+        Raises ConfigurationError if the line is empty, lacks a quotation mark, or names no existing program.
         """
         try:
             arguments = tuple(shlex.split(command))

@@ -375,7 +375,7 @@ class ReconnectingBench:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Size of a finished recording relative to the growing one, for 24-bit white noise; smaller for dwells."""
+"""Final size of a recording relative to its size while growing, for 24-bit white noise; less for dwells."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Return the path of a rig's last check; the file name contains the rig's name and a hash of it.
+    """Return the path of a rig's last check; the file name contains the rig's name and its hash.
 
     With ``passed``, return the path of the last check that did not fail.
     """

@@ -33,13 +33,13 @@ NOISE_SHARE = Bounds(1e-3, 2e-2)
 _MEDIAN_OF_NORMAL = 0.6745
 """Ratio of median magnitude to standard deviation of a normal variable."""
 _IN_MOMENTS = 0.2
-"""Fraction of the total rms: if the rms estimated from the median is below it, noise counts as bursts."""
+"""Noise counts as bursts if the rms estimated from the median is below this fraction of the total rms."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
 """Bounds on the time for one verified change of a generator setting [s]; a stop takes as long."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Bounds on the recording time for which the disk has space [h], negated as a longer time is better."""
+"""Bounds on the recording time for which the disk has space [h], negated because a longer time is better."""
 
 
 def bench_report(
@@ -49,8 +49,8 @@ def bench_report(
 
     All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
     ``bench`` must not be sampling; ``folder`` is for the recordings; another thread can stop the check by
-    ``switch``, within a block of samples. ``amplitude_vpp`` is by default at most 2 % of the amplitude limit,
-    and too small for contact [V].
+    ``switch``, within a block of samples. By default, ``amplitude_vpp`` [V] is at most 2 % of the amplitude
+    limit, and too small for contact.
 
     Raises CheckStopped when somebody stopped the check, InstrumentError when an instrument fails, DataLost
     when the converter lost samples, and ConfigurationError when the bench plays a recording back. All other
@@ -101,7 +101,7 @@ class _BlockReader:
             digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, as the check of a run does; return the settled samples."""
+        """Play the sine without a ramp, like the check before a run; return the settled samples."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)

@@ -87,7 +87,7 @@ WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Bounds on a channel's phase deviation from the rig's model; above 90 degrees its sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
-"""Bounds on m0's phase deviation; it is never a FAIL, as the model of the specimen is less accurate."""
+"""Bounds on m0's phase deviation, which never FAILs because the model of the specimen is less accurate."""
 LEFT_OVER = Bounds(0.02, 0.05)
 """Bounds on the fraction of the drive voltage that remains when the output is off."""
 

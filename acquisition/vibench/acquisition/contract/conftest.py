@@ -32,7 +32,7 @@ def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first shipped virtual one; None if it does not name the instrument."""
+    """Return the given bench, or the first shipped virtual one; None if this bench lacks the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in plug_ins_of(rig)[kind] else None
