@@ -55,13 +55,13 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band relative to the tolerance. Smaller errors are left, as every correction disturbs the motion."""
+"""Dead band relative to the tolerance. Smaller errors stay, because every correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
 """Fraction of the base's level error [dB] that one correction removes; the specimen responds slowly."""
 _BATCHES = 8
-"""Number of batches for the uncertainty of a mean, as successive periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return m0's velocity over its sensor's signal; 0 at 0 Hz except for a velocity sensor."""
+        """Return the ratio of m0's velocity to its sensor signal; 0 at 0 Hz except for a velocity sensor."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
@@ -69,7 +69,7 @@ class FeedbackChannels:
         """Return the ratio of m0's displacement to the base's; zero if the base does not move.
 
         Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental,
-        and ``harmonic`` times the phase of the base is subtracted from its phase.
+        and ``harmonic`` times the phase of the base is subtracted from the phase of that harmonic.
         """
         if not np.any(base):
             return 0j
@@ -113,7 +113,7 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
 
 
 _REMEMBERED_S = 0.1
-"""Duration of stored samples [s], the motion from which a later drop-out is recognised and bridged."""
+"""Duration of the stored samples [s], from which a later drop-out is recognised and bridged."""
 
 
 class BridgedRows:

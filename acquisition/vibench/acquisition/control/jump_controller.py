@@ -45,7 +45,7 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""Most brackets (frequency intervals) per jump; a new one starts if the motion leaves its branch early."""
+"""Largest number of brackets (frequency intervals) per jump; leaving the branch early starts a new one."""
 
 
 class _Return(Enum):
@@ -152,7 +152,7 @@ class JumpLocator:
     def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        First glide forward fast. If the motion leaves the branch, repeat in steps to find out where.
+        Move forward in a fast glide first. If the motion leaves the branch, find out in steps where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
@@ -173,7 +173,7 @@ class JumpLocator:
     def _find_departure(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward. Return index and state where the motion left the branch; None if it stayed on it."""
+        """Go forward. Return index and state where the motion left the branch; None if it stayed."""
         for place in steps:
             found = yield from self._move_to(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
@@ -181,7 +181,7 @@ class JumpLocator:
         return None
 
     def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back in growing steps until the motion is on the branch. Return that index, or None."""
+        """Go back in growing steps until the motion is on the branch. Return the index reached, or None."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():

@@ -57,7 +57,7 @@ class PhaseLaw:
     A look is one measurement of the loop, of duration L [s]. During a look the phase of the motion relative
     to the drive changes by ``d = 2 pi L (r - f - w e)``: f is the drive frequency, r the resonance, e the
     phase error [rad] and w the half-width of the mode. Hence ``r - f = w e + d / (2 pi L)``. The loop changes
-    f by g times this, so that each look reduces the error by the fraction g. If the error falls too slowly, g
+    f by g (r - f), so that each look reduces the error by the fraction g. If the error falls too slowly, g
     is raised for the term ``w e`` only. For harmonic n, L is replaced by n L, and r and w are the mode's
     values divided by n. For a subharmonic of order n, e is the error of n times its phase, r and w refer to
     the drive, and a look has n times as many drive periods.
@@ -82,7 +82,7 @@ class PhaseLaw:
         """Frequency [Hz], phase error [rad] and base level [m/s2] of each look (measurement)."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look (measurement). Return its phase error [rad] and the motion's relative change to come."""
+        """Add a look (measurement). Return its phase error [rad] and the expected change of the motion."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
@@ -217,7 +217,7 @@ class PhaseSearch:
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
         """Return the resonance: the zero of a line fitted to the phases measured near it.
 
-        ``sensor_phase_deg`` is the standard uncertainty of the phase that all measurements share [degrees].
+        ``sensor_phase_deg`` is the standard uncertainty of their common phase error [degrees].
         """
         nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]

@@ -92,7 +92,7 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest remaining change of a locked motion, in phase tolerances; it is 0.5 for super- and subharmonics."""
+"""Largest remaining change of a locked motion over the phase tolerance; 0.5 for super- and subharmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
@@ -152,7 +152,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level. Return the number of looks (measurements), and the result; None if lost."""
+    """Control phase and level. Return the number of looks (measurements) and the result, None if lost."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -301,7 +301,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Return the phase of m0 over the base, minus its target; its uncertainty is the scatter of batches."""
+    """Return the phase of m0 relative to the base, minus its target; the uncertainty is from batches."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES

@@ -75,8 +75,8 @@ def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float)
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return whether a point between the ends of a jump belongs before or after the jump.
 
-    It belongs before if its response is nearer to that of ``before`` than to that of ``after``, and no
-    further from it than these two are apart. A jump to a third branch counts as after.
+    It belongs before if, of the three responses, its own and that of ``before`` are the nearest pair. A jump
+    to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
@@ -123,7 +123,7 @@ class SettledState:
     """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Hold
     harmonics: tuple[complex, ...]
-    """Displacement of m0 at 1 to 4 times its repetition rate, over the base's at the drive frequency."""
+    """Displacement ratio of m0, at 1 to 4 times its repetition rate, to the base at the drive frequency."""
     drives: int = 1
     """Number of drive periods in one period of m0."""
 
@@ -373,7 +373,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Extend the range of frequencies with the level out of tolerance; None if the level is in tolerance."""
+    """Extend the range of frequencies whose level is out of tolerance; None if the level is in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

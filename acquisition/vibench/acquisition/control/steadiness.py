@@ -227,7 +227,7 @@ class Judgement:
     noise: float
     """Part of the scatter explained by noise of the channel; a smaller scatter cannot be measured."""
     remaining: float
-    """Extrapolated change of the cluster means still to come; for an aperiodic motion, their last change."""
+    """Extrapolated remaining change of the cluster means; for an aperiodic motion, their last change."""
 
 
 def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:

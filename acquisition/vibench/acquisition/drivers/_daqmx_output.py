@@ -48,7 +48,7 @@ class DaqmxOutput:
         """Whether the output is at zero volts and nothing is reserved; if not, `stop` sets it to zero."""
         self._is_open = True
         self.idle = IdleOutput.HELD
-        """Voltage of the output once it runs out of samples, as read back: zero if the device can do so."""
+        """Voltage of the output after its last sample, as read back: zero if the device supports that."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -185,7 +185,7 @@ class DaqmxOutput:
 
 
 def _set_idle_output(channel: AOChannel) -> IdleOutput:
-    """Set the idle output to zero volts, as many devices hold the last value; return the value read back."""
+    """Set the idle output to zero volts (many devices hold the last value); return the value read back."""
     # A device that cannot hold zero refuses the setting; a device without this setting refuses the query.
     with suppress(DaqError):
         channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS

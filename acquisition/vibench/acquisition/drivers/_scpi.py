@@ -94,7 +94,7 @@ class ScpiInstrument:
             return self.complaints()
 
     def query(self, message: str) -> str:
-        """Return the reply to a query without its line end; bytes outside ASCII are kept readable."""
+        """Return the reply to a query without its line end, decoded as GB 18030; invalid bytes replaced."""
         # These generators send "ohm" as the GBK character A6 B8: invalid text must not stop a query.
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
@@ -286,7 +286,7 @@ class Word:
         self._expect(owner, word)
 
     def insist(self, owner: ScpiInstrument, word: str) -> None:
-        """Set the word; the value read back decides, as errors in the queue may be old and are ignored."""
+        """Set the word. Only the value read back counts: errors in the queue may be old and are ignored."""
         owner.send(f"{self.header.format(c=owner.channel)} {word}")
         self._expect(owner, word)
 
