@@ -112,7 +112,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
     Programs in other containers of this computer are included, since they read the same state folder. So are
     programs that ended without confirming silence. Raises EngineError when there is none. ``pid`` selects one
-    program; None selects all of this computer.
+    program; None selects all programs of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained, *unconfirmed_programs())
@@ -129,7 +129,7 @@ def out_of_reach() -> str:
 
 
 def require_ended(engine: Announcement) -> None:
-    """Refuse to continue after an engine was killed, as its output is not confirmed to be off.
+    """Refuse to continue after an engine was killed, because its output is not confirmed to be off.
 
     Raises EngineGone when the announced ``engine`` was killed, with the advice to switch the amplifier off.
     """

@@ -146,7 +146,7 @@ def stop_engine(
     The stop is written to a file in the state folder. The program obeys within 0.05 s, or when its process
     runs again. The function returns when the program has confirmed that its output is off, or after a time
     limit. If no file can be written, or the program does not read it, the stop is sent over the engine's
-    connection. A hold (pause) is sent, never written, as a hold from a file may begin late. ``engine`` is
+    connection. A hold (pause) is sent, never written: a hold from a file may begin late. ``engine`` is
     the announcement of the program, ``level`` is the kind of stop, and ``reason`` is stored in the recording.
 
     Raises

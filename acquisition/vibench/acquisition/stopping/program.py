@@ -350,7 +350,7 @@ class _StopTargets:
             withdraw(entry[1])
 
     def announce_again(self) -> None:
-        """Add the rigs opened since the announcement of this process to it; ignore a failure."""
+        """Add newly opened rigs to the announcement of this process; ignore a failure."""
         with self._changing, suppress(OSError):
             if self._inside:
                 self._announce(self._inside[0][1])
