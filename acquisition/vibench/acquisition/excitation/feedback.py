@@ -12,7 +12,7 @@ Share = Annotated[float, Field(gt=0, lt=1)]
 HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
 """Displacement to be held [m]. The bounds only catch wrong units; no sensor or shaker reaches them."""
 HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
-"""Acceleration to be held [m/s2]. The bounds only catch wrong units, as no shaker reaches 10 000 g."""
+"""Acceleration to be held [m/s2]. The bounds only catch wrong units; no shaker reaches 10 000 g."""
 
 
 class Settling(FrozenModel):
@@ -28,7 +28,7 @@ class Settling(FrozenModel):
     periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
     """Number of drive periods over which the motion must repeat."""
     longest_period: int = Field(default=8, ge=1, le=32)
-    """Longest period of the motion that is searched for, in drive periods."""
+    """Longest motion period that is searched for, in drive periods."""
     aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
     """Number of drive periods over which a non-repeating motion must have constant statistics."""
     shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
@@ -96,4 +96,4 @@ class JumpSearch(FrozenModel):
     resolution_hz: PositiveFloat = 0.25
     """Largest allowed spacing of the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
-    """Largest number of searches in one pass, including those at steep changes that are no jumps."""
+    """Largest number of searches in one pass, including those at steep changes that are not jumps."""

@@ -27,7 +27,7 @@ Lines = NDArray[np.int64]
 def band_lines(start_hz: float, stop_hz: float, repetition_hz: float) -> Lines:
     """Return the harmonics of ``repetition_hz`` from ``start_hz`` to ``stop_hz``, including the edges.
 
-    A harmonic within 1e-9 of an edge belongs to the band, as 200 times 0.1 Hz may not be exactly 20 Hz.
+    A harmonic within 1e-9 of an edge belongs to the band, because 200 times 0.1 Hz may not be exactly 20 Hz.
     """
     tolerance = 1e-9
     first = int(np.ceil(start_hz / repetition_hz * (1 - tolerance)))

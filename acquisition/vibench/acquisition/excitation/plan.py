@@ -216,7 +216,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Return this excitation with the lead-in ``way``, and its tone; None for kinds without lead-in."""
+        """Return this excitation with lead-in ``way``, and the tone it adds; None if it has no lead-in."""
         del way, lead_s
         return None
 

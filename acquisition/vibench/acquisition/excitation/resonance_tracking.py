@@ -13,7 +13,7 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor by which one change alters the setting; large, as a level has only 150 loop periods."""
+"""Largest factor by which one change alters the setting; large, because a level has only 150 loop periods."""
 
 
 class ResonanceTracking(AbstractFeedback):
@@ -33,7 +33,7 @@ class ResonanceTracking(AbstractFeedback):
     (modes 1 and 3 of the paper). If only one of these holds, it leads by 90 degrees (``phase_deg = 90``).
 
     ``subharmonic`` n = 2 or 3 tracks a motion of m0 that repeats every n drive periods: n times its phase
-    lags the base by 90 degrees; for n = 2 the phase is again measured as for a square. Super- and
+    lags the base by 90 degrees; for n = 2 the phase is again measured from a cosine. Super- and
     subharmonic resonances give no natural frequency and no damping.
     """
 

@@ -39,7 +39,7 @@ class SweptBy(StrEnum):
     COMPUTER = "computer"
     """The computer changes the frequency in steps; possible with any generator."""
     GENERATOR = "generator"
-    """The generator changes the frequency without steps, if it has a sweep function; a trigger starts it."""
+    """The generator changes the frequency without steps, by a sweep function that a trigger starts."""
 
 
 MOST_SWEEP_STEPS = 1_000_000

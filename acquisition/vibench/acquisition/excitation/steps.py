@@ -135,7 +135,7 @@ class Approach(StrEnum):
 
 @dataclass(frozen=True)
 class HeldAcceleration:
-    """Feedback holds the fundamental of the base motion, with any drive up to the largest allowed."""
+    """Feedback holds the fundamental of the base motion, with any drive voltage up to the largest allowed."""
 
     amplitude_m_per_s2: float
     """Peak acceleration of the base's fundamental [m/s2]."""

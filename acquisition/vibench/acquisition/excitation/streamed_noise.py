@@ -17,7 +17,7 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per seed: with few, any sample is quick to reach; with many, drawing is faster."""
+"""Number of random values per seed: few make any sample quick to reach, many make drawing faster."""
 TRANSITION_WIDTH = 0.5
 """Transition width of the filter divided by the band's lower edge; the band edges are the -6 dB points."""
 HAMMING_WIDTH = 3.3

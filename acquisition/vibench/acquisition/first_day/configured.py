@@ -366,7 +366,7 @@ _FROM = {
     Role.AMPLIFIER_VOLTAGE: "output of the amplifier, at the shaker",
 }
 Confirmed = Callable[[str], str]
-"""Function that asks whether a wire connects two ends; an empty answer ends. The page shows the answer."""
+"""Function that asks whether a wire connects two ends; an empty answer aborts. The page shows the answer."""
 
 
 @dataclass(frozen=True)

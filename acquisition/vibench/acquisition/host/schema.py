@@ -74,7 +74,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Allow the former key of the specimen, and as frequencies a range or a list of numbers and ranges."""
+    """Allow the specimen's former key. Frequencies may be a range, or a list of numbers and ranges."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}

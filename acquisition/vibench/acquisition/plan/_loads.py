@@ -28,7 +28,7 @@ from ..excitation.steps import (
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
-"""Number of spans of half the playback rate up to which a held waveform is computed: twice the playback rate.
+"""Number of spans, each of half the playback rate, for which the spectrum of a held waveform is computed.
 Higher images are below 1/20 of the level of the band, and the table responds to them less.
 """
 PASSED_LEVELS = np.arange(1, 17) / 16

@@ -209,7 +209,7 @@ class RunState(StrEnum):
 
 
 CHECK_FREQUENCY_HZ = 160.0
-"""Sine of the bench check, near the calibration of accelerometers (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
+"""Frequency of the check's sine, near that of accelerometer calibrations (159.2 Hz, ISO 16063-21)."""
 CHECK_FRACTION = 0.02
 """Amplitude of the bench check relative to the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
