@@ -323,16 +323,16 @@ class UntilNote(AbstractNote):
     wishes: dict[str, SixFigures]
     """Requested relative 95 % bounds, by name of the result."""
     longest_s: SixFigures
-    """Longest time for which the stretch may be recorded [s]."""
+    """Longest time for which the step or dwell may be recorded [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
     """Relative 95 % bounds at the last analysis, None if not determined; empty before the first analysis."""
     looked_s: SixFigures = 0.0
-    """Recorded time of the stretch at the last analysis [s]."""
+    """Recorded time of the step or dwell at the last analysis [s]."""
     looks: int = 0
     hindrance: str = ""
-    """Reason why no bounds could be determined; empty if they were."""
+    """Reason why no bounds could be determined; empty if all were determined."""
     recorded_s: SixFigures | None = None
-    """Total recorded time of the stretch [s]; None while it is still being recorded."""
+    """Total recorded time of the step or dwell [s]; None while it is being recorded."""
 
     @property
     def shares(self) -> tuple[float, ...]:

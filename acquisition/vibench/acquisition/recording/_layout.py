@@ -209,7 +209,7 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
 
 
 READ_KINDS = "iufS"
-"""Types that are read: numbers and fixed-length text, as HDF5 does not check variable-length text."""
+"""Types that are read: numbers and fixed-length text; HDF5 does not check variable-length text."""
 
 
 def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:

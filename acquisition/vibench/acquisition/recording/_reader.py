@@ -476,7 +476,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return samples, state and reason of a ``.part``; without a running program, it is "interrupted"."""
+    """Return samples, state and reason of a ``.part``; without a running program: "interrupted"."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

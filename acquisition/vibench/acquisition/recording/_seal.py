@@ -454,7 +454,7 @@ def open_database(uri: str) -> sqlite3.Connection:
 
 @contextmanager
 def close_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Close a new ``connection`` if its first use fails, as Windows cannot move or delete an open file.
+    """Close a new ``connection`` if its first use fails, because Windows cannot move or delete an open file.
 
     Raises sqlite3.Error, or any other error of the first use, after closing.
     """

@@ -39,7 +39,7 @@ class EventKind(StrEnum):
 
 
 REJECTED = "average rejected"
-"""Text of a mark that excludes from the results the last noise realisation that began earlier."""
+"""Text of a mark that excludes a noise realisation: the last one that began before the mark."""
 
 
 @dataclass(frozen=True)

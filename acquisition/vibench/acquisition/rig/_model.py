@@ -109,7 +109,7 @@ class RigModel:
     def under_sines(
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
-        """Return complex peaks of ``quantity`` at peak voltages ``terminal_v`` [V], shape of both inputs."""
+        """Return complex peaks of ``quantity`` at peaks ``terminal_v`` [V]; both inputs are broadcast."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).response(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:

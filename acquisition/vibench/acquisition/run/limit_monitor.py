@@ -91,7 +91,7 @@ class SpecimenTracker:
 RMS_S = 1.0
 """Averaging time for the rms current, whose limit is due to heating [s]."""
 REACTION = 1.1
-"""Allowed force on the table, relative to the coil's force limit; above 1, as the specimen reacts, too."""
+"""Allowed force on the table, relative to the coil's force limit; above 1 because the specimen reacts."""
 SETTLING_S = 0.5
 """Time after the start during which integrated quantities are not checked [s]. An AC-coupled input drifts
 after its current is switched on, and the drift integrates to metres. During this time, the run plays only the

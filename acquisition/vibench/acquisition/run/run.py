@@ -45,7 +45,7 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Smallest ratio of a sweep's step duration to the time of its commands; above 1, as command times vary."""
+"""Smallest ratio of a sweep's step duration to the time of its commands; above 1 (command times vary)."""
 _MOST_COMMANDS = 2
 """Largest number of commands for one change of tone: amplitude and frequency."""
 
@@ -341,7 +341,7 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _log_bounds(self, loop: AcquisitionLoop) -> None:
-        """Log the error bounds of each finished result; the reason why the run ended repeats the last."""
+        """Log the error bounds of each finished result; the reason for the run's end repeats the last one."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)

@@ -165,7 +165,7 @@ LISTEN_S = 0.02
 LONGEST_S = 12.0
 """Longest search for silence [s], longer than the converter's buffer."""
 LOWER_AFTER_S = 1.0
-"""Time after which a still measured drive is also lowered in amplitude [s]: the relay may be stuck."""
+"""Time after which the amplitude is lowered if the drive is still measured [s]: the relay may be stuck."""
 STILL_ON = 0.1
 """Fraction of the largest recorded drive above which a remaining signal cannot be hum."""
 
@@ -249,7 +249,7 @@ _LONGEST_ROUND_S = 0.1
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Guard that switches the drive off if the run stops reading; thread, memory and stop are reserved.
+    """Guard that switches the drive off if the run stops reading; its thread and memory are reserved.
 
     The run calls the guard when its drive starts and after every block. The drive counts as on until its
     output has been read back as off.
@@ -260,7 +260,7 @@ class DriveGuard(ClosedOnLeaving):
     ) -> None:
         """``is_heard`` returns whether the drive was still measured after its output was switched off.
 
-        Raises AcquisitionError when the system provides no memory for the reserve, or no thread.
+        Raises AcquisitionError when the system provides no thread, or no memory for the reserve.
         """
         MEMORY_RESERVE.hold()
         self._drive = drive
