@@ -17,7 +17,7 @@ LEVELS = ("ramp", "abort", "off")
 
 
 class RunningProgram:
-    """Running program that has announced itself by a file, whose name has its process id and start time."""
+    """Running program that has announced itself by a file named after process id and start time."""
 
     def __init__(self, path: str, pid: str, start: str, is_alive: Callable[[], bool]) -> None:
         self.path = path

@@ -37,7 +37,7 @@ LOOK_S = 1.0
 
 
 class Analyst:
-    """Analyses recordings in another process and returns results in the order of submission."""
+    """Analyser of recordings in another process; it returns results in the order of submission."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool

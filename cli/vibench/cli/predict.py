@@ -250,7 +250,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return how many starts lead to the motion, such as 5/8; "lost" if it forgets its start, else empty."""
+    """Return the fraction of starts that lead to the motion (5/8), "lost" for a forgotten start, or ""."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"

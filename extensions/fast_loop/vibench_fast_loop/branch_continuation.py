@@ -14,7 +14,7 @@ from vibench.acquisition.rig import Rig
 _NO_TRIES = 12
 """Maximum number of attempts per point; the motion settles and is measured in each."""
 _BEFORE = 60
-"""Number of periods before the evaluated perturbations: lead-in, and trial to find the size."""
+"""Number of periods before the evaluated perturbations: a lead-in, and a trial to find their size."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -61,7 +61,7 @@ class BranchContinuation(AbstractFeedback):
     """Size of the drive changes that measure the stability of each point: relative rms change of the
     fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to skip the measurement."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
-    """Number of evaluated periods with small changes at each point; a few more serve to find the size."""
+    """Number of evaluated periods with small drive changes per point; a few more serve to find their size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:

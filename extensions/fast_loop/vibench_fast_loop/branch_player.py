@@ -57,7 +57,7 @@ class LoopLook:
 
 
 class BranchPlayer:
-    """Plays settings of a controller, and measures the response of base and m0 to each."""
+    """Player of controller settings, which measures the response of base and m0 to each."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan
@@ -126,7 +126,7 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Return the second half of the blocks; halve it again as long as its own halves differ."""
+    """Return the second half of the blocks, halved again as long as its two halves differ."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
         # Differences of neighbours are used, because a drift hardly changes them.

@@ -150,7 +150,7 @@ class BranchSolver:
         self._last = beside
 
     def correct(self, point: MeasuredPoint, predicted: PredictedPoint) -> Vector:
-        """Return the next iterate, in the plane through the prediction that is perpendicular to the arc."""
+        """Return the next iterate, in the plane that contains the prediction, perpendicular to the arc."""
         along = predicted.along
         row = along[1:] @ self._slope[-_RATIO:]
         row[0] += along[0]

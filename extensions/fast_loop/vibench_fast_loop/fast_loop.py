@@ -199,7 +199,7 @@ def branch_hold(
 
     ``plant`` and ``law`` are as known to the host computer; the specimen has no rigid stops. The branch
     starts at ``start_hz`` and stays in ``range_hz``. ``begin`` is the approach to the level: from rest, or
-    from three times the level, which finds motions with impacts. Without stops, it starts at rest. The
+    from three times the level, which finds motions with impacts. Without stops, the start is from rest. The
     frequency first changes in the direction ``way``. A motion counts as held up to the multiplier
     ``allowed``. Returns None if the model has no motion at the start.
     """

@@ -35,7 +35,7 @@ class LinearLaw:
     step: Table
     """Matrix that maps the memory to its next state, shape (n, n)."""
     inlet: Table
-    """Matrix that maps samples to the next memory, shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    """Matrix from samples to the next memory state, shape (n, 2), per m/s2 of the base and per m/s of m0."""
     output: Table
     """Matrix that maps the memory to the output voltage, shape (1, n) [V]."""
     direct: Table

@@ -13,7 +13,7 @@ them: z of m0 at the drive frequency, b1 and b3 of the base at one and three tim
 
 dz/dt = A z + B0 b1 + B1 db1/dt + B2 d2b1/dt2 + C0 b3 + C1 db3/dt,
 
-where capital letters are real 2 x 2 matrices for real and imaginary part, as springs that change twice a
+where capital letters are real 2 x 2 matrices for real and imaginary part, because springs that change twice a
 period couple a deviation to its conjugate. Multipliers are exp(T eig A). Both harmonics must be perturbed
 independently: the specimen also drives the table at three times the frequency, so b3 would follow from z.
 
