@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Initial states except rest: largest displacement relative to the gap; frequency for velocities [Hz]."""
+"""Largest displacement of initial states except rest, relative to the gap; frequency for velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):

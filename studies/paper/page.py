@@ -210,9 +210,9 @@ def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigu
     Parameters
     ----------
     levels
-        Responses at every drive level, the first figure.
+        First figure: responses at every drive level.
     score
-        Number of claims that hold, over damping.
+        Figure of the number of claims that hold, over damping.
     """
     failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
     missing = f" Claims that do not hold: {', '.join(failed)}." if failed else ""

@@ -20,7 +20,7 @@ _HIGH_RATE = 0.8
 """High similarity rate; section 4 of the paper says "more than 80 %"."""
 _CURVE_POINTS = 200
 _DRAWS = 4
-"""Number of initial states, which lead to different chaotic motions, on which the rates depend."""
+"""Number of initial states; they lead to different chaotic motions, so the rates vary."""
 FITTED = (
     COMPARED_LOWER,
     change("compared", 600.0),

@@ -372,7 +372,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Process one batch of samples and schedule the next; all at once would block the event loop."""
+        """Process one batch of samples and schedule the next; all batches at once would block the window."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:

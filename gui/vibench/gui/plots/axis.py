@@ -201,7 +201,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
 
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Return a larger step, and the at most ``most`` ticks at its multiples.
+    """Return a larger step, and the ticks at its multiples, of which there are at most ``most``.
 
     An axis needs two numbers. If fewer are left, return the two outermost ticks of the smaller step.
     """

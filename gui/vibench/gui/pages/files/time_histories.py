@@ -27,7 +27,7 @@ SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
 """Largest number of plots kept for reuse; creating a plot takes ten times as long as drawing it."""
 _LABEL_AT = 0.1
-"""Vertical position of segment names relative to the plot; low, as the channel name is at the top."""
+"""Vertical position of segment names relative to the plot; low, because the channel name is at the top."""
 _NAMED_SHARE = 0.08
 """Length of the shortest segment that is named, relative to the recording."""
 
