@@ -115,7 +115,7 @@ def _line(cells: tuple[str, ...], widths: list[int]) -> str:
 
 
 _PACE = {"pace", "speed", "faults"}
-"""Settings of a virtual rig whose change does not count as a changed configuration."""
+"""Settings of a virtual rig that may change without a new bench check."""
 _HOUR = timedelta(hours=1)
 _DAY = timedelta(days=1)
 
@@ -153,7 +153,7 @@ class CheckResult(FrozenModel):
 
 
 def rig_digest(rig: Rig) -> str:
-    """Return the SHA-256 of a rig's configuration, without settings whose change needs no new check."""
+    """Return the SHA-256 of a rig's configuration, except settings that may change without a new check."""
     content = rig.model_dump(mode="json", exclude={"check_valid_h": True, "virtual": _PACE})
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

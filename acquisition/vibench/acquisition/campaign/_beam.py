@@ -48,7 +48,7 @@ class BeamMover:
 
     @contextmanager
     def beam_at(self, bench: Bench, name: str, measurement: Measurement) -> Iterator[Bench]:
-        """Yield the bench with the beam at the point of a measurement, which is recorded as ``name``.
+        """Yield the bench with the beam at the point of the measurement that is recorded as ``name``.
 
         Raises AcquisitionError when the command fails, because the beam may then be anywhere.
         """

@@ -106,7 +106,7 @@ class CampaignLog(ClosedOnLeaving):
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval of status lines between events [s]; this gives half a megabyte per night."""
+"""Interval of status lines between events [s]; they take half a megabyte per night."""
 LEFT_ALONE_S = 1.0
 """Longest wait on closing for the last lines to be written [s]."""
 

@@ -84,7 +84,7 @@ def find_recordings(
 def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:
     """Recover every unfinished attempt at a point; return the errors by file name.
 
-    Raises RecordingError when a complete recording cannot be recovered, so that it is not measured again.
+    Raises RecordingError when a complete recording cannot be recovered; its point is not measured again.
     """
     errors: dict[str, str] = {}
     for path in attempts:

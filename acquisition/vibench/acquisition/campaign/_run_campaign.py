@@ -380,7 +380,7 @@ WRITTEN_SHARE = 1 / 1.7
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """Duration and disk space of the recordings of a campaign that do not exist yet."""
+    """Duration and disk space of those recordings of a campaign that do not exist yet."""
 
     recordings: int
     """Number of recordings that the campaign must still make."""
