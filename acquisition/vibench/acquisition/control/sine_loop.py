@@ -216,7 +216,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up to the setting that the model predicts for ``level``, or to the plan's setting for None."""
+    """Ramp up to the setting that the model predicts for ``level``; if None, to the plan's setting."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 
@@ -274,7 +274,7 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
 
 
 def _model_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Return the setting for the level at the present frequency, for a table without specimen [Vpp]."""
+    """Return the setting for the level at the present frequency, assuming a bare table [Vpp]."""
     return _bare_vpp(loop, level, loop.setting.frequency_hz)
 
 
@@ -328,7 +328,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Return response [m], ratio m0 / base and base acceleration [m/s2] from the newer half of periods."""
+    """Return response [m], ratio m0 / base and base acceleration [m/s2] from the newer periods."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

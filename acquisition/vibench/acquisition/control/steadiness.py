@@ -72,7 +72,7 @@ class DriveClock:
 Phasors = NDArray[np.complex128]
 
 ORDERS = 5
-"""Number of Fourier orders of a period: mean and four harmonics, enough to tell periods apart."""
+"""Number of Fourier orders of a period: mean and four harmonics, enough to distinguish periods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +215,7 @@ last change.
 
 @dataclass(frozen=True)
 class Judgement:
-    """Judgement whether and how a series of periods has settled; values are relative to the motion's rms."""
+    """Judgement on whether and how periods have settled; values are relative to the motion's rms."""
 
     steadiness: Steadiness
     period: int

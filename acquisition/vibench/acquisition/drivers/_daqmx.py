@@ -1,4 +1,4 @@
-"""Digitizer on NI-DAQmx: continuous hardware-timed sampling without gaps; it is always released."""
+"""Digitizer on NI-DAQmx: continuous hardware-timed sampling without gaps; the device is always released."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack

@@ -14,7 +14,7 @@ _RECOVERY_SAMPLES = 64
 def overload_ranges(
     volts: Samples, roles: tuple[str, ...], full_scales_v: tuple[float, ...], first_sample: int
 ) -> tuple[Overload, ...]:
-    """Return the ranges of a block where a channel reaches 95 % of its full scale.
+    """Return the sample ranges of a block in which a channel reaches 95 % of its full scale.
 
     ``volts`` have the shape (channels, samples) [V]; ``first_sample`` is the number of the block's first
     sample in the run.
@@ -36,7 +36,7 @@ def overload_ranges(
 
 
 def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
-    """Raise LimitExceeded for a NaN or a sample beyond the bench's limit, InstrumentError if closed."""
+    """Raise LimitExceeded for a NaN or a sample beyond the bench's limit, InstrumentError if it is closed."""
     peak_v = float(np.max(np.abs(volts), initial=0.0))
     if not peak_v <= limit_v:  # this form also refuses a NaN
         raise LimitExceeded(

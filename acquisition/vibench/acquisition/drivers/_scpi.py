@@ -99,7 +99,7 @@ class ScpiInstrument:
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
-        """Return the reply to a query; after an empty reply (possible after ``*CLS``), repeat it once."""
+        """Return the reply to a query; after an empty reply (after ``*CLS``), repeat the query once."""
         return self.query(message) or self.query(message)
 
     def query_number(self, message: str) -> float:
