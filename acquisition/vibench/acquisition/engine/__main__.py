@@ -59,7 +59,7 @@ def _handle_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
-    """End an idle engine that nobody uses, because it may keep a bench from other programs."""
+    """End an idle engine that nobody uses, because it may block a bench for other programs."""
 
     def look() -> None:
         pause = Event()

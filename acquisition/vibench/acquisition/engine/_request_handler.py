@@ -94,7 +94,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 STALL_S = 0.2
-"""Interval between two checks of the viewers beyond which this process counts as stalled [s]."""
+"""If checks of the viewers are further apart than this [s], this process counts as stalled."""
 LATE_FACTOR = 4.0
 """Growth of the time allowed without requests, per unit of this process's own delay (same computer)."""
 TAKEN_OVER_S = 2.0

@@ -248,7 +248,7 @@ class Server:
             self._leave(viewer)
 
     def _make_room(self) -> None:
-        """Disconnect the longest silent viewer; an attending viewer only if there is no other."""
+        """Disconnect the viewer that is silent for longest; an attending viewer only if there is no other."""
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),

@@ -90,7 +90,7 @@ class Verb(Generic[A]):
     word: str
     """Value of the key ``ask`` in the message."""
     method: str
-    """Name of the method of request handler and client that belongs to the verb."""
+    """Name of the verb's method in the request handler and in the client."""
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]
