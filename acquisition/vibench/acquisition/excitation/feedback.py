@@ -92,7 +92,7 @@ class JumpSearch(FrozenModel):
     """Criteria by which a change between two steps counts as a jump, and the accuracy of its location."""
 
     factor: float = Field(default=1.5, gt=1, le=100)
-    """Change of Response II (fundamental of m0 over base) above this factor counts as a jump."""
+    """A change of Response II (fundamental of m0 over base) by more than this factor counts as a jump."""
     resolution_hz: PositiveFloat = 0.25
     """Largest allowed spacing of the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)

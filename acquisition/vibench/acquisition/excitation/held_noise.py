@@ -79,7 +79,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def density(self) -> Samples:
-        """Power spectral density of the spectrum at each spectral line [(m/s2)2/Hz]."""
+        """Requested power spectral density at each spectral line [(m/s2)2/Hz]."""
         return density_at(self.spectrum, self.lines * self.repetition_hz)
 
     @property

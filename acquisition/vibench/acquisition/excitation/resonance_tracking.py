@@ -47,7 +47,7 @@ class ResonanceTracking(AbstractFeedback):
     high_hz: FrequencyHz
     """Highest frequency of the search [Hz]."""
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
-    """Phase of m0 relative to the base at which resonance is defined, from displacements [degrees]."""
+    """Phase of m0 relative to the base that defines resonance, from displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 whose phase is used: relative to the base, or absolute."""
     harmonic: Literal[1, 2, 3] = 1
@@ -106,7 +106,7 @@ class ResonanceTracking(AbstractFeedback):
     def motion(self, harmonics: Sequence[complex]) -> complex:
         """Return the complex motion whose phase is compared with ``phase_deg``.
 
-        ``harmonics`` of m0 over the base start with the fundamental of m0's period, longer for a subharmonic.
+        ``harmonics`` (m0 over base) start with that of m0's period, which is longer for a subharmonic.
         """
         if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])

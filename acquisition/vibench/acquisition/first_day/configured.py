@@ -121,7 +121,7 @@ def value_in(text: str, key: str) -> str:
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
     """Return the template with a value replaced by an answer, and a note on its source.
 
-    Raises ConfigurationError when the type of the answer is wrong (text for a number or date), or the
+    Raises ConfigurationError when the type of the answer is wrong (such as text for a number), or the
     template has no table for the key.
     """
     found = _place(text, key)

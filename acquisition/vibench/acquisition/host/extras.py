@@ -18,7 +18,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
 def require_extra(extra: str) -> None:
     """Require that the libraries of an extra are installed, without importing them.
 
-    Raises MissingLibrary when one is not installed. ``extra`` is its name in `pyproject.toml`.
+    Raises MissingLibrary when one is not installed. ``extra`` is the extra's name in `pyproject.toml`.
     """
     for library in EXTRAS[extra]:
         # Check the parent first, because find_spec of a submodule raises an error if the parent is missing.

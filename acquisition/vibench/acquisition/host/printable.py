@@ -8,7 +8,7 @@ LONGEST_CLAUSE = 400
 
 
 def printable(text: str) -> str:
-    r"""Escape characters of ``text`` that move the cursor, reorder text or are invisible; return one line.
+    r"""Return one line, with escapes for characters that move the cursor, reorder text or are invisible.
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb

@@ -103,7 +103,7 @@ def complaints(error: ValidationError, content: object, model: type[BaseModel], 
 
 
 def _similar_key(place: Place, model: type[BaseModel]) -> str:
-    """Return the key of the model that is most similar to the unknown key at `place`; empty if none is."""
+    """Return the key of the model that is most similar to the unknown key at `place`, or empty text."""
     models = [model]
     for part in place[:-1]:
         fields = [each.model_fields[part] for each in models if part in each.model_fields]

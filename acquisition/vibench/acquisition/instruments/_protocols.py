@@ -75,7 +75,7 @@ class Block:
     """Voltages at the converter's input, shape (channels, samples) [V]."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
-    """Integers of the converter, recorded unchanged; `Digitizer.volts_per_count` times these gives the volts.
+    """Integers of the converter, recorded unchanged; multiply by `Digitizer.volts_per_count` to get volts.
     None if the converter gives only volts."""
 
 

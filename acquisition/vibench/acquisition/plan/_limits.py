@@ -380,7 +380,7 @@ def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck
 TOUCH_SHARE = 0.25
 """Largest p in a check, relative to the gap: a sine without a ramp overshoots, and impacts might persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Frequencies within 3 % of the check's sine [Hz]; the model's resonances may be off by 3 % (0072)."""
+"""Frequencies within 3 % of the check's sine [Hz]; the model's resonances may err by 3 % (decision 0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:

@@ -171,7 +171,7 @@ def needed_vpp(
     """Return the setting at which the base reaches ``acceleration`` [m/s2], peak to peak [V].
 
     ``on_table`` describes what is mounted on the table in the rig's model. Feedback assumes a bare table
-    (smooth response), and corrects the rest.
+    (smooth response), and corrects the difference.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()

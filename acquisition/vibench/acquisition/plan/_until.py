@@ -13,7 +13,7 @@ FEWEST_REALISATIONS = 4
 SHORTEST_S = 2.0
 """Default time before the first analysis [s]; a shorter recording is analysed only at its end."""
 LOOK_FACTOR = 2.0**0.5
-"""Ratio of the recorded time at one analysis to that at the analysis before."""
+"""Ratio of the recorded time at one analysis to the recorded time at the previous analysis."""
 
 
 Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
