@@ -22,7 +22,7 @@ COMPLEX_PART = "complex_part"
 """Attribute that marks the real or imaginary part of a complex array; only h5py reads complex numbers."""
 SETTINGS_JSON = "settings_json"
 AXES = "axes_json"
-"""Attribute of an array with the names of the axis arrays of its dimensions."""
+"""Attribute of an array that names the axis array of each of its dimensions."""
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of an array's axes; for files of earlier versions, they are found from the lengths."""
+    """Return the names of an array's axes; for files of earlier versions, derive them from the lengths."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

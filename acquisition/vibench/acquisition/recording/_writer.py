@@ -80,7 +80,7 @@ RESERVED = 8
 
 
 class DescriptorReserve:
-    """File descriptors kept in reserve during the run, and released at its end to finish the recording."""
+    """File descriptors kept in reserve during the run, then released to finish the recording."""
 
     def __init__(self) -> None:
         self._held: list[int] = []

@@ -371,7 +371,7 @@ class ControllerConfig(FrozenModel):
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input on which the controller accepts a proportional-derivative law; absent for any linear law."""
+    """Only input for a proportional-derivative law; absent if the controller accepts any linear law."""
     source: str = Field(min_length=1)
     """Source of the values for sample rate, latency and limit."""
 

@@ -16,7 +16,7 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""Peak over rms value of a sine; the limiter is set to the rms current of the largest unlimited sine."""
+"""Ratio of peak to rms of a sine; the limiter is set to the rms current of the largest unlimited sine."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
@@ -103,7 +103,7 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck_motion)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the complex ``quantity`` per metre of p that stops impose, shape as ``frequency_hz``."""
+        """Return the complex ``quantity`` per metre of p imposed by the stops, shape as ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(

@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest accepted number in a sensitivity, and inverse of the largest; others are typing errors."""
+"""Smallest number accepted in a sensitivity; the largest is its inverse. Others are typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 

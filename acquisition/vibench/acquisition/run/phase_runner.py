@@ -130,11 +130,11 @@ class SweepWatch:
 
 
 HOLD_LONGEST_S = HOLD_ROOM_S
-"""Longest total hold of a run [s]; the space in its recording limits it."""
+"""Longest total hold of a run [s], limited by the space in its recording."""
 
 
 LATEST = 0.5
-"""Largest delay of a command in a stepped sweep that needs no event, as a fraction of the step."""
+"""Largest delay of a command in a stepped sweep that is not logged, as a fraction of the step."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
@@ -161,7 +161,7 @@ class _Pace(Enum):
     OF_THE_PLAN = auto()
     """The planned time; used for stepped sweeps."""
     OF_ITSELF = auto()
-    """The end of the previous phase: no command is due, or commands take no time."""
+    """The end of the previous phase; used if no command is due, or commands take no time."""
 
 
 class StopRequested(Exception):

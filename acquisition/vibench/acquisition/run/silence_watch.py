@@ -157,7 +157,7 @@ def _require_base(figures: CheckFigures) -> None:
 
 
 SILENT_V = 5e-3
-"""Half of the peak-to-peak voltage that still counts as silence: noise, hum, lowest generator setting [V]."""
+"""Half of the largest peak-to-peak voltage that counts as silence (noise, hum, smallest setting) [V]."""
 HUM_FACTOR = 2.0
 """Multiple of the hum before the run up to which a signal counts as silence, if above `SILENT_V`."""
 LISTEN_S = 0.02
