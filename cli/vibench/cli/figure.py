@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Numbers of the paper's figures that show measurements, which are drawn from recordings."""
+"""Numbers of those figures of the paper that show measurements; they are drawn from recordings."""
 
 
 def figure(

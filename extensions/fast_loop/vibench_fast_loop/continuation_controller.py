@@ -56,9 +56,9 @@ _GROWTH, _EASY = 1.5, 3
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Variations of the unknowns. Frequency and first coefficient: in steps; harmonics: relative to the level."""
 _BELOW = 5.0
-"""Initial value of the first coefficient below the model's value, in steps."""
+"""Distance of the first coefficient's initial value below the model's value, in steps."""
 _ABOVE = 8.0
-"""Initial value of the first coefficient above the model's value (about three times as large), in steps."""
+"""Distance of this initial value above the model's value (then about three times as large), in steps."""
 _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps], and largest base harmonics, relative to the
 level, that allow it. Both are small, because a motion with impacts is easily lost."""
