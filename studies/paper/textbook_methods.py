@@ -133,7 +133,7 @@ _DORMAND_PRINCE = Tableau(
 
 
 def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0) -> TextbookMethod:
-    """Return Dormand and Prince's pair, controlled as in MATLAB; defaults as MATLAB's for a run of 30 s.
+    """Return Dormand and Prince's pair, controlled as in MATLAB; the defaults are MATLAB's for a run of 30 s.
 
     Raises ValueError when a tolerance or the longest step is not positive and finite.
     """

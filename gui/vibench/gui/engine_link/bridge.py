@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 
 def find_measurement(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Return the measurement of the campaign that records the file ``name``; None if there is none."""
+    """Return the campaign's measurement that records the file ``name``; None if there is none."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)
@@ -305,7 +305,7 @@ class Bridge(QObject):
 
     @property
     def may_leave(self) -> bool:
-        """Whether the plan was armed so that the run continues without a window."""
+        """Whether the plan was armed as a run that continues without a window."""
         return self.is_driving and self._attendance is Supervision.UNATTENDED
 
     def close(self, how: Urgency = Urgency.END) -> None:

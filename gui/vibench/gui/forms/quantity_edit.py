@@ -96,7 +96,7 @@ _LONGEST_SHOWN = 40
 _SMALL = 1e-2
 """Absolute SI value at and above which a quantity is shown without a unit prefix."""
 _DIGITS = 6
-"""Number of displayed digits of a long number; the stored value keeps all."""
+"""Number of displayed digits of a long number; the stored value keeps all digits."""
 MOST_WHOLE = 1 << 53
 """Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0

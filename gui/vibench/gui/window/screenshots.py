@@ -32,7 +32,7 @@ from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
-"""Smallest supported and a common window size [pixels]; pictures of each size have their own folder."""
+"""Smallest supported window size, and a common size [pixels]; pictures of each size have their own folder."""
 PATIENCE_S = 3600.0
 """Longest wait for the window to become ready [s]; it is long, because the computer may be busy."""
 STILL_MS = 1200

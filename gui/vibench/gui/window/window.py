@@ -338,7 +338,7 @@ class Window(QMainWindow):
         self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Apply a change of the font; parts with a style sheet need a new one for this."""
+        """Apply a change of the font; parts with a style sheet need a new style sheet."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)

@@ -123,7 +123,7 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size that fits the number of channels, or four if there are fewer."""
+        """Return the size that fits the number of channels, but at least four channels."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
