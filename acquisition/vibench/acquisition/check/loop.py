@@ -119,7 +119,7 @@ LASTING: Mapping[str, Lasting] = {
     BASE_ACCELERATION: Lasting.LEVEL,
     **{detection_name(role): Lasting.LEVEL for role in Role},
 }
-"""Kind of quantity by the name of the finding."""
+"""Kind of quantity of each finding, keyed by the finding's name."""
 
 
 class LoopCheck:
