@@ -48,7 +48,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def unattended_engine() -> Announcement | None:
-    """Return an engine that runs a campaign although its parent program has ended; None without one."""
+    """Return an engine that runs a campaign although its parent program has ended; None if there is none."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
