@@ -35,7 +35,7 @@ class Batch:
     """Batch of writes, and of counters that are written afterwards to mark the data as valid."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
-    """Offset in the file and data of each write."""
+    """File offset and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
     """Value of each counter once the writes are on the disk, by file offset."""
     reservations: tuple[tuple[int, int], ...] = ()

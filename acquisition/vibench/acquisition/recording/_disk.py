@@ -21,7 +21,7 @@ class Disk(Protocol):
         """Write ``data`` at ``offset``, at least into the cache of the operating system."""
 
     def sync(self) -> None:
-        """Return when everything written so far would survive a power cut."""
+        """Wait until everything written so far would survive a power cut."""
 
     def reserve(self, offset: int, size: int) -> None:
         """Reserve space in the file, so that later writes to this range do not fail on a full disk."""
@@ -129,7 +129,7 @@ class TroubledDisk(PositionedFile):
         super().write(offset, data)
 
     def sync(self) -> None:
-        """Return when everything written so far would survive a power cut."""
+        """Wait until everything written so far would survive a power cut."""
         meet_trouble()
         super().sync()
 

@@ -63,7 +63,7 @@ class Dropout(NamedTuple):
 
     first: int
     stop: int
-    """Number of the sample after the last one."""
+    """Number of the sample after the drop-out's last sample."""
 
 
 def find_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:

@@ -71,11 +71,11 @@ class VirtualConfig(FrozenModel):
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
     generator_noise_v: NonNegativeFloat
-    """White noise at the terminal while the output is on, rms from 0 to 25.6 kHz [V]."""
+    """White noise at the terminal while the output is on, rms in the band 0 to 25.6 kHz [V]."""
     amplifier_noise_v: NonNegativeFloat
-    """White noise at the amplifier's output, rms from 0 to 25.6 kHz [V]."""
+    """White noise at the amplifier's output, rms in the band 0 to 25.6 kHz [V]."""
     accelerometer_noise_m_per_s2: NonNegativeFloat
-    """White noise of the accelerometer, rms from 0 to 25.6 kHz [m/s2]."""
+    """White noise of the accelerometer, rms in the band 0 to 25.6 kHz [m/s2]."""
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
     faults: str | None = None

@@ -165,7 +165,7 @@ class _Pace(Enum):
 
 
 class StopRequested(Exception):
-    """Raised when somebody requested the run to end."""
+    """Raised when somebody requested the end of the run."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.reason)

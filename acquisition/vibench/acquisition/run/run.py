@@ -211,7 +211,7 @@ class Run(ClosedOnLeaving):
         return self._ending.outcome(self._path)
 
     def cancel(self, reason: str = "cancelled") -> None:
-        """Request the run to ramp down and end.
+        """Request that the run ramp down and end.
 
         It has no effect on a run that has ended or is in its final ramp.
         """
