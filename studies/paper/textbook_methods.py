@@ -51,7 +51,7 @@ class Law(NamedTuple):
     loss: float = 0.0
     reference: float = 1.0
     terms: tuple[tuple[int, float], ...] = ()
-    """Exponent and force at the reference [N] of each term."""
+    """Exponent of each term, and its force at the reference [N]."""
     beside: float = 0.0
     """Stiffness of a linear spring parallel to the stop [N/m]."""
 

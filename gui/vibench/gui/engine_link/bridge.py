@@ -145,7 +145,7 @@ class EngineLine:
             tell()
 
     def leave(self, how: Urgency = Urgency.END) -> None:
-        """End the engine after a ramp-down, or leave the engine running; return without waiting for this."""
+        """End the engine after a ramp-down, or leave the engine running; return without waiting."""
         self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:

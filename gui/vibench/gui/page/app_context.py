@@ -73,7 +73,7 @@ class Settings:
         self._store.setValue(key.value, value)
 
     def state(self, key: SettingKey, name: str = "") -> QByteArray:
-        """Return the stored layout of a window or splitter; empty without one."""
+        """Return the stored layout of a window or splitter; empty if none is stored."""
         value = self._store.value(f"{key.value}/{name}" if name else key.value)
         return value if isinstance(value, QByteArray) else QByteArray()
 
