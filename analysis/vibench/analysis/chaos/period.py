@@ -10,9 +10,9 @@ from ..tables import Tabular
 
 LONGEST_PERIOD = 32
 _TABLE = 2
-"""Number of dimensions of an array of Poincaré points: drive periods by coordinates."""
+"""Number of dimensions of an array of Poincaré points, whose shape is (drive periods, coordinates)."""
 STEADY = 2e-3
-"""Scatter allowed in a steady motion's points, relative to the orbit; real drives fluctuate by this much."""
+"""Scatter allowed in a steady motion's points, relative to the orbit, because real drives fluctuate."""
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25
@@ -66,8 +66,8 @@ def shortest_period(points: Points) -> int | None:
     """Return the fewest drive periods after which all points repeat within noise; None if they do not.
 
     To test period n, every nth point is compared over the whole record, because slow changes are small from
-    one period to the next. These points may scatter by 0.2 % of the orbit (unsteady drive) in addition to
-    their noise; if n exceeds one, by at most half of the total scatter.
+    one period to the next. In addition to their noise, these points may scatter by 0.2 % of the orbit
+    (unsteady drive). If n exceeds one, half of the total scatter is a further limit.
     """
     by_noise = (_NOISE_MARGIN * points.noise) ** 2
     allowed = by_noise + STEADY**2
@@ -85,8 +85,8 @@ def shortest_period(points: Points) -> int | None:
 def drift(points: Points) -> float:
     """Return the largest trend of the points' mean or scatter over a record, in standard errors.
 
-    The slope through tenths of the record is divided by its standard error. A scatter of 0.2 % of the orbit
-    is tolerated as unsteadiness of the drive.
+    A line is fitted to the values of the record's tenths, and its slope divided by its standard error. A
+    scatter of 0.2 % of the orbit is tolerated as unsteadiness of the drive.
     """
     blocks = np.array_split(points.value, _BLOCKS)
     place = np.linspace(-0.5, 0.5, _BLOCKS)
@@ -115,7 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the points' scatter about their mean changes by a tenth or more, however small it is."""
+    """Return whether the points' scatter about their mean, however small, changes by a tenth or more."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

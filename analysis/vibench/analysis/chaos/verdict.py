@@ -34,7 +34,7 @@ _EXPLAINED = 0.02
 """Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Largest RMS distance of points from a closed curve, relative to their spread, even if noise is larger."""
+"""Noise of the points raises the limit `_EXPLAINED` to at most this value."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -75,7 +75,7 @@ def rotation(points: Reals) -> Rotation:
 
 
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
-    """Return the mains frequency or the harmonic that explains a rotation number; None if there is none."""
+    """Return the mains frequency, or a harmonic of it, that explains a rotation number; None if none does."""
     for mains in _MAINS_HZ:
         for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
             turns = hum_hz / drive_hz
@@ -121,7 +121,7 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Maximum number of points, from the end of a record, to test their shape; more points only take time."""
+"""Maximum number of points for tests of the shape, from the end of a record; more only take time."""
 ABOVE_NOISE = 5.0
 """Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
@@ -133,7 +133,7 @@ SLOW = 0.5
 _FEWEST_TURNS = 3.0
 """Minimum number of turns around a closed curve in a record; fewer turns count as a slow change."""
 _LARGEST_HUM = 0.1
-"""Largest mains hum relative to the orbit; a larger hum may be motion at the mains frequency."""
+"""Largest component at the mains frequency, relative to the orbit, that counts as hum, not as motion."""
 _LOW_PERIOD = 4
 """Longest period that counts as short; mains hum at half the drive frequency causes such periods."""
 CHAOTIC_K = 0.9
@@ -196,7 +196,7 @@ class MotionVerdict(Tabular):
     def least_exponent_per_s(self) -> float | None:
         """Lower bound on the largest Lyapunov exponent of a chaotic motion; None if unresolved.
 
-        Noise and the finite size of the motion reduce the slope by an unknown amount, up to a half. Points
+        Noise and the finite size of the motion reduce the estimate by an unknown amount, up to a half. Points
         that scatter for other reasons diverge as well.
         """
         parting = self.evidence.divergence
@@ -210,11 +210,11 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     """Return the verdict on a motion from its points, one per drive period.
 
     A motion is *periodic* if its points repeat within their noise, and *quasi-periodic* if they lie on a
-    closed curve. It is *chaotic* only if all tests agree: settled, far above the noise, on no closed curve,
-    0-1 test near one without oversampling, and linear noise rejected by surrogates. Each test alone would
-    accept some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as when a
-    chaotic transient ends, the last part is classified: always if its period is at most 4, otherwise only if
-    it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
+    closed curve. It is *chaotic* only if all tests agree: it is settled, far above the noise and on no closed
+    curve, the 0-1 test is near one without oversampling, and surrogates reject linear noise. Each test alone
+    would accept some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as
+    when a chaotic transient ends, the last part is classified: always if its period is at most 4, otherwise
+    only if it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
     InvalidRequest when the drive frequency is not positive and finite.
 
     Parameters

@@ -50,7 +50,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
         Theiler's window: points less than this many steps apart in time are not neighbours, since they belong
         to one stretch of the orbit (Theiler, Phys. Rev. A 34 (1986) 2427).
     last
-        Only points before this index are used, so that both points of a pair can be followed beyond it.
+        Only points before this index are used, so that both points of a pair have successors.
     floor
         Neighbours closer than this are skipped, because noise dominates.
     """
@@ -86,7 +86,7 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Ratio of neighbours' distance to the typical one above which the attractor's size limits the growth."""
+"""Neighbours' distance over the typical distance, above which the attractor's size limits growth."""
 _ABOVE_NOISE = 3.0
 """Minimum ratio of the neighbours' distance to the noise for a point of the line fit."""
 _SHORTEST_FIT = 3
@@ -117,7 +117,8 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     """Return the divergence of neighbouring points over time.
 
     Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit starts where distances exceed the noise
-    and ends before the size of the attractor limits them. If too few steps lie between, the exponent is NaN.
+    and ends before the size of the attractor limits them. With too few steps between both, the exponent is
+    NaN.
 
     Raises NotEnoughData when fewer than 50 points have a neighbour.
 
@@ -206,7 +207,7 @@ class ZeroOne:
 
 
 def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
-    """Apply the 0-1 test to a series that was taken once per drive period.
+    """Apply the 0-1 test to a series with one value per drive period.
 
     Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
     oscillatory term removed (eqs. 3.1 to 3.6). It mistakes noise for chaos, and an oversampled chaotic flow
@@ -351,7 +352,7 @@ def surrogate_test(
     Parameters
     ----------
     series
-        Shape (n,), taken once per drive period.
+        Shape (n,), one value per drive period.
     statistic
         `prediction_error` or `time_symmetry`.
     seed

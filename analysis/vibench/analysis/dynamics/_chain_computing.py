@@ -201,8 +201,8 @@ SHOWN_PERIODS = 16
 STRETCHES = 400
 """Maximum number of equal parts of a whole run; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
-"""Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, at most this share of the time simulated before."""
+"""Averaging time [s] of energies under a steady sine, after the responses were observed; if an error or a
+time was requested, largest share of the time simulated before."""
 SWEEP_PARTS = 120
 """Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
@@ -338,7 +338,7 @@ def _bare_run(
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Return a run with its outcome and impacts only, as for a run that did not reach its end."""
+    """Return the result of a run that stopped early, which has only its outcome and impacts."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,

@@ -56,7 +56,7 @@ _EDGE = 1e-3
 """Relative margin at both ends of a frequency axis; measured frequencies miss round values by ppm."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratios of the ends of a frequency axis: linear below the first, with ticks at 3 and 7 below the second."""
+"""Ratio of the ends below which a frequency axis is linear, and ratio below which it has ticks at 3 and 7."""
 _FEW_DECADES = (1.5, 0.5)
 """Numbers of decades below which some, or all, ticks between powers of ten have labels."""
 _POWERS_BELOW = 1e-3

@@ -24,7 +24,7 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Ratios of Response I to II (1 for a sine) below which nothing collides, and above which masses collide."""
+"""Ratios of Response I to II (1 for a sine): below the first nothing collides, above the second masses do."""
 _LENGTH_S = 3.0
 """Length of the tracked part of a recording [s], long enough for four restarts of the search."""
 _MOST_RECORDINGS = 3
@@ -115,7 +115,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
 def track_recordings(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
-    The second result is empty. If no recording can be tracked, the first is None and the second the reason.
+    The second result is the reason if no recording can be tracked (then the first is None), else empty.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -145,7 +145,7 @@ def numbers_from_statistics(
 ) -> tuple[CollisionNumbers | None, str]:
     """Return parameters by comparing statistics of the first suitable recording with simulated specimens.
 
-    The second result is empty. If no recording is suitable, the first is None and the second the reason.
+    The second result is the reason if no recording is suitable (then the first is None), else empty.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:

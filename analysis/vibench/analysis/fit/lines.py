@@ -41,7 +41,7 @@ _STEP = 1e-6
 _HOPELESS = 5.0
 """Multiple of the chi square limit above which no weighting of lines can make a fit valid."""
 _MOST_STEPS = 60
-"""Maximum number of evaluations of a fit; the fit of a further mode that the data lack has no optimum."""
+"""Maximum number of evaluations of a fit; fits of a further mode that the data lack have no optimum."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""

@@ -55,7 +55,7 @@ class Posterior:
     draws: Reals
     """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics relative to the furthest run; infinite if bounds leave a range."""
+    """Distance of the observed statistics relative to the furthest run; infinite if bounds miss the range."""
 
     @property
     def fits(self) -> bool:

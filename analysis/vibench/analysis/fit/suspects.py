@@ -56,7 +56,7 @@ class Suspect:
     mends: bool
     """Whether the model fits when this assumption is dropped."""
     behind: float
-    """Twice the log likelihood ratio to the best suspect, plus ln(number of values) per parameter; best 0."""
+    """Twice the log likelihood ratio to the best suspect (0 for itself), plus ln(values) per parameter."""
 
     @property
     def may_be_it(self) -> bool:
@@ -65,7 +65,7 @@ class Suspect:
 
 
 def suspects(lines: Lines, usual: LineFit, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
-    """Fit without each assumption in turn; return the assumptions by likelihood and number of parameters.
+    """Fit without each assumption in turn; return the assumptions sorted by likelihood and parameters.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def suspects(lines: Lines, usual: LineFit, *, is_nonlinear: bool | None) -> tupl
 
 
 _Told = Callable[[Specimen, Reals], str]
-"""Function that describes the fitted change; an empty text if the change is impossible."""
+"""Function that returns a description of the fitted change, or an empty text for an impossible change."""
 
 
 def _assumptions(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:

@@ -39,7 +39,7 @@ _REACH_DAMPING = 4.0
 _USUAL_HZ = 300.0
 """Reference frequency that scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""Largest relative uncertainty of the line or damping of an unresolved peak; others may be ripples."""
+"""Largest relative uncertainty of an unresolved peak (line or damping); less certain peaks may be ripples."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Degrees of the background, tried in turn; near broad peaks, a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
@@ -52,11 +52,11 @@ def resonances(
     """Find and fit the resonances of a transmission in a band, sorted by frequency.
 
     Each significant peak is fitted with H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ...,
-    weighted by the standard deviations. This is one mode on a polynomial background of degree 1 to 3 from the
-    neighbouring modes; R, b0 and b1 are complex. The pole is found by variable projection (Golub & Pereyra
-    1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise explains are left out. Then all modes are fitted
-    together. The joint fit is used if it explains the whole band, because a polynomial describes neighbouring
-    modes only approximately.
+    weighted by the standard deviations. This is one mode on a polynomial of degree 1 to 3, the background
+    from neighbouring modes; R, b0 and b1 are complex. The pole is found by variable projection (Golub &
+    Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise explains are left out. Then all modes
+    are fitted together. The joint fit is used if it explains the whole band, because a polynomial describes
+    neighbouring modes only approximately.
 
     Raises InvalidRequest when fewer than eight lines lie in the band.
     """
@@ -211,7 +211,7 @@ def _split_poles(poles: Reals, modes: int) -> Iterator[Reals]:
 
 
 def _is_determined(found: Resonance, lines: Lines) -> bool:
-    """Return whether the lines determine a mode: in the band, damping known, and not a ripple of noise."""
+    """Return whether a mode is determined: in the band, with known damping, and not a ripple of noise."""
     natural_hz, damping = found.frequency_hz, found.damping_ratio
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
     if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:

@@ -204,7 +204,7 @@ def _refine(
 def _restarts(
     motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> list[Estimate] | str:
-    """Search parameters in several parts of a motion; return a reason if too few parts could be tracked."""
+    """Search for parameters in several parts of a motion; return a reason if too few could be tracked."""
     stretches = _stretches(motion)
     good: list[Estimate] = []
     refused = ""
@@ -266,7 +266,7 @@ def combine(found: list[Estimate], described: TrackedSpecimen, independent: floa
 
 
 def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
-    """Replace the narrow prior by a wide one; return values, claimed and likely variances.
+    """Replace the narrow prior by a wide one; return values, and their claimed and likely variances.
 
     The filter needs a narrow prior to keep its track. With this prior, weakly determined parameters would
     stay at the description, with bounds as narrow as the prior. In units of the narrow prior, the information

@@ -250,7 +250,7 @@ class LiveTwin:
         self._begin_anew(0)
 
     def begin_run(self, usual: Level | None) -> None:
-        """Discard the last motion but keep its parameters; ``usual`` is the new excitation's level."""
+        """Discard the last motion but keep its parameters; ``usual`` is the new excitation's usual level."""
         self.watch = ChangeWatch(usual)
         self.found = ()
         self._begin_anew(0)

@@ -16,9 +16,9 @@ from ._ring import RingWindow
 _LEAST_SHARE = 0.5
 """Minimum share of a sine's power in its strongest spectral line and the neighbouring lines."""
 _NEIGHBOURS = 3
-"""Number of a sine's spectral lines on each side of its strongest (Hann), even in a slow sweep."""
+"""Number of lines on each side of the strongest line of a sine (Hann window), even in a slow sweep."""
 _LEAST_LINE = 4
-"""Minimum number of periods to analyse; with fewer, the sine's spectral line merges with the offset's."""
+"""Minimum number of periods to analyse; with fewer, the lines of the sine and of the offset merge."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
 
 
 _BAND_BELOW = 0.3
-"""High-pass frequency for displacement, relative to the drive's; passes half orders but no drift."""
+"""High-pass frequency for displacement over drive frequency; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
 """Length [s] of newest signal from which the drive frequency is found; five periods of 10 Hz."""
@@ -96,7 +96,7 @@ _STRETCH_PERIODS = 25
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Minimum ratio of final to initial drive amplitude in the samples of a point; less is a ramp-down."""
+"""Minimum ratio of final to initial drive amplitude in a point's samples; a lower ratio is a ramp-down."""
 _STEEPEST_POWER = 2
 """Largest power of frequency that the voltage of a sweep follows (constant displacement)."""
 

@@ -64,7 +64,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Return the rms noise over the quiet blocks; the quietest block alone is a few per cent too low."""
+    """Return the rms noise over all quiet blocks; that of the quietest block is a few per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)

@@ -108,7 +108,7 @@ _TOPS = (0.1, 0.03, 0.01)
 _FLAT = 0.88
 """Share of a top's samples in its upper half: 0.71 for smooth, 0.84 for straight, 1 for clipped peaks."""
 _FLAT_VALUE = 0.4
-"""Share of the samples in the upper half of a peak that have one value; it is lower in smooth peaks."""
+"""Minimum share of the samples in a clipped peak's upper half that have the clipped value."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
 """Minimum number of converter steps to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
@@ -165,7 +165,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 _LEAST_HEIGHT = 0.1
-"""Smallest height of a peak above the median, relative to the span; if lower, the signal rests there."""
+"""Smallest height of a peak above the median, relative to the span; a lower top is a signal at rest."""
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:

@@ -107,7 +107,7 @@ def _logarithm(response: Reals) -> Reals:
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Return the step at each interval between the lines fitted on both sides, and its standard error."""
+    """Return each interval's step from the line fitted before to the line fitted after it, and its error."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2

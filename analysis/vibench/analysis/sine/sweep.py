@@ -119,7 +119,7 @@ _SAME_LARGEST = 0.03
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge in which a bridge's error of three times the motion decays to 2 %."""
+"""Periods of the band's lower edge in which a bridging error of three times the motion decays to 2 %."""
 _ROOM = 1.1
 """Factor on the length of longer intervals; the first interval may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)

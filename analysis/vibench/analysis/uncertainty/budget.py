@@ -14,7 +14,7 @@ from ..tables import Tabular, plus_minus
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Factor on the scatter of a recording that ended when its scatter was small enough: `Budget.widen`."""
+"""Factor on the scatter of a recording that ended when its scatter was small enough; see `Budget.widen`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = {

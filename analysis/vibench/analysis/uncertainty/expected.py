@@ -54,7 +54,7 @@ _EDGE_PERIODS = 80
 """Drive periods at each end of a window that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Difference of runs, in standard errors, above which the runs are on different motions."""
+"""Difference of runs, in standard errors, above which they count as different motions."""
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,8 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
     specimen. For a sine, they are both Responses over at most 5 s. Their random error is the scatter of three
     simulated runs, analysed like recordings; it is not stated if the runs settle on different motions.
-    Scatter falls with the root of the time. Other kinds of plan, and rigs without a channel for the motion of
-    m0 or the base's acceleration, have no expected results.
+    Scatter falls with the square root of the time. Other kinds of plan, and rigs without a channel for the
+    motion of m0 or the base's acceleration, have no expected results.
 
     Parameters
     ----------
