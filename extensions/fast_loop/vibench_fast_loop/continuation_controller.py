@@ -307,7 +307,7 @@ def stability_note(
     low, high = found.bounds
     stability = Stability.OPEN
     if moved <= max(_SAME, _ERRORS * error):
-        # Comparisons with NaN are false; then the stability is not determined.
+        # Comparisons with NaN are false, so the stability is then undetermined.
         stability = Stability.STABLE if high < 1 else Stability.UNSTABLE if low > 1 else Stability.OPEN
     known = isfinite(found.size) and isfinite(found.error)
     return BranchStabilityNote(

@@ -190,7 +190,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig may wait in simulated time, which passes faster: use the longer of both times.
+                # A virtual rig may wait in simulated time, which passes faster: use the longer of the two.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

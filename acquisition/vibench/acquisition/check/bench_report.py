@@ -23,7 +23,7 @@ from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
 """Largest level of the test sine as a fraction of the bench's amplitude limit, far below clipping."""
-# After this time, the response of an AC coupling with a corner of 0.5 Hz to a step has decayed.
+# After this time, the step response of an AC coupling with a corner of 0.5 Hz has decayed.
 _SETTLE_S = 1.5
 _READ_S = 2.0
 _BYTES_PER_SAMPLE = 4

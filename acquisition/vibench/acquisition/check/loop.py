@@ -142,7 +142,7 @@ class LoopCheck:
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
-        # Channels that do not detect the sine were reported above.
+        # Channels without the sine were reported above.
         if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):

@@ -140,7 +140,7 @@ class PhaseLaw:
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Only the level changed before the first measurement. Assume that the phase error did not change.
+        # Before the first measurement, only the level has changed. Assume that the phase error has not.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -237,7 +237,7 @@ class PhaseSearch:
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # Extrapolate from the best measurement, because other modes bend the line away from its own zero.
+        # Extrapolate from the best measurement: other modes bend the line, so its own zero is wrong.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)

@@ -108,7 +108,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     """Lock on to the resonance at every level and record there; each level starts where the last ended."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # The tracked order may be 1 % of the motion, and the whole motion would seem settled too early.
+        # The tracked order may be 1 % of the motion, which as a whole would seem settled too early.
         loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
@@ -190,7 +190,7 @@ def _search(
 ) -> Controller[TrackedPlace]:
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Super- and subharmonics settle slowly, and unsettled motions would give a wrong phase slope.
+        # Super- and subharmonics settle slowly; measured before, they would give a wrong phase slope.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     controller = SettlingController(loop, rule, level)

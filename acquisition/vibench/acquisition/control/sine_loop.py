@@ -320,7 +320,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # Use only the newest measurement, because earlier measurements belong to another setting.
+        # Use only the newest measurement: earlier ones were made at another setting of the drive.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:

@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape too: that of the sine may be too high for the memory.
+            # Set the frequency before the shape too: the sine's may be too high for a shape in memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
@@ -332,7 +332,7 @@ class AFG1022X(ScpiInstrument):
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves an error, as the empty reply has shown already
+        self.complaints()  # drop the error of an unknown query; the empty reply is enough
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)

@@ -115,7 +115,7 @@ class DaqmxOutput:
             with ExitStack() as last:
                 last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
                 last.callback(self._release)
-                # An output that ran out of samples reports this again; the output has stopped, as required.
+                # An output that has run out of samples reports this error again; it has stopped, as required.
                 last.enter_context(suppress(DataLost))
                 if task is not None:
                     with daqmx_call(f"stopping {self._physical}"):

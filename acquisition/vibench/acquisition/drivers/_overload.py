@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import InstrumentError, LimitExceeded
 from ..instruments import Overload, Samples
 
-# Vibrometers and converters distort before they clip: hardware reference 4.
+# Vibrometers and converters distort before they clip (hardware reference, section 4).
 OVERLOAD_FRACTION = 0.95
 # A delta-sigma converter's filter rings about this long after a clip; closer overloads count as one.
 _RECOVERY_SAMPLES = 64

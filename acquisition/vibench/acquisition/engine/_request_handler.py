@@ -307,7 +307,7 @@ class RequestHandler:
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
-            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer that sent it has gone
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer that sent the request has gone
         return self.continues_unattended or (self._is_orphan and self._is_looked_after)
 
     @property

@@ -105,7 +105,7 @@ class Admission:
         oldest = next(iter(self._waiting.values()), None)
         if oldest is not None and len(self._waiting) >= WAITING_MOST:
             if monotonic() - oldest.since_s < YOUNG_S:
-                sleep(YOUNG_S / 10)  # first read messages that waiting clients may have sent
+                sleep(YOUNG_S / 10)  # first read what the waiting clients may have sent
                 return
             self._turn_away(next(iter(self._waiting)))
         try:

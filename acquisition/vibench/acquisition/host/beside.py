@@ -21,7 +21,7 @@ class Beside:
         self.is_busy = self._is_closing = False
         """Whether a job is running or queued in the helper thread."""
         self._changed = Condition()
-        with suppress(RuntimeError):  # without a thread from the system, no job is done
+        with suppress(RuntimeError):  # if the system refuses a thread, no job is done
             Thread(target=self._run, name=name, daemon=True).start()
 
     def do(self, job: Callable[[], None]) -> None:

@@ -150,7 +150,7 @@ def _band_hz(source: SampleSource) -> Floats:
 def _of_waveform(lines: ComplexArray, repetition_hz: float, number: int, transfer: Transfer) -> Load:
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Use twice the samples that the highest spectral line needs, so that no peak between samples is missed.
+    # Take twice as many samples as the highest spectral line needs, so that no peak between them is missed.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)

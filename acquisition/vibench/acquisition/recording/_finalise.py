@@ -172,7 +172,7 @@ def location(part: Path, error: Exception) -> str:
         is_there = part.exists()
     except OSError:  # the folder no longer responds
         is_there = False
-    # After FileNotFoundError, the recording was removed; a file with this name is a different file.
+    # FileNotFoundError means that the recording was removed; a file with this name is a different file.
     if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (

@@ -94,7 +94,7 @@ class Ending:
             digitizer.stop()
         except AcquisitionError as failure:
             self._add(failure)
-            if not has_failed_already:  # otherwise the first failure remains the cause
+            if not has_failed_already:  # otherwise the first failure stays the cause of the end
                 raise
 
     def _finish(self, sink: RecordingWriter) -> None:

@@ -376,7 +376,7 @@ class PhaseRunner:
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
                 self._silence.note_signal()
-                with suppress(AcquisitionError):  # the measured drive decides, not the result of this call
+                with suppress(AcquisitionError):  # the measured drive shows whether this succeeded
                     self._drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
                 self.loop.cut()

@@ -83,7 +83,7 @@ class KeptStops:
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             self._taken.add(path)
             with suppress(OSError):
-                _answer(path, "silent").unlink(missing_ok=True)  # the answer to an earlier stop
+                _answer(path, "silent").unlink(missing_ok=True)  # this file answers an earlier stop
                 rename(path, _answer(path, "taken"))
         self.confirm()
 

@@ -104,7 +104,7 @@ class StopSwitch:
     @property
     def request(self) -> StopRequest | None:
         """Hardest stop requested so far; None if none was requested."""
-        # Each level has a separate entry, so that two threads at once cannot lose the harder stop.
+        # Each level has a separate entry, so that two threads that stop at once cannot lose the harder stop.
         for level in reversed(StopLevel):
             if level in self._requests:
                 return self._requests[level]

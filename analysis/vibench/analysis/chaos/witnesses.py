@@ -117,8 +117,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     """Return the divergence of neighbouring points over time.
 
     Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit starts where distances exceed the noise
-    and ends before the size of the attractor limits them. With too few steps between both, the exponent is
-    NaN.
+    and ends before the size of the attractor limits them. If too few steps remain, the exponent is NaN.
 
     Raises NotEnoughData when fewer than 50 points have a neighbour.
 

@@ -290,7 +290,7 @@ def _begin(block: Reals) -> "_Scan | None":
     rising = intervals[intervals > 0]
     if not rising.size or np.count_nonzero(intervals >= 0) < _RISING * intervals.size or block.size < 2:
         return None
-    # A lost sample doubles an interval; rounding lengthens it by a third at most if samples can be counted.
+    # A lost sample doubles an interval. If samples can be counted, rounding lengthens it by at most a third.
     typical = float(np.median(rising[rising <= 1.4 * np.quantile(rising, _SINGLE)]))
     is_near = np.abs(intervals / typical - 1) <= _OFF
     # Repeated and coarse times have intervals of zero, which lost samples do not explain.

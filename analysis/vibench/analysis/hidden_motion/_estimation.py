@@ -109,7 +109,7 @@ class _Search:
                 begun = acquire(inflated, self._motion, looked)
                 match begun:
                     case str():
-                        # Report why the first start failed; the last fails because the record ends.
+                        # Report why the first start failed: the last one fails only because the record ends.
                         why, looked = why or begun, looked + block
                         continue
                     case FilterState():

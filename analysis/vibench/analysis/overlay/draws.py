@@ -402,7 +402,7 @@ def all_draws(
 
     def estimate_draw(number: int) -> Draw[None]:
         channels = source.channels(number)
-        # One estimate at a time: it is at most half of the work, but takes twice the simulation's memory.
+        # Compute one estimate at a time: it is at most half of the work, but takes twice a run's memory.
         with estimating:
             draw = estimate(channels)
             if number == 0:

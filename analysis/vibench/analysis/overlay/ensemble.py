@@ -229,8 +229,7 @@ def largest_of_chance(largest: Reals) -> float:
 
     ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
     distribution with their mean and deviation. It is widened, because few draws determine these poorly:
-    otherwise 2 % of 16 draws would exceed it, and 5 % of five. The factor is fitted to
-    simulations.
+    otherwise 2 % of 16 draws would exceed it, and 5 % of five. The factor is fitted to simulations.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)

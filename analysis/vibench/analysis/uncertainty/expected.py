@@ -478,7 +478,7 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: ChannelSd, at_hz: float
         if chance.has_several_motions:
             yield ExpectedResult(name, window_s, None, Cause.CHANCE, lasting, missing)
         elif scatter > STEADY and name == RESPONSE_I:
-            # The largest value scatters from window to window; a longer recording does not reduce this.
+            # The largest value scatters from window to window, however long the recording is.
             yield ExpectedResult(
                 name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing
             )

@@ -144,7 +144,7 @@ def chain_lyapunov_exponent(
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
     """Return the second motion, moved along the line between both motions to the small distance."""
     apart = second - first
-    # The size is at least a displacement of all masses by the drive amplitude, because it is zero at rest.
+    # At rest the size is zero: use at least a displacement of all masses by the drive amplitude.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))

@@ -165,7 +165,7 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    # Use only zeros with falling values: through a mode, the lag increases with frequency.
+    # Use only zeros at which the function falls: through a mode, the lag increases with frequency.
     found_hz = [
         float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)

@@ -93,7 +93,7 @@ class FixedCourse:
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s requested have passed")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # The period became known only in the window: observe it again over whole periods (no leakage).
+            # The period became known only in the window: observe again, over whole periods (no leakage).
             begins = window.begins.copy()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)

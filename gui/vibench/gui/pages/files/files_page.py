@@ -171,7 +171,7 @@ class FilesPage(Page):
         self._opened = recording
         self._title.setText(recording.path.name)
         if recording.path != path:
-            # The recording ended after the folder was listed, which changed its name.
+            # After the folder was listed, the recording ended and so got another name.
             self._wanted = recording.path
             self.list_folder()
         if recording.samples == 0:
