@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape too: the sine's may be too high for a shape in memory.
+            # Set the frequency before the shape too: a sine's frequency may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)

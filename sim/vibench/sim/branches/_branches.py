@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches that start at motions on no known branch, and their forks, until a time limit."""
+    """Yield branches from motions on no known branch, and the branches that fork off, until a time limit."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()

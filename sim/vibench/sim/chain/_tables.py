@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Distance in cells up to which two cells may not both be in contact, for each window, (windows,)."""
+    """Distance in cells within which only one cell may be in contact, for each window, shape (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:

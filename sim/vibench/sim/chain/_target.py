@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Continue the run for ``periods``; return whether it succeeded with time left for as many again."""
+        """Continue the run for ``periods``; return whether it succeeded and leaves time for as many again."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))

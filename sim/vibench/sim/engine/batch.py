@@ -223,8 +223,8 @@ class BatchedMotion:
     """Result of one motion that was integrated in a batch."""
 
     states: Floats
-    """States once per drive period, shape (periods, 6). If a period, except the last, ends during a short
-    collision, its state is extrapolated back from the motion after the collision."""
+    """States once per drive period, shape (periods, 6). If a period other than the last ends during a short
+    collision, the state is extrapolated back from the motion after the collision."""
     impacts: int
 
 
@@ -260,7 +260,7 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
     Parameters
     ----------
     runs
-        Motions with the same tolerance, out of contact at the end of a drive period, no tangent vectors.
+        Motions without tangent vectors, with equal tolerances, out of contact at the end of a drive period.
     periods
         Number of drive periods for each motion.
 

@@ -99,7 +99,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces samples put past the end by rounding."""
+        """Return all samples, shape (samples, 6); ``last`` replaces samples rounded past the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 

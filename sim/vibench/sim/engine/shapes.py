@@ -59,7 +59,7 @@ ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
 """Largest distance of the maximum from the middle of phi [rad], at which eight terms have an error of 1e-7;
-at a tenth of it they have only rounding errors."""
+at a tenth of this distance they have only rounding errors."""
 
 
 def _top_of(terms: Vector) -> float:

@@ -113,7 +113,7 @@ class LyapunovEstimate:
     local_time_s: Floats
     """End times of the intervals in which growth is measured, shape (n,) [s]."""
     local_exponents_per_s: Floats
-    """Growth rate in each interval, with the first interval at time zero, shape (n,) [1/s]."""
+    """Growth rate in each interval, the first of which begins at time zero, shape (n,) [1/s]."""
     transient: ChaoticTransient | None
     impacts: int
     """Number of impacts in the whole run."""

@@ -51,7 +51,7 @@ class BlockedMean:
     blocks: int
     correlation_length: float
     """Number of successive values that carry as much information as one independent value: the squared
-    standard error over the one that independent values would have."""
+    standard error over that of independent values."""
     is_long_enough: bool
     """Whether there are at least `FEWEST_BLOCKS` blocks; otherwise the standard error is a lower bound."""
 
@@ -102,7 +102,7 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the limits of the correlation test at each block length, tested with all longer lengths."""
+    """Return the limits of the correlation test for each block length together with all longer lengths."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))

@@ -19,7 +19,7 @@ LARGEST_ATTRIBUTE_BYTES = 1_000_000
 LARGEST_CHUNK_BYTES = 256_000_000
 """Largest allowed chunk of a dataset [bytes]; chunks of recordings have 200 kB."""
 LARGEST_RATIO = 1100
-"""Largest ratio of declared to stored bytes; Deflate compresses by at most 1030 (zlib's documentation)."""
+"""Largest ratio of declared to stored bytes; Deflate compresses at most 1030-fold (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
 """Largest size [bytes] that a dataset may declare beyond its stored data, for constant fill values."""
 OWN_FILTERS = frozenset(

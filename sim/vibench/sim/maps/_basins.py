@@ -24,9 +24,9 @@ BLOCKS = 4
 """Number of parts into which each axis is divided for the jackknife error of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain initial states with which a distance is used in the fit."""
+"""Fewest uncertain initial states at a distance that the fit uses."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of uncertain initial states with which a distance is used in the fit."""
+"""Largest share of uncertain initial states at a distance that the fit uses."""
 SPREAD = 4.0
 """Smallest ratio of the largest to the smallest used distance; a narrower range gives no reliable slope."""
 

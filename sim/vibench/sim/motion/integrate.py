@@ -71,7 +71,7 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 
 
 LATEST_START_S = 1e8
-"""Latest start time [s], about three years; later ones cannot be resolved to 1e-8 s in double precision."""
+"""Latest start time [s], about three years; double precision cannot resolve later times to 1e-8 s."""
 MOST_SAMPLES = 1e9
 """Largest number of samples of a run; they need 48 GB of memory."""
 ROUNDING = 1e-9

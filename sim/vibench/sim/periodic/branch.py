@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle within which a Floquet multiplier lies on it, as without damping."""
+"""Distance from the unit circle within which a Floquet multiplier counts as on it, as without damping."""
 
 
 class Parameter(StrEnum):

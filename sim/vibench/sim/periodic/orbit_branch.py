@@ -48,7 +48,7 @@ class ExactFamily:
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
         """Return the closure error after a period, its Jacobian, and a ratio of scales.
 
-        The map scales velocities by its own drive, the family by the reference drive; the ratio converts.
+        The map scales velocities by its drive, the family by the reference drive. The ratio converts them.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]

@@ -317,7 +317,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
 
 
 class PhaseReference(StrEnum):
-    """Which motion of m0 defines the phase at a phase resonance."""
+    """Motion of m0 that defines the phase at a phase resonance."""
 
     RELATIVE = "relative"
     """Motion relative to the base: for the lowest mode, or if contacts limit the relative motion."""

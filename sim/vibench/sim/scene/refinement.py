@@ -190,11 +190,11 @@ class _Refinement:
         self._run_error: float | None = None
         """Relative integration error of the responses of each start; None if not yet measured."""
         self._kind: MotionKind | None = None
-        """Kind of the motion from the first start if that does not repeat; None if not yet known."""
+        """Kind of the motion from the first start if this motion does not repeat; None if not yet known."""
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """Number of latest states once per drive period that are stored."""
+        """Number of latest states that are stored, one per drive period."""
 
     def answers(self) -> Iterator[ScenePrediction]:
         """Yield ever better results; raise ValueError if the time was too short for any result."""

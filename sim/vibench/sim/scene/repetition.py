@@ -258,7 +258,7 @@ class Pace:
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Return the period of a nearly settled motion, in drive periods; 1 if there is none.
 
-        Spectral lines are taken over it. What counts as nearly settled is the same at every accuracy level.
+        Spectral lines are taken over this period. Nearly settled means the same at every accuracy level.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period

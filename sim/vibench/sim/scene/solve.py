@@ -441,7 +441,7 @@ def _final_kind(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> Moti
 
 
 def _confirm_chaos(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
-    """Return the prediction; a motion found to be chaotic is corrected if its exponent is not positive."""
+    """Return the prediction; the kind "chaotic" is corrected if the exponent is not positive."""
     from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
 
     is_chaotic = found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}

@@ -133,7 +133,7 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return the relative rounding errors of responses; a line has the absolute error of its peak."""
+    """Return the relative rounding errors of responses; a line's absolute error equals that of the peak."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
@@ -144,7 +144,7 @@ class _StrictRun:
     run: FollowedRun
     """Stricter run, at the time at which it separated from the original run, else at the window's end."""
     responses_m: Floats | None
-    """Responses in the window [m], shape (4,); None if the two runs have separated before it."""
+    """Responses in the window [m], shape (4,); None if the two runs separate before it."""
     is_together: bool
     """Whether the stricter run stayed together with the original run."""
 

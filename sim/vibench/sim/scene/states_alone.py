@@ -31,7 +31,7 @@ SLICE_S = 0.5
 PARTS = 4
 """Number of parts of a stretch in which growth is measured, to see if a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Time for which states are stored, in decay times of the slowest mode; settling takes ten at *standard*."""
+"""Time for which states are stored [decay times of the slowest mode]; settling takes ten at *standard*."""
 
 
 class StatesAlone:

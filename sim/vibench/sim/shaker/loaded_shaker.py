@@ -159,7 +159,7 @@ class LoadedShaker:
     Coil and table are solved exactly for a voltage and a force that are constant in a time step. The specimen
     is solved exactly between impacts; impacts are integrated within a step (native/cubic.hpp). The specimen's
     force on the table is extrapolated and constant in a step. This causes a relative error (omega h)^2 / 12
-    in the motion due to it (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
+    in the resulting motion (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
     """
 
     def __init__(

@@ -43,7 +43,7 @@ class DrivenTable:
     """Model of a test bench: amplifier, shaker, specimen and sensors."""
 
     amplifier: Amplifier
-    """Amplifier; the default one if the voltage is that at the coil."""
+    """Amplifier; the default one for a voltage measured at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity

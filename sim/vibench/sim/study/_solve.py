@@ -70,8 +70,8 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
 
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; the same
-for bundles that are solved in SIMD batches [s]."""
+"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; and that of
+a bundle that is solved in SIMD batches."""
 
 
 class Expansion(Points):
