@@ -80,7 +80,7 @@ _LEAST_RISING = 64
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 _MOST_REPEATED = 100
-"""Maximum number of samples by which times may go back; at more, another record begins."""
+"""Maximum number of samples by which times may go back; beyond it, another record begins."""
 FARTHEST = 2**40
 """Largest gap between two times that is counted, in sample intervals."""
 _DATENUM = (693_000, 770_000)

@@ -367,7 +367,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]]:
-    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``) and those of all columns."""
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``) and the facts of all columns."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:
