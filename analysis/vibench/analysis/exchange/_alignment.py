@@ -62,7 +62,7 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative distance from multiples of the usual interval that counts as irregular; its allowed share."""
+"""Relative distance of irregular intervals from multiples of the usual one, and their allowed share."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 10
@@ -70,7 +70,7 @@ _LEAST_ROUNDED = 10
 _ROUNDED_SPREAD = 1.05
 """Largest range of the deviations of rounded times from a line, in units of the last digit."""
 _COARSE_SPREAD = 1.25
-"""Largest range of the deviations of coarse times from a line, in last digits; more means lost samples."""
+"""Largest range of the deviations of coarse times from a line, in last digits; lost samples exceed it."""
 _RISING = 0.9
 """Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512

@@ -116,7 +116,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
 
 
 def _rank(time: SourceChannel, channel: SourceChannel, *, is_named: bool) -> tuple[bool, bool, int]:
-    """Return flags that show how likely times belong to a channel; all zero if they do not."""
+    """Return a key that ranks how likely times belong to a channel; all zero if they do not."""
     if time.samples != channel.samples:
         return False, False, 0
     is_above = _group(channel).startswith(_group(time))
