@@ -103,7 +103,7 @@ def drift(points: Points) -> float:
 
 
 def slow_share(points: Points) -> float:
-    """Return the variance between the means of tenths of the record, relative to the points' variance."""
+    """Return the variance of the means of the record's tenths, relative to the variance of the points."""
     means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _BLOCKS)])
     whole = float(np.sum(np.var(points.value, axis=0)))
     return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0

@@ -129,7 +129,7 @@ LARGEST_NOISE = 0.1
 SMALL = 0.05
 """Largest scatter of a periodic motion with linear noise, relative to the size of the orbit."""
 SLOW = 0.5
-"""Largest `slow_share` of the variance of a motion that does not change slowly."""
+"""Largest `slow_share` of a motion that does not change slowly."""
 _FEWEST_TURNS = 3.0
 """Minimum number of turns around a closed curve in a record; fewer turns count as a slow change."""
 _LARGEST_HUM = 0.1
@@ -140,7 +140,7 @@ CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required distance below the surrogates' mean [standard deviations]; a rank test alone errs once in 40."""
 _ASYMMETRIC = 2.5
-"""Minimum `margin` of the time symmetry; noise exceeds it in 4 % of cases (better of two coordinates)."""
+"""Minimum `margin` of the time symmetry; the larger of noise's two margins exceeds it in 4 % of cases."""
 _SURELY = 3.0
 """Distance of an exponent's lower bound below its estimate, in standard deviations of the estimate."""
 _DELAYS = 3

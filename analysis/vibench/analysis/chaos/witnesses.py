@@ -179,7 +179,7 @@ def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
 
 
 _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
-"""Frequencies c of the 0-1 test; others are prone to resonances (Gottwald and Melbourne, section 3.1)."""
+"""Range of frequencies c of the 0-1 test; others cause resonances (Gottwald and Melbourne, section 3.1)."""
 _FREQUENCIES = 100
 _CUT = 10
 """The mean square displacement is computed for lags up to the series length divided by this number."""
@@ -333,7 +333,7 @@ def prediction_error(series: Reals) -> float:
 
 
 def time_symmetry(series: Reals) -> float:
-    """Return the skewness of a series' increments, root mean square over lags of 1 to 4, with a minus sign.
+    """Return minus the rms, over lags of 1 to 4, of the skewness of a series' increments.
 
     Linear noise is symmetric in time, also after a static nonlinearity; dissipative chaos rarely is
     (Schreiber and Schmitz, Physica D 142 (2000) 346, section 5).

@@ -107,7 +107,7 @@ class Curve(Tabular):
 
 
 def sorted_curve(curve: Curve) -> Curve:
-    """Return the curve sorted by frequency, each frequency once, for downward sweeps and repeated points."""
+    """Return the curve sorted by frequency, without duplicates, for downward sweeps and repeated points."""
     frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
         curve,

@@ -67,7 +67,7 @@ class BranchRequest(SpecimenChoice):
     places: Annotated[int, Field(ge=2, le=1000)] = 8
     """Number of values in the range at which motions are searched for."""
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
-    """Number of random initial states at each value; a larger number finds more isolated branches."""
+    """Number of random initial states at each value; a larger number may find further isolated branches."""
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
     """Longest period to search, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1

@@ -188,7 +188,7 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
 
 _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
-"""Samples per period of the highest frequency: enough for a figure, few enough for a long sweep."""
+"""Samples per period of the highest frequency: enough for a figure, and few enough for a long sweep."""
 _SMALLEST_PART = 0.2
 """The frequency axis contains all lines above this share of the largest spectral line (-14 dB)."""
 _EXCITATION_COLUMNS = 2000

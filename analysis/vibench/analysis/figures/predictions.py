@@ -160,7 +160,7 @@ _POINTS = 801
 
 
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigure:
-    """Draw the contact force on m1 over p = y - z, with one panel per specimen, titled by its key.
+    """Draw the contact force on m1 over p = y - z, with one panel per specimen, titled by the key.
 
     The stop with the smaller gap is shown. A law that depends on speed is drawn for loading and unloading at
     0.1 m/s. Rigid stops have no finite force and are drawn as a wall.

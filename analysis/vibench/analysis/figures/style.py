@@ -53,12 +53,12 @@ WIDTH_IN = 7.2
 """Width of figures [in] that fits the text of an A4 page and a column of a report."""
 PNG_DPI = 160
 _EDGE = 1e-3
-"""Relative margin at both ends of a frequency axis; measured frequencies miss round values by ppm."""
+"""Relative margin at both ends of a frequency axis; measured frequencies differ from round values by ppm."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
 """Ratio of the ends below which a frequency axis is linear, and ratio below which it has ticks at 3 and 7."""
 _FEW_DECADES = (1.5, 0.5)
-"""Numbers of decades below which some, or all, ticks between powers of ten have labels."""
+"""On an axis with fewer decades than this, some, or all, ticks between powers of ten have labels."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))

@@ -140,7 +140,7 @@ def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate
 
 
 _SAME_HZ = 0.5
-"""Dwells closer than this [Hz] have the same frequency."""
+"""Dwells whose frequencies differ by less than this [Hz] count as dwells at one frequency."""
 _OVERSHOOT = 1.5
 """Largest p during the steps of a ramp, relative to steady motion; usually below 1.2."""
 

@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Return one parameter of a specimen; if links differ in damping time, that of link 0 is returned."""
+    """Return one parameter of a specimen; the damping time is that of link 0 if links differ."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:

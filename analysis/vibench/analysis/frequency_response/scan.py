@@ -66,7 +66,7 @@ class Scan:
 
     @property
     def shapes(self) -> tuple[ScanShape, ...]:
-        """Deflection shape at each resonance that is found in at least one point."""
+        """Deflection shape at each resonance that at least one point shows."""
         found = sorted(mode.frequency_hz for each in self.analyses for mode in each.response.resonances)
         groups = np.split(np.array(found), np.flatnonzero(np.diff(found) > _SAME * np.array(found[1:])) + 1)
         return tuple(self._shape(float(np.median(each))) for each in groups if each.size)

@@ -175,7 +175,7 @@ def move_filter(
     force_variance: Reals = _NOTHING,
     record: Structure | None = None,
 ) -> int:
-    """Advance ``at`` by up to ``count`` samples; return the number of samples before a loss.
+    """Advance ``at`` by up to ``count`` samples; return the number of samples until the track was lost.
 
     In each table after the first, one parameter is changed by its deviation.
     """

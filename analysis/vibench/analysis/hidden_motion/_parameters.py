@@ -35,7 +35,7 @@ class Search(NamedTuple):
     step: float
     """Step of the parameter for numerical derivatives."""
     near: float
-    """Prior standard deviation about the description, if the latter suffices to track the motion."""
+    """Prior standard deviation about the description, if the description suffices to track the motion."""
     least_sd: float = 0.0
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0

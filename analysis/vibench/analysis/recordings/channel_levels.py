@@ -113,9 +113,9 @@ _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
 """Minimum number of converter steps to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
-"""Largest empty range of values in a well sampled smooth peak, relative to the peak and to a top."""
+"""Largest empty range of values in a smooth, well sampled peak, relative to the heights of peak and top."""
 _AS_FREQUENT = 0.4
-"""Largest number of samples at one value below a clipped peak, relative to the clipped samples."""
+"""Largest number of samples at one value below a clipped peak, over the number of clipped samples."""
 
 
 def _lasting(bins: Reals) -> tuple[int, int]:

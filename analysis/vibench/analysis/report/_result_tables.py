@@ -140,7 +140,7 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 
 def edge_text(edge: Edge, instead: str) -> str:
-    """Return an edge with its bounds as text, or the text ``instead`` if it is not empty."""
+    """Return the text ``instead`` if it is not empty, otherwise an edge with its bounds as text."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 

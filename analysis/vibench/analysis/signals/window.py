@@ -91,7 +91,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
 
 
 def line_correlation(window: Window | str) -> tuple[float, float]:
-    """Return the number of correlated neighbouring lines of a windowed spectrum, for values and squares.
+    """Return the number of correlated neighbouring lines of a windowed spectrum, for values and for squares.
 
     Errors of lines k apart have the correlation |W(k) / W(0)|, with W the transform of the squared window.
     """

@@ -219,7 +219,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
 
 
 def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
-    """Yield sentences on the kinds of recorded motions and on missed levels; period one is omitted."""
+    """Yield sentences on the kinds of recorded motions (except period one) and on missed levels."""
     count = Counter((each.motion, each.period) for each in steps)
     kinds = [
         f"period {period}: {count[Steadiness.PERIODIC, period]}"

@@ -178,7 +178,7 @@ class SpectralDensity(Tabular):
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float
-    """Equivalent noise bandwidth; times the density, it gives the power of a sine on a line."""
+    """Equivalent noise bandwidth; its product with the density is the power of a sine on a line."""
     segments_used: int
     segments_excluded: int
     sample_rate_hz: float

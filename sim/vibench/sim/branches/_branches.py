@@ -132,11 +132,11 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distances of the first guess from the state at a bifurcation, over the gap, tried to switch branches."""
+"""Distances [gaps] of the first guess from the state at a bifurcation, tried to switch branches."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distances of the parameter from a bifurcation, over the parameter's range, tried to switch branches."""
+"""Distances of the parameter from a bifurcation, relative to its range, tried to switch branches."""
 LEFT = 1e-4
-"""Distance from the old branch, over the gap, above which a motion counts as being on the new branch."""
+"""Distance [gaps] from the old branch above which a motion counts as being on the new branch."""
 SWITCHED = {
     BifurcationKind.SYMMETRY_BREAKING: BranchOrigin.SYMMETRY_BREAKING,
     BifurcationKind.PERIOD_DOUBLING: BranchOrigin.PERIOD_DOUBLING,

@@ -26,9 +26,9 @@ SIMPLER = 1e-6
 """Relative distance of states below which half a period counts as a period, or a motion as symmetric."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
-"""Largest abs(p) of random initial states, over the gap on the same side."""
+"""Largest abs(p) of random initial states, relative to the gap on the same side."""
 RANDOM_REACH = 3.0
-"""Largest x and z of random initial states, over the larger of gap and amplitude without stops."""
+"""Largest x and z of random initial states, relative to the larger of gap and amplitude without stops."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Lowest and highest approach speed of the collision fit, over gap times fastest modal rate."""
+"""Lowest and highest approach speed of the collision fit, divided by gap and fastest modal rate."""
 HARDEST_PRESS = 0.24
 """Largest acceleration due to other springs that the collision fit covers, over approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
@@ -150,7 +150,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect on p of each repeated time integral of the force, over that of the second one."""
+    """Return the effect on p of each repeated time integral of the force, over the effect of the second."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]

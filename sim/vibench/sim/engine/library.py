@@ -179,7 +179,7 @@ class Engine:
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
-        """Return the tables of a scene. They point to the collision and step shapes: keep those alive.
+        """Return the tables of a scene. They point to the collision and step shapes: keep these shapes alive.
 
         Raises ValueError when the engine rejects a number of the scene.
         """

@@ -110,7 +110,7 @@ class KickStability:
     motion: int
     """Index of the motion, as in `MapResults.motion_numbers`."""
     size: float
-    """Standard deviation of the kicks: displacements over the gap, velocities over gap * 2 pi f."""
+    """Standard deviation of the kicks: displacements / gap, velocities / (gap * 2 pi f)."""
     returned: Share
     """Share of kicks after which the motion returns, within the drive periods of the map."""
 

@@ -157,7 +157,7 @@ class MapResults(GridResults[Map]):
     def motions(self) -> tuple[MapMotion, ...]:
         """Motions of the whole map, in the order of `motion_numbers`.
 
-        Shares are those among all known points, corrected by the audit if points are filled in.
+        Shares refer to all known points, and are corrected by the audit if points are filled in.
         """
         return self._describe_motions(self.motion_numbers.reshape(-1), self.audit)
 

@@ -46,7 +46,7 @@ class Response:
 
     @property
     def response_i(self) -> float:
-        """Largest abs(x) over the window, over the drive amplitude."""
+        """Largest abs(x) in the window, over the drive amplitude."""
         return self.largest_x_m / self.drive.amplitude_m
 
     @property
@@ -56,7 +56,7 @@ class Response:
 
     @property
     def relative_i(self) -> float:
-        """Largest abs(p) over the window, over the drive amplitude."""
+        """Largest abs(p) in the window, over the drive amplitude."""
         return self.largest_p_m / self.drive.amplitude_m
 
     @property

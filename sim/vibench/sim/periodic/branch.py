@@ -152,7 +152,7 @@ class OrbitSigns:
     joins: BifurcationKind | None = None
     """Bifurcation at which this branch meets a branch of mirrored motions or of half the period."""
     grazing_distance: float = math.inf
-    """Distance from grazing: p to the stop over the gap or, at a contact, dp/dt over the gap times 2 pi f."""
+    """Distance from grazing: (p to the stop) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
 
     @property
     def over_period(self) -> Complex:
@@ -194,9 +194,9 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Distance from a simpler motion, over the gap, which a branch may cover in one step."""
+"""Largest distance [gaps] from a simpler motion at the points before and after it."""
 IS_SIMPLER = 1e-7
-"""Distance from a simpler motion, over the gap, below which both motions differ only by rounding."""
+"""Distance [gaps] from a simpler motion below which both motions differ only by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:

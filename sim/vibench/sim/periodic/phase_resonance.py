@@ -34,7 +34,7 @@ FREQUENCY_SHARE = 0.1
 FARTHEST = 20.0
 """Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state that Newton's iteration may try, over the gap; larger ones take minutes on a hard spring."""
+"""Largest state [gaps] that Newton's iteration may try; larger ones take minutes on a hard spring."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
 """Step of the finite differences for derivatives of the phase, over the scale of each unknown."""

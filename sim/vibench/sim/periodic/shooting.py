@@ -300,7 +300,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the distance from grazing: p to the stop over the gap, or dp/dt over the gap times 2 pi f."""
+    """Return the distance from grazing: (p to the stop) / gap, or (dp/dt) / (gap * 2 pi f)."""
     if isinstance(specimen.contact, NoContact | PowerLaw):
         return math.inf
     lower, upper = specimen.gaps_m

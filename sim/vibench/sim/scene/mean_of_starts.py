@@ -74,7 +74,7 @@ def windows_of(starts: Sequence[Start]) -> int:
 
 
 def others_of(starts: Sequence[Start]) -> int | None:
-    """Return how many starts missed the repeating motion that most reached; None without such a motion."""
+    """Return how many starts missed the repeating motion of most starts; None without such a motion."""
     settled = np.array([each.windows[0] for each in starts if each.repeats is not None])
     if 2 * len(settled) < len(starts) or len(settled) == 0:
         return None

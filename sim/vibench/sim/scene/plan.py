@@ -141,7 +141,7 @@ SLOW = 0.9
 """Ratio of drive frequency to lowest natural frequency below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if p without stops equals the gap; grows with the cube root of p over gap."""
+"""Impacts per drive period if p without stops equals the gap; grows with the cube root of p / gap."""
 HALF_PRESSED = 150.0
 """Ratio of p without stops to the gap at which m1 touches a stop for half of the time."""
 MICROMETRES = 1e6

@@ -2,7 +2,7 @@
 
 Ever better results with error estimates are computed until the target is met. Methods, by rising cost: a
 closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated window,
-checked by a stricter run; with sensitive dependence on the start, the mean of these over several starts.
+checked by a stricter run; with sensitive dependence on the start, their mean over several starts.
 """
 
 import math

@@ -28,7 +28,7 @@ from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile,
 from .states_alone import Follow, StatesAlone
 
 PUSH = 1e-6
-"""Largest change of the initial state: displacements over the gap, velocities over gap times 2 pi f."""
+"""Largest change of the initial state: displacements / gap, velocities / (gap * 2 pi f)."""
 SEED = 2025
 PARTED = 0.01
 """Relative difference of displacements above which the motions from two starts have separated; it is ten
@@ -36,7 +36,7 @@ thousand times the initial difference."""
 TOUCHING = 0.999
 """Ratio of abs(p) to the gap above which m1 may be in contact."""
 LEAST_SIZE = 1e-3
-"""Smallest size of a motion, over the gap, that is used in the test for separation."""
+"""Smallest size [gaps] of a motion that is used in the test for separation."""
 LEAST_S = 1e-3
 """Smallest assumed computing cost of a run from one start [s]."""
 TOO_FEW = 4
@@ -151,7 +151,7 @@ class SeveralStarts:
 
     @property
     def motions(self) -> tuple[ReachedMotion, ...]:
-        """Motions reached from the starts; that of the requested start comes first."""
+        """Motions reached from the starts; the motion of the requested start comes first."""
         return tuple(self._reached)
 
     @property

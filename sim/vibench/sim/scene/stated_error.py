@@ -31,7 +31,7 @@ accurate than a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Ratio of a window's length to that of the shorter windows it is compared with; also of their leakage."""
+"""Number of parts of a window that are compared with it; their leakage is as many times larger."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
@@ -48,7 +48,7 @@ SLOWEST_RATIO = 0.9
 FIRST_LOOK = 16
 """Number of drive periods before two runs are first compared; this number then doubles each time."""
 PARTED = 0.05
-"""Difference over the gap, or relative difference of responses, above which two runs have separated."""
+"""Difference [gaps], or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
 """Number of decay times (slowest mode) after which a chaotic motion counts as stationary."""
 MEMBERS = 5

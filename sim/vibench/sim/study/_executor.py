@@ -36,7 +36,7 @@ class Reply:
 
     bundle: Bundle
     solved: tuple[SolvedScene, ...]
-    """Results in the order of the scenes; fewer than scenes after a cancellation or an error."""
+    """Results in the order of the scenes; some are missing after a cancellation or an error."""
     error: BaseException | None = None
     """Error that prevented the missing results; None if there was no error."""
 

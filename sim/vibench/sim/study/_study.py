@@ -26,7 +26,7 @@ from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_sp
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
-"""Largest number of values of all ranges together; more are probably a mistake."""
+"""Largest number of values of all ranges together; more values are probably a mistake."""
 WHOLE = 1e-9
 """Relative tolerance within which a range has a whole number of steps and so includes its stop."""
 
