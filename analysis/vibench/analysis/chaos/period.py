@@ -16,7 +16,7 @@ STEADY = 2e-3
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25
-"""Largest ratio of the variance at equal phase to the variance of all points, for periods above one."""
+"""For periods above one: largest variance at equal phase, relative to the variance of all points."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""

@@ -140,7 +140,7 @@ CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required distance below the surrogates' mean [standard deviations]; a rank test alone errs once in 40."""
 _ASYMMETRIC = 2.5
-"""Minimum `margin` of the time symmetry; the larger of noise's two margins exceeds it in 4 % of cases."""
+"""Minimum `margin` of the time symmetry; with noise, one of two coordinates exceeds it in 4 % of cases."""
 _SURELY = 3.0
 """Distance of an exponent's lower bound below its estimate, in standard deviations of the estimate."""
 _DELAYS = 3

@@ -439,7 +439,7 @@ def _node(axis: FunctionAxis, recording: RecordingDescription) -> int:
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return a function, its first frequency, and its spacing with six digits; zeros if uneven."""
+    """Return a function, its first frequency, and its spacing with six digits; zeros for uneven spacing."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0

@@ -64,7 +64,7 @@ class StepTables:
     flow: Reals
     """Matrix that maps state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
     small_flow: Reals
-    """Matrix that maps state, acceleration and its rise over a small step, without stops; shape (8, 10)."""
+    """The same matrix for a small step, shape (8, 10)."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""

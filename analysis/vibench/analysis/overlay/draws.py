@@ -264,7 +264,7 @@ START_M = 5e-9
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Lead-in before the simulated part, fade-in at its start, and faded tail after the part [s]."""
+"""Lead-in before the simulated part, fade-in at the start of the lead-in, faded tail after the part [s]."""
 _NOISE = 0.15
 """Uncertainty (± natural logarithm) of a channel's noise, estimated in its quietest part."""
 _MORE = 3

@@ -190,7 +190,7 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each branch diagram; along frequency, with the results of stepped sines and sweeps."""
+    """Draw each branch diagram; if over frequency, with the results of stepped sines and sweeps."""
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:

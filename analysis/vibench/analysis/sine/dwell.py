@@ -264,7 +264,7 @@ class DwellResponse(Tabular):
     noise_density: float
     """Noise density of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """RMS displacement noise from the velocity noise, or measured without drive if larger [m]."""
+    """RMS displacement noise [m]: from the velocity noise or, if larger, as measured without drive."""
     displacement: ConvertedSignal
     """x over the record [m]; the window lies in its settled part."""
     is_clear: Flags

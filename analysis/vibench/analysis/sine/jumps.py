@@ -17,7 +17,7 @@ _SIDE = 12
 """Number of intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""Minimum size of a jump in standard errors, since thousands of steps with rough errors are tested."""
+"""Minimum size of a jump in standard errors, as thousands of steps with roughly known errors are tested."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3

@@ -121,7 +121,7 @@ _LINES = 1 << 15
 _BRIDGE_PERIODS = 3.0
 """Periods of the band's lower edge in which a bridging error of three times the motion decays to 2 %."""
 _ROOM = 1.1
-"""Factor on the length of longer intervals; the first interval may start slightly below the band."""
+"""Factor on the length of the longer intervals, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference with unit gain for white noise, which removes the smooth motion."""

@@ -342,7 +342,7 @@ def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
 def _densities(rig: Rig, frequency_hz: Reals) -> tuple[Reals, float] | None:
     """Return one-sided noise densities: m0's velocity [(m/s)^2/Hz], base acceleration [(m/s2)^2/Hz].
 
-    None if not stated. An accelerometer on m0 has the noise of its sensor divided by omega.
+    None if not stated. For an accelerometer on m0, sensor noise is divided by omega.
     """
     response = rig.response or Role.M0_VELOCITY
     of_m0, of_base = _density(rig, response), _density(rig, Role.BASE_ACCELERATION)

@@ -58,7 +58,7 @@ SLOWEST, FASTEST = 0.06, 5.0
 HARDEST_PRESS = 0.24
 """Largest acceleration due to other springs that the collision fit covers, over approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest time derivative of that acceleration, over speed / u^2; ratio of successive derivatives."""
+"""Largest time derivative of that acceleration, over speed / u^2, and ratio of successive derivatives."""
 PAPER_TURN = 0.053
 """Fastest modal rate times u [rad], for the paper's specimen at a medium approach speed."""
 SLOWEST_TURN = 0.15

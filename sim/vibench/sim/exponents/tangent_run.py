@@ -237,7 +237,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Change of state per cycle (relative) below which a motion repeats, and above which it does not."""
+"""Relative change of state per cycle: below the first a motion repeats, above the second it does not."""
 LONGEST_CYCLE = 16
 """Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0

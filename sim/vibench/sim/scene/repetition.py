@@ -33,12 +33,12 @@ motion may still be settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
 """Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
 NEUTRAL = 0.1
-"""Growth per decay time of the slowest mode that still counts as zero; damping alone gives -1."""
+"""Largest growth per decay time (slowest mode) that counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
 """Number of consecutive parts of a motion; in a drift, the changes of state in all of them grow, or all
 shrink. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time without growth or decay of a perturbation that shows quasi-periodic motion, in decay times."""
+"""Time [decay times] without growth or decay of a perturbation, after which a motion is quasi-periodic."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ FINEST_STEP_HZ = 5e4
 _PASS_PART = 0.45
 """Upper end of the pass band over the sample rate; a cosine edge to half the sample rate follows."""
 _MARGIN = 2048
-"""Samples on each side of a piece that are filtered with it; beyond, impulse responses are below 1e-8."""
+"""Samples filtered with a piece on each side of it; beyond them, impulse responses are below 1e-8."""
 _PIECE = 1 << 15
 """Number of samples in a piece of the recording; a piece is filtered at once."""
 _BLOCK_S = 0.02
