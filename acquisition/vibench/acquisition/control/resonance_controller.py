@@ -190,7 +190,7 @@ def _search(
 ) -> Controller[TrackedPlace]:
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Super- and subharmonics settle slowly; measured before, they would give a wrong phase slope.
+        # Super- and subharmonics settle slowly; measured too early, they would give a wrong phase slope.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     controller = SettlingController(loop, rule, level)

@@ -216,7 +216,7 @@ def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
 LONGEST_READ_S = 2.0
 # Time added to the duration of a read [s]; samples that come later are an error.
 _READ_MARGIN_S = 10.0
-# Sigma-delta modules use the next higher rate of a list. Refuse a lower rate, or one twice as high.
+# Sigma-delta modules use the next higher rate of a list. Refuse a rate below the request or twice as high.
 _MOST_COERCED = 2.0
 
 

@@ -253,7 +253,7 @@ class BranchDiagram(Tabular):
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return curves of Responses I and II of m0, separate for unstable motions; empty over amplitude."""
+        """Return curves of Responses I and II of m0 for stable and unstable motions; empty over amplitude."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []

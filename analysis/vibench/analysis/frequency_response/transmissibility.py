@@ -17,7 +17,7 @@ _ENOUGH_FREEDOM = 24.0
 _FREEDOM = 96.0
 """Degrees of freedom, summed over neighbouring lines, for estimating the noise levels."""
 _FEWEST_FREEDOM = 4.0
-"""If all lines together have more degrees of freedom, smoothing over neighbouring lines helps."""
+"""If all lines together have more degrees of freedom than this, smoothing over neighbours helps."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12

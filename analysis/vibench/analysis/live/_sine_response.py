@@ -87,7 +87,7 @@ def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Rea
 
 
 _BAND_BELOW = 0.3
-"""High-pass frequency for displacement over drive frequency; passes half orders but no drift."""
+"""High-pass frequency for displacement, divided by the drive frequency; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
 """Length [s] of newest signal from which the drive frequency is found; five periods of 10 Hz."""

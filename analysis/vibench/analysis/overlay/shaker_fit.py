@@ -109,7 +109,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starting points, as data determine products of parameters better than each."""
+    """Search from several starting points: data determine products of parameters better than parameters."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -151,7 +151,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return base acceleration over voltage, times s, like an estimate of velocity over acceleration."""
+    """Return base acceleration over voltage, times s, as for a ratio of velocity to acceleration."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     plan = analysis.excitation

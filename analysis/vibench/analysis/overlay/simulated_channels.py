@@ -75,7 +75,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 _PIECE_S = 5.0
 """Duration that is simulated at once, to limit memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; each multiplies the end effect of a spline by 0.27."""
+"""Extra samples on each side of a piece; each sample multiplies the end effect of a spline by 0.27."""
 _VX = 3
 _STATE = 6
 

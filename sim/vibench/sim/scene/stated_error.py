@@ -31,7 +31,7 @@ accurate than a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Number of parts of a window that are compared with the whole; their leakage is so many times larger."""
+"""Number of parts of a window that are compared with the whole; their leakage is this many times larger."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
