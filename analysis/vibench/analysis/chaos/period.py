@@ -27,7 +27,7 @@ _STEADY_SCATTER = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Points(Tabular):
-    """Poincaré points of a motion, one per drive period, with their noise, relative to the orbit's size."""
+    """Poincaré points of a motion, one per drive period, and their noise; both relative to the orbit."""
 
     value: Reals
     """Displacement and velocity, each divided by the size of the orbit, shape (periods, 2)."""

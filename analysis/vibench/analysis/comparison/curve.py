@@ -169,9 +169,9 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """Minimum height of a peak above the neighbouring valley [dB]."""
 _LEAST_RISE_SD = 8.0
-"""Minimum height of a peak in standard deviations; a thousand points of noise span 6.5."""
+"""Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 of these."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance [half widths]): at most n peaks, the mode's own included, lie within it of a mode."""
+"""Pairs (n, distance [half widths]): at most n peaks, the mode's own included, lie this close to a mode."""
 _CROWD_RISE = 0.3
 """Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01

@@ -237,7 +237,7 @@ class TimeAxis:
     trouble: str = ""
     """Reason why the times cannot be used; empty if they can be used."""
     unit: str | None = ""
-    """Unit of the times; empty if the file states none, None for sample numbers."""
+    """Unit of the times; empty if not stated, None for sample numbers."""
     is_named: bool = False
     """Whether the name of the channel means time."""
 

@@ -21,7 +21,7 @@ from .specimen_fit import SpecimenFit
 _M0, _RELATIVE = 0, 3
 """Columns of m0 and p in `base_transmissibility`."""
 _MOST_APART = 0.03
-"""Largest |ln| of the ratio of measured to linear motion of m0; smooth motion with contact differs more."""
+"""Largest |ln| of the ratio of measured to linear motion of m0; smooth motion with contact exceeds it."""
 _STEP_HZ = 0.02
 """Frequency step [Hz] for the curvature of the transmissibility: 1 % of the narrowest resonance."""
 _STEP = 1e-4

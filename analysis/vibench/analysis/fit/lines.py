@@ -36,7 +36,7 @@ PHASE_AT_HZ = 100.0
 SCALES = (0.9, 0.95, 1.05, 1.1)
 """Factors on all natural frequencies for further starting points of the search."""
 _STEP = 1e-6
-"""Logarithmic step of central differences; far above rounding, far below the width of a resonance."""
+"""Logarithmic step of central differences, far above rounding and far below the width of a resonance."""
 
 _HOPELESS = 5.0
 """Multiple of the chi square limit above which no weighting of lines can make a fit valid."""

@@ -27,7 +27,7 @@ from .parameters import (
 from .suspects import Assumption, Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
-"""Relative standard deviation of a converter clock; recordings do not reveal its error."""
+"""Relative standard deviation of a converter clock, whose error recordings do not reveal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class SpecimenFit(Tabular):
     lines: int
     """Number of spectral lines that were fitted."""
     reduced_chi_square: float
-    """Reduced chi square, about 1 if the model explains the lines; scatter is estimated."""
+    """Reduced chi square from estimated scatter, about 1 if the model explains the lines."""
     limit: float
     """Reduced chi square that one correct model in a thousand exceeds."""
     suspects: tuple[Suspect, ...]

@@ -155,7 +155,7 @@ class Scatter(StrEnum):
     REALISATIONS = "realisations"
     """Bounds contain the full uncertainty: noise and nonlinear distortion."""
     PERIODS = "periods"
-    """Bounds contain noise only, from one realisation; a nonlinear specimen may lie outside."""
+    """Bounds contain noise only, from one realisation; a nonlinear response may lie outside."""
 
 
 @dataclass(frozen=True)

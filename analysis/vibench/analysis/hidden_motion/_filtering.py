@@ -26,7 +26,7 @@ _IMPULSE_SHARE = 0.003
 _SMOOTHING_S = 8e-3
 """Averaging time of squared innovations to detect the loss of a track [s]."""
 LOSS_LIMIT = 8.0
-"""Mean squared normalised innovation above which a track is lost; about 1 is good."""
+"""Mean squared normalised innovation above which a track is lost; a good track has about 1."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
 """Value of `FilterPredictions.kinds` for a step without contact."""

@@ -289,7 +289,7 @@ class SimulatedRun:
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
-    """Accuracy of simulated contacts if the base motion drives the specimen; standard for a voltage."""
+    """Accuracy of simulated contacts if the base motion drives the specimen; *standard* if a voltage does."""
     base_band_hz: tuple[float, float] | None
     """Band of the base displacement that drives the specimen; None if a voltage drives it."""
     why: str = ""

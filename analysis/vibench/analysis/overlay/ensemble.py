@@ -284,7 +284,7 @@ class CurveDifference(Tabular):
     frequency_hz: Reals
     decibel: Reals
     standard_errors: Reals
-    """ln(measured / simulated) over the combined standard deviation; infinite if that is zero."""
+    """ln(measured / simulated) over the combined standard deviation; infinite if the latter is zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
         """Return the ratios at the points flagged by ``kept``."""

@@ -19,7 +19,7 @@ from ..signals.arrays import Complexes, Flags, Reals
 from .response import FORCE, RESPONSE_ROLES, VELOCITY, ResponseChannel
 
 SENSOR_DAMPING_RATIO = 0.02
-"""Damping ratio of a piezoelectric sensor's mounted resonance; a usual value."""
+"""Usual damping ratio of the mounted resonance of a piezoelectric sensor."""
 
 
 class SensedChannel(Protocol):

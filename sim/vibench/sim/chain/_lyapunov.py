@@ -26,7 +26,7 @@ from ._tables import chain_tables, longest_window_s
 NEARNESS = 1e-6
 """Distance to which the two motions are repeatedly reset, over the size of the first motion."""
 SHORTEST_INTERVAL_S = 5e-3
-"""Shortest time between two resets [s]; at a rate of 100 per second, distances grow less than twofold."""
+"""Shortest time between two resets [s]; at a growth rate of 100 1/s, distances grow less than twofold."""
 FEWEST_INTERVALS = 32
 """Smallest number of intervals from which the error of the mean growth rate is estimated."""
 

@@ -99,7 +99,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of the exponent [1/s]; for cycles, half the difference of two; for modes, zero."""
+    """Standard error of the exponent [1/s]; half the difference of two cycles if periodic, zero for modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion

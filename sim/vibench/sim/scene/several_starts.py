@@ -108,7 +108,7 @@ class Draw:
     clear: int = CLEAR
     """Number of starts, including the requested one, if all starts reach one motion or chaos lasts."""
     fewest: int = FEWEST
-    """Number of starts if they neither reach one motion, nor several motions, nor lasting chaos."""
+    """Number of starts if neither of the other two cases applies."""
     most: int = MOST
     """Number of starts if different starts reach different motions."""
     seed: int = SEED
