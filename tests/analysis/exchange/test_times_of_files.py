@@ -363,14 +363,50 @@ def test_a_column_named_t_with_another_quantity_is_not_read_as_time(tmp_path, he
         assert not recording.gaps
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".mat", ".h5", ".tdms"])
+@pytest.mark.parametrize("jitter", ["normal", "uniform", "alternating", "rare"])
+def test_jittered_times_are_refused_unless_the_mapping_ignores_them(tmp_path, suffix, jitter):
+    rng = np.random.default_rng(17)
+    intervals = {
+        "normal": 0.1 * rng.standard_normal(SAMPLES),
+        "uniform": rng.uniform(-0.25, 0.25, SAMPLES),
+        "alternating": 0.1 * (-1.0) ** np.arange(SAMPLES),
+        "rare": 0.4 * (rng.random(SAMPLES) < 0.1),
+    }[jitter]
+    times = np.round((np.arange(SAMPLES) + intervals) / RATE_HZ, 7)
+    path = tmp_path / f"a{suffix}"
+    columns = {"time": times, "a": motion(times), "b": 2 * motion(times)}
+    if suffix == ".csv":
+        np.savetxt(path, np.stack(list(columns.values())).T, "%.9g", ",", header="time,a,b", comments="")
+    elif suffix == ".mat":
+        savemat(path, {"run": columns})
+    elif suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for name, values in columns.items():
+                file[f"run/{name}"] = values
+    else:
+        with nptdms.TdmsWriter(path) as writer:
+            writer.write_segment([nptdms.ChannelObject("g", *each) for each in columns.items()])
+    with pytest.raises(InvalidRequest, match=r"times that jitter by .*, more than their digits explain"):
+        import_recording(path, mapping(suffix[1:], RATE_HZ), tmp_path / "made.h5")
+    even = mapping(suffix[1:], RATE_HZ).model_copy(update={"time": "even"})
+    with open_recording(import_recording(path, even, tmp_path / "made.h5")) as recording:
+        assert recording.bench["imported"]["time_contradicted"]
+
+
 @pytest.mark.parametrize("first", [0.0, 7.3, 1.7e9])
 @pytest.mark.parametrize(
-    ("rate_hz", "digits"),
-    [(1024, 3), (980, 3), (4900, 4), (5120, 4), (9600, 4), (9980, 4), (51_200, 5), (96_000, 5)],
+    ("rate_hz", "digits", "rows"),
+    [
+        *((rate_hz, 3, 6000) for rate_hz in (1024, 980)),
+        *((rate_hz, 4, 6000) for rate_hz in (4900, 5120, 9600, 9980)),
+        *((rate_hz, 5, 6000) for rate_hz in (51_200, 96_000)),
+        *((rate_hz, digits, 200) for rate_hz, digits in ((980, 3), (5120, 4), (5120, 5))),
+    ],
 )
-def test_rounded_times_are_not_counted_as_lost_samples(tmp_path, rate_hz, digits, first):
+def test_rounded_times_are_not_counted_as_lost_samples(tmp_path, rate_hz, digits, rows, first):
     """One interval in 20 or fewer differs from the others, by one unit of the last digit."""
-    times = np.arange(6000) / rate_hz
+    times = np.arange(rows) / rate_hz
     rows = (
         f"{first + t:.{digits}f};{x:.9g};{2 * x:.9g}\n" for t, x in zip(times, motion(times), strict=True)
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from vibench.acquisition import shorten
 
@@ -65,16 +66,18 @@ _OFF, _MANY_OFF = 0.25, 0.05
 """Relative distance of irregular intervals from multiples of the usual one, and their allowed share."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
-_LEAST_ROUNDED = 10
+_LEAST_ROUNDED = 3
 """Minimum number of differing intervals to recognize rounding; fewer could be due to regular losses."""
-_ROUNDED_SPREAD = 1.05
-"""Largest range of the deviations of rounded times from a line, in units of the last digit."""
+_JITTER, _OUTLIERS = 0.04, 0.03
+"""Largest range of jitter that rounding does not explain [sample intervals]; ignored share on each side."""
 _COARSE_SPREAD = 1.25
 """Largest range of the deviations of coarse times from a line, in last digits; lost samples exceed it."""
 _RISING = 0.9
 """Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512
 """Number of time stamps in a group; only the smallest and the largest deviation of each group are kept."""
+_LAST = 64
+"""Number of time stamps from which the resolution is determined."""
 _LEAST_RISING = 64
 """Minimum number of evenly rising values at which a channel not named time counts as times."""
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
@@ -297,33 +300,58 @@ def _begin(block: Reals) -> "_Scan | None":
     is_off = np.abs(intervals / typical - np.maximum(np.rint(intervals / typical), 1)) > _OFF
     mean = float(block[-1] - block[0]) / intervals.size
     many = _MANY_OFF * intervals.size + (intervals.size > 2)
+    digit = float(np.max(_resolution(block[np.newaxis], typical)))
     if np.count_nonzero(is_off) > many:
-        return _Scan(mean, float(np.quantile(rising, 0.01)))
+        is_repeated = np.count_nonzero(intervals == 0) > many
+        return _Scan(mean, float(np.quantile(rising, 0.01)) if is_repeated else digit)
     are_many_lost = bool(np.count_nonzero(~is_near) > many)
-    digit = typical if are_many_lost else _last_digit(intervals[~is_near] - typical, typical)
-    spread = _COARSE_SPREAD if are_many_lost else _ROUNDED_SPREAD
-    if digit and _distance_from_line(block) < spread * digit:
+    # Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
+    # later times away from a line; rounding moves each time by half a digit at most.
+    off = np.abs(intervals[~is_near] - typical)
+    is_digit = off.size >= _LEAST_ROUNDED and 0.9 * float(np.min(off)) < digit
+    if is_digit and _distance_from_line(block) < _COARSE_SPREAD * digit:
         return _Scan(mean, digit)
     near = intervals[is_near]
     rounding = min(float(np.ptp(near)) / 2, 0.8 * _OFF * typical)
     return _Scan(float(np.mean(near)), rounding, is_inferred=are_many_lost)
 
 
-def _last_digit(off: Reals, typical: float) -> float:
-    """Return the last decimal digit of times if its rounding may explain their intervals; else 0.
-
-    Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
-    later times away from a line; rounding moves each time by half a digit at most.
-    """
-    step = float(np.min(np.abs(off))) if off.size >= _LEAST_ROUNDED else 0.0
-    digit = 10.0 ** round(np.log10(step)) if 0 < step < 1.5 * typical else 0.0
-    return digit if abs(step - digit) < (_ROUNDED_SPREAD - 1) * digit else 0.0
-
-
 def _distance_from_line(times: Reals) -> float:
     place = np.arange(times.size) / times.size
     apart = times - times[0]
     return float(np.ptp(apart - np.polyval(np.polyfit(place, apart, 1), place)))
+
+
+def _resolution(times: Reals, interval: float) -> Reals:
+    """Return the rounding unit of the last times in each row, shape (rows,): decimal digits or float steps.
+
+    The unit is larger at later times if numbers have a fixed number of significant digits.
+    """
+    last = times[:, -_LAST:]
+    unit = np.spacing(np.max(np.abs(last), axis=1))
+    for digit in 10.0 ** (np.floor(np.log10(interval)) + np.arange(-2, 2)):
+        places = last / digit
+        is_whole = np.abs(places - np.rint(places)) <= 4 * np.spacing(np.abs(places))
+        unit = np.where(np.all(is_whole, axis=1), np.maximum(unit, digit), unit)
+    with np.errstate(over="ignore"):
+        single = last.astype(np.float32)
+    are_single = np.all(np.abs(last - single) <= unit[:, np.newaxis] / 2, axis=1)
+    steps = np.spacing(np.max(np.abs(single), axis=1)).astype(np.float64)
+    return np.asarray(np.where(are_single, np.maximum(unit, steps), unit))
+
+
+def _jitter(times: Reals, distance: Reals, interval: float, unit: float) -> float:
+    """Return the largest range of distances from a line that rounding to ``unit`` or more cannot explain."""
+    width = min(_BIN, times.size)
+    starts = np.minimum(np.arange(0, times.size, width), times.size - width)
+    rows, off = (sliding_window_view(each, width)[starts] for each in (times, distance))
+    units = np.maximum(_resolution(rows, interval), unit)
+    place = np.linspace(-1.0, 1.0, width)
+    off = off - np.mean(off, axis=1, keepdims=True)
+    off = off - np.outer(off @ place / np.sum(place**2), place)
+    low, high = np.quantile(off, (_OUTLIERS, 1 - _OUTLIERS), axis=1)
+    # Times with the larger unit of the next row may begin within a row.
+    return float(np.max(high - low - _COARSE_SPREAD * np.maximum(units, np.append(units[1:], 0.0))))
 
 
 class _Scan:
@@ -337,6 +365,7 @@ class _Scan:
         self._samples = 0
         self._runs = [(0, 0)]
         self._kept: list[Reals] = []
+        self._jitter = 0.0
         self._trouble = ""
 
     def add(self, block: Reals) -> None:
@@ -356,6 +385,9 @@ class _Scan:
         jumps = np.flatnonzero(steps != 1)[: MOST_RUNS + 1]
         self._runs += [(self._samples + int(at), int(places[at])) for at in jumps]
         distance = block - self._start - self._interval * places
+        unit = self._rounding if self.is_coarse else 0.0
+        if block.size > 2:
+            self._jitter = max(self._jitter, _jitter(block, distance, self._interval, unit))
         kept = np.arange(block.size)
         if block.size > _BIN:
             starts = range(0, block.size, _BIN)
@@ -381,6 +413,11 @@ class _Scan:
             _COARSE_SPREAD * self._rounding if self.is_coarse else 2 * _PLACED * interval + self._rounding
         )
         trouble = self._trouble or _time_fault(self._runs, self._samples, span)
+        if not trouble and self._jitter > _JITTER * interval:
+            trouble = (
+                f"has times that jitter by {self._jitter / interval:.2g} sample intervals, more than their "
+                "digits explain"
+            )
         if not trouble and spread > allowed:
             trouble = (
                 f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis: they "
