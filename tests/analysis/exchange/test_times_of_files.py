@@ -465,6 +465,38 @@ def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more
         import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
 
 
+@pytest.mark.parametrize(
+    ("segments", "is_clear"),
+    [
+        (("ab", "ab", "ab"), True),
+        (("a", "b", "a", "b"), True),
+        (("a", "a", "b", "b"), True),
+        (("ab", "a", "ab", "b"), False),
+        (("ab", "b", "a", "ab"), False),
+        (("a", "b", "a", "a", "b", "b"), False),
+        (("abb", "aab"), False),
+    ],
+    ids=str,
+)
+def test_tdms_channels_with_data_in_other_segments_are_refused(tmp_path, segments, is_clear):
+    """A repeated letter stands for more samples; all channels have the same number of samples."""
+    values, done = motion(np.arange(SAMPLES) / RATE_HZ), {"a": 0, "b": 0}
+    about = {"wf_increment": 1 / RATE_HZ}
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        for each in segments:
+            objects = []
+            for name in sorted(set(each)):
+                part = slice(done[name], done[name] + 1000 * each.count(name))
+                done[name] = part.stop
+                objects.append(nptdms.ChannelObject("g", name, values[part], about))
+            writer.write_segment(objects)
+    if is_clear:
+        import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
+    else:
+        with pytest.raises(InvalidRequest, match=r"states samples of segments = 1: .*may shift their times"):
+            import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
+
+
 def test_a_wav_or_mat_file_that_stores_a_channel_more_than_once_is_refused(tmp_path):
     path = write("wav", tmp_path, "sound", np.random.default_rng(0))
     content = path.read_bytes()

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
-from itertools import chain
+from itertools import chain, combinations, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -50,13 +50,20 @@ def open_tdms(path: Path) -> Iterator[Source]:
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
+        counts: dict[str, dict[int, int]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep each segment's properties, keyed by sample; npTDMS keeps only the last ones."""
+            """Keep each segment's properties and sample counts; npTDMS keeps the last and the sum."""
+
+            _segment = 0
 
             def _update_object_metadata(self, segment: Any) -> None:
                 self._before = {path: each.num_values for path, each in self.object_metadata.items()}
                 super()._update_object_metadata(segment)
+                self._segment += 1
+                for name, each in self.object_metadata.items():
+                    if added := each.num_values - self._before.get(name, 0):
+                        counts.setdefault(name, {})[self._segment] = added
 
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
@@ -75,7 +82,25 @@ def open_tdms(path: Path) -> Iterator[Source]:
             for each in group.channels()
             if len(each) > 1 and each.dtype.kind in "iufM"
         ]
-        yield Source({_channel(file, each, statements): partial(_read, each) for each in found})
+        segments = dict(_unlike_segments({each.path: counts[each.path] for each in found}))
+        yield Source({_channel(file, each, statements, segments): partial(_read, each) for each in found})
+
+
+def _unlike_segments(counts: Mapping[str, Mapping[int, int]]) -> Iterator[tuple[str, str]]:
+    """Yield path and segments of channels that are as long as others, but are divided in another way.
+
+    Channels may share all segments, follow one another, or take turns.
+    """
+    layouts = {tuple(each.items()): each for each in counts.values()}
+    for one, other in combinations(layouts.values(), 2):
+        turns = pairwise(zip(one, other, strict=False))
+        is_in_turn = all(max(now) < min(then) for now, then in turns) and [*one.values()] == [*other.values()]
+        is_apart = max(one) < min(other) or max(other) < min(one)
+        is_clear = one.keys().isdisjoint(other) and (is_apart or is_in_turn)
+        if not is_clear and sum(one.values()) == sum(other.values()):
+            for path, each in counts.items():
+                if each in (one, other):
+                    yield path, ", ".join(f"{segment}: {count}" for segment, count in each.items())
 
 
 def _read(channel: Any, start: int, stop: int) -> Reals:
@@ -85,7 +110,9 @@ def _read(channel: Any, start: int, stop: int) -> Reals:
     return np.asarray(values, dtype=np.float64)
 
 
-def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]]) -> SourceChannel:
+def _channel(
+    file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]], segments: Mapping[str, str]
+) -> SourceChannel:
     def facts(path: str) -> list[tuple[str, Any]]:
         return [fact for each in statements.get(path, {}).values() for fact in each]
 
@@ -101,6 +128,8 @@ def _channel(file: Any, channel: Any, statements: Mapping[str, Mapping[int, Any]
     }
     runs, jumps = restarts(starts_s, times["sample_rate_hz"], len(channel))
     times["time_trouble"] = times["time_trouble"] or jumps
+    if channel.path in segments and len(runs) == 1:
+        times["shifts"] += (("samples of segments", segments[channel.path]),)
     times["start_s"] = next(iter(starts_s.values()), times["start_s"])
     step = exact_step(channel.dtype)
     unknown = [f"{n} = {v}" for n, v in own if _SCALE_TYPE.fullmatch(n) and v not in SCALES]
