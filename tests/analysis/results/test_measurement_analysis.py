@@ -162,26 +162,49 @@ def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
     assert found.verdict is not Verdict.WARNING
 
 
-@pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-5), ("m0_velocity", 1e-5)])
+def scaled(facts, channel, factor, **header):
+    """Return facts with another scale and header of one channel."""
+    level = facts.level(channel)
+    envelope = replace(
+        level.envelope, lower=factor * level.envelope.lower, upper=factor * level.envelope.upper
+    )
+    changed = replace(level, header=replace(level.header, **header), envelope=envelope)
+    return replace(facts, channels=tuple(changed if each is level else each for each in facts.channels))
+
+
+@pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-6), ("m0_velocity", 1e-5)])
 def test_a_scale_that_makes_the_response_absurd_is_reported(dwell_file, role, factor):
     facts = analysis_of(dwell_file("weak")).facts
     assert "Scales" not in {each.what for each in measurement_checks(facts)}
-    level = facts.level(role)
-    scaled = replace(level.envelope, lower=factor * level.envelope.lower, upper=factor * level.envelope.upper)
-    levels = tuple(replace(each, envelope=scaled) if each is level else each for each in facts.channels)
-    (found,) = [each for each in measurement_checks(replace(facts, channels=levels)) if each.what == "Scales"]
+    (found,) = [each for each in measurement_checks(scaled(facts, role, factor)) if each.what == "Scales"]
     assert found.verdict is Verdict.WARNING
     assert "check the scales or sensitivities of m0_velocity and base_acceleration" in found.text
 
 
-def test_a_small_force_is_not_taken_for_a_wrong_scale(dwell_file):
+def imported_base(unit, source):
+    channels = [{"role": "drive_voltage", "source": "u"}, {"role": "base_acceleration", "source": source}]
+    channels = [{**each, "full_scale": None, "file_unit": ""} for each in channels]
+    units = [{"unit": "V", "full_scale": None}, {"unit": unit, "full_scale": None}]
+    return {"imported": {"mapping": {"channels": channels}, "channels": units}}
+
+
+@pytest.mark.parametrize("case", ["small force", "sharp resonance", "base in V", "base from the drive"])
+def test_a_large_or_small_response_is_not_always_a_wrong_scale(dwell_file, case):
     facts = analysis_of(dwell_file("weak")).facts
-    level = facts.level("m0_velocity")
-    small = replace(level.envelope, lower=1e-5 * level.envelope.lower, upper=1e-5 * level.envelope.upper)
-    force = replace(level, header=replace(level.header, role="base_force", quantity="force"), envelope=small)
-    levels = tuple(force if each is level else each for each in facts.channels)
-    found = measurement_checks(replace(facts, channels=levels, response="base_force"))
-    assert "Scales" not in {each.what for each in found}
+    match case:
+        case "small force":
+            found = scaled(facts, "m0_velocity", 1e-5, role="base_force", quantity="force")
+            found = replace(found, response="base_force")
+        case "sharp resonance":
+            found = scaled(facts, "m0_velocity", 2000.0)
+        case "base in V":
+            found = replace(scaled(facts, "base_acceleration", 1e-6), bench=imported_base("V", "a"))
+        case "base from the drive":
+            found = replace(scaled(facts, "base_acceleration", 1e-6), bench=imported_base("", "u"))
+    assert "Scales" not in {each.what for each in measurement_checks(found)}
+    if "base" in case:
+        known = replace(found, bench=imported_base("g", "a"))
+        assert "Scales" in {each.what for each in measurement_checks(known)}
 
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])

@@ -1,17 +1,17 @@
 """Checks of a recording, each with a verdict and a text."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
 from math import cos, pi
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from pydantic import ValidationError
 
 from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
 from vibench.acquisition.recording import RecordingState, SealState
-from vibench.acquisition.rig import GeneratorConfig
+from vibench.acquisition.rig import GeneratorConfig, size_of_unit
 
 from ..tables import Tabular
 from .channels import BASE, DRIVE
@@ -40,7 +40,7 @@ class Check:
 _LEAST_SHARE_OF_RANGE = 1e-3
 """Minimum share of the input range that a channel should use, so that the converter resolves it."""
 _FARTHEST = 1000.0
-"""Largest plausible ratio of the motions of mass and base, or of base and mass."""
+"""Largest plausible ratio of the motions of mass and base, or of base and mass, far from a resonance."""
 _OFTEN_DARK = 0.01
 """Share of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
@@ -206,14 +206,29 @@ def _ranges(facts: RecordingFacts) -> Iterator[Check]:
 def _scales(facts: RecordingFacts) -> Iterator[Check]:
     base, response = (facts.level(role) for role in (BASE, facts.response))
     order = {"velocity": 1, "displacement": 2}.get(response.header.quantity, 0)
-    low, high = ((2 * pi * hz) ** order * response.span for hz in facts.measurement.excitation.band_hz)
-    is_absurd = low > _FARTHEST * base.span > 0 or high * _FARTHEST < base.span
-    if is_absurd and response.header.quantity != "force":
+    low_hz, high_hz = facts.measurement.excitation.band_hz
+    low, high = ((2 * pi * hz) ** order * response.span for hz in (low_hz, high_hz))
+    # Without damping, the amplitude at a resonance grows by pi f times that of the base per second.
+    farthest = max(_FARTHEST, 3 * pi * high_hz * facts.duration_s)
+    is_absurd = low > farthest * base.span > 0 or high * _FARTHEST < base.span
+    if is_absurd and response.header.quantity != "force" and _is_acceleration(base.header.role, facts.bench):
         text = (
             f"the mass moved about {low / base.span:.2g} times as far as the base; check the scales or "
             f"sensitivities of {facts.response} and {BASE}"
         )
         yield Check("Scales", Verdict.WARNING, text)
+
+
+def _is_acceleration(role: str, bench: Mapping[str, Any]) -> bool:
+    """Return False if a channel was imported from the drive, or from a file that states another quantity."""
+    imported = bench.get("imported", {})
+    mapped = {each["role"]: each for each in imported.get("mapping", {}).get("channels", ())}
+    units = dict(zip(mapped, (each["unit"] for each in imported.get("channels", ())), strict=False))
+    if role not in mapped:
+        return True
+    unit = mapped[role]["file_unit"] or units[role]
+    is_drive = DRIVE in mapped and mapped[DRIVE]["source"] == mapped[role]["source"]
+    return not is_drive and (not unit or size_of_unit(unit, "m s-2") is not None)
 
 
 def _rates(facts: RecordingFacts) -> Check:
