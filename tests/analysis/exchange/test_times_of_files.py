@@ -333,6 +333,25 @@ def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, no
         assert [each.flat_tops for each in channel_levels(recording)] == [(), (), ()]
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
+@pytest.mark.parametrize("motion_of", ["one side", "two sides", "clipped hits"])
+def test_only_clipped_peaks_of_hits_are_flat_tops(tmp_path, motion_of, noise):
+    """A free body moves at a constant velocity between hits, and vibrates after each hit."""
+    rng = np.random.default_rng(3)
+    since = np.arange(22_000)[:, np.newaxis] - np.array([1700, 5300, 8000, 12_500, 17_100])
+    signs = (-1.0) ** np.arange(5) if motion_of == "two sides" else np.ones(5)
+    force = np.sum(signs * np.where(abs(since) < 40, np.cos(since * np.pi / 80), 0), axis=1)
+    if motion_of == "clipped hits":
+        force = np.minimum(force, 0.6)
+    ringing = np.exp(-since / 200.0) * np.cos(0.3 * since)
+    velocity = np.sum(signs * np.where(since > 0, 1.0 - ringing, 0.0), axis=1)
+    wave = [each + noise * rng.standard_normal(each.size) for each in (force, force, velocity)]
+    meaning = dwell_at(tmp_path / "a.csv", *wave)
+    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
+        flat = [bool(each.flat_tops) for each in channel_levels(recording)]
+    assert flat == [motion_of == "clipped hits"] * 2 + [False]
+
+
 @pytest.mark.parametrize(
     ("heading", "order"),
     [*product(["time [s]", "Zeit", "t (s)", "t"], ["falling", "shuffled"]), ("time [s]", "not a number")],

@@ -9,7 +9,7 @@ import numpy as np
 from vibench.acquisition.recording import ChannelHeader, Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..signals.arrays import Integers, Reals
+from ..signals.arrays import Integers, Reals, runs_of
 from ..signals.envelope import DEFAULT_BINS, Envelope
 from .channels import BASE, DRIVE, OnRead, ignore_reading
 
@@ -92,9 +92,16 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
             full_scale=float(full_scale[row, 0]),
             share_at_full_scale=int(cut[row]) / int(counts[row].sum()),
             flat_tops=tuple(
-                float(offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0])
+                value
                 for side, highest in zip((1, -1), lasting[row], strict=True)
                 if (top := _flat_top(counts[row, ::side], highest, header, full_scale[row, 0])) is not None
+                and not _rests_at(
+                    value := float(
+                        offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0]
+                    ),
+                    lower[row],
+                    upper[row],
+                )
             ),
         )
         for row, header in enumerate(recording.channels)
@@ -164,6 +171,23 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
     return None
 
 
+def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
+    """Return whether a signal stays near a value for long, such as a free body before a hit, in an envelope.
+
+    A constant value other than zero, such as that of a saturated amplifier, is no rest if it is the only one.
+    """
+    is_near = np.maximum(abs(lower - value), abs(upper - value)) < _REST[0] * np.nanmax(
+        upper - np.nanmin(lower)
+    )
+    is_constant = (lower == upper) & (upper != 0)
+    if not np.any(is_constant & ~is_near):
+        is_near &= ~is_constant
+    longest = np.diff(runs_of(is_near), axis=1).max(initial=0)
+    return bool(longest >= _REST[1] * lower.size)
+
+
+_REST = 0.05, 0.02
+"""Range of values at rest, relative to the span; shortest rest relative to the recording."""
 _LEAST_HEIGHT = 0.1
 """Smallest height of a peak above the median, relative to the span; a lower top is a signal at rest."""
 
