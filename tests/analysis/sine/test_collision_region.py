@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks import fast_sweeps
 from benchmarks.fast_sweeps import FastSweep, fast_sweep, simulate_and_analyse
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.acquisition import open_bench, run_measurement
@@ -158,6 +159,39 @@ def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact
     scene = fast_sweep(seed)
     outcome = simulate_and_analyse(scene, contact, scene.specimen)
     assert not outcome.is_wrong, outcome
+
+
+def impacts_and_collisions(number, monkeypatch):
+    """Return the frequencies of all impacts [Hz] and the reported collisions of a random sweep."""
+    kept = []
+    monkeypatch.setattr(fast_sweeps, "outcome", lambda *each: kept.extend(each))
+    scene = fast_sweep(number, seed=5)
+    simulate_and_analyse(scene, "hertz", scene.specimen)
+    _, found, said, impacts_s = kept
+    return np.interp(impacts_s, found.time_s, found.frequency_hz), said
+
+
+def test_bounds_of_an_end_include_the_ringing_after_the_last_impact(monkeypatch):
+    """Collisions up to 761 Hz were once reported; the last impact was at 593 Hz."""
+    impacts_hz, said = impacts_and_collisions(10, monkeypatch)
+    (region,) = said.regions
+    assert region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
+    assert region.stop.lower_hz > 560
+
+
+def test_ringing_after_collisions_is_not_a_second_region(monkeypatch):
+    """Collisions from 207 to 186 Hz were once reported; the last impact was at 236 Hz."""
+    impacts_hz, said = impacts_and_collisions(4, monkeypatch)
+    (region,) = said.regions
+    assert region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
+
+
+@pytest.mark.parametrize("number", [29, 44])
+def test_bounds_of_a_beginning_include_periodic_impacts(number, monkeypatch):
+    """Starts of 76.0 and 235.0 Hz were once reported within 1.7 Hz; the true ones were 71.2 and 225.4 Hz."""
+    impacts_hz, said = impacts_and_collisions(number, monkeypatch)
+    start = said.regions[0].start
+    assert start.lower_hz - 0.1 <= impacts_hz[0] <= start.upper_hz
 
 
 @pytest.mark.parametrize("is_known", [True, False])

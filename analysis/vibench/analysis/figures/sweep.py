@@ -144,11 +144,12 @@ def regions_text(found: Collisions) -> str:
     parts = []
     for region in found.regions:
         whole = region.reaches_start and region.reaches_stop
-        low_hz, high_hz = region.start.lower_hz, region.start.upper_hz
-        middle = plus_minus(0.5 * (low_hz + high_hz), 0.5 * (high_hz - low_hz))
-        begin = "the sweep's beginning" if region.reaches_start else f"{middle} Hz"
-        # The end of collisions is random, so the end in one run has no bounds.
-        end = "the sweep's end" if region.reaches_stop else f"{region.stop.frequency_hz:.1f} Hz in this run"
+        begin, end = (
+            plus_minus(0.5 * (each.lower_hz + each.upper_hz), 0.5 * (each.upper_hz - each.lower_hz))
+            for each in (region.start, region.stop)
+        )
+        begin = "the sweep's beginning" if region.reaches_start else f"{begin} Hz"
+        end = "the sweep's end" if region.reaches_stop else f"{end} Hz in this run"
         parts.append("during the whole sweep" if whole else f"from {begin} to {end}")
     return f"the masses collide {' and '.join(parts)}{unclear}"
 

@@ -446,7 +446,9 @@ def modal_fit(
         nearby = float(np.sum(squares[about])) / beside
         # Errors due to ringing also correlate with conjugates of other errors, which at most doubles the
         # variance of a fitted value.
-        widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
+        # Motion left from the hit before changes neighbouring lines together; the jackknife includes it.
+        least = 1.0 if band.settings.decay_per_s is None else 0.0
+        widened = max(least, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
         top_hz = np.array([natural_hz])

@@ -112,9 +112,8 @@ def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
         "Frequencies with collisions in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
         tuple(row for each in sweeps for row in _collision_rows(each)),
-        "Bounds of a beginning lie between the last interval clearly without collisions and the first "
-        "clearly with collisions. "
-        "An end has no bounds: it is random, and differs between runs. "
+        "Bounds lie between the nearest interval clearly without collisions and the first or last clearly "
+        "with collisions. The end is random, and differs between runs. "
         "The motion that a sweep follows depends on its direction and on its first frequency.",
     )
 
@@ -133,7 +132,7 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
             if number < len(regions):
                 region = regions[number]
                 cells.append(edge_text(region.start, "start of sweep" if region.reaches_start else ""))
-                cells.append("end of sweep" if region.reaches_stop else _last(region.stop))
+                cells.append(edge_text(region.stop, "end of sweep" if region.reaches_stop else ""))
             else:
                 cells += [ABSENT, ABSENT]
         yield (*cells, _PAPER_COLLISION)
@@ -142,11 +141,6 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 def edge_text(edge: Edge, instead: str) -> str:
     """Return the text ``instead`` if it is not empty, otherwise an edge with its bounds as text."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
-
-
-def _last(edge: Edge) -> str:
-    """Return the end of a region, without bounds because it is random and differs between runs."""
-    return f"{edge.frequency_hz:.1f} Hz in this run"
 
 
 def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:

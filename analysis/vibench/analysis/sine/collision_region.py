@@ -30,6 +30,12 @@ _SMOOTH_AT_MOST = 0.1
 _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
+_RISE = 1.2
+"""Ratio of the residual to that of the interval before, above which impacts must excite it."""
+_UNLIKE = 2.0
+"""Ratio of Response II to that without contact, or its inverse, above which an interval may have impacts."""
+_QUIET = 0.7
+"""Ratio of the residual to noise, distortion and ringing below which an interval has no impacts."""
 _VOTE_S = 1.0
 """Time around an interval in which most intervals must exceed the threshold, as collisions persist."""
 _MERGE_S = 3.0
@@ -44,7 +50,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: nearest intervals clearly without and clearly with collisions; ring-down widens the bounds."""
+    """Bounds: the nearest intervals clearly without collisions and clearly with impacts, not ringing."""
 
 
 @dataclass(frozen=True)
@@ -102,8 +108,8 @@ def collisions(sweep: SweptMotion) -> Collisions:
     from the quietest tenth of the sweep if it can be smooth. An interval collides if most neighbours exceed
     the limits, also in drop-outs, or if two successive intervals exceed twice the limits and show impacts.
     Above twice the limits without impacts, the interval is undetermined. Impacts show as orders 2 and 3 above
-    a tenth of order 1 and above twice their value without contact. If no specimen is known, a region must
-    show impacts at frequencies whose double and triple the sweep has not just passed.
+    a tenth of order 1 and above twice their value without contact. The residual of a region must rise; if no
+    specimen is known, it must show impacts at frequencies whose double and triple the sweep has not passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -127,12 +133,19 @@ def collisions(sweep: SweptMotion) -> Collisions:
     is_clear[0] &= is_known  # The initial transient of an unknown specimen may not have decayed.
     inside = np.zeros(above.size, dtype=np.bool_)
     regions = []
+    # Free ringing only decays, so a residual that rises shows impacts.
+    is_evident = above & (residual > _RISE * np.append(residual[:1], residual[:-1]))
+    usual = np.hypot(_NOISE_FACTOR * sweep.noise_rms, np.maximum(_DISTORTION, ringing) * fundamental)
+    is_unlike = np.abs(np.log(sweep.response_ii / sweep.linear_ii)) > np.log(_UNLIKE)
+    is_quiet = (residual < _QUIET * usual) & (ringing <= _TOO_FAST) & ~is_unlike
     is_voted = _majority(above, votes) | binary_opening(is_clear & impacts, np.ones(2, np.bool_))
     for run in _merged_runs(is_voted, round(_MERGE_S / sweep.interval_s)):
         first, last = _trim_run(above, *run, votes)
-        if is_known or np.mean(_seen_impacts(sweep)[first : last + 1]) >= _ENOUGH:
-            regions.append(_region(sweep, residual / threshold, first, last))
-            inside[first : last + 1] = True
+        here = slice(first, last + 1)
+        is_struck = first == 0 or is_evident[here].any()
+        if is_struck if is_known else np.mean(_seen_impacts(sweep)[here]) >= _ENOUGH:
+            regions.append(_region(sweep, first, last, is_clear, is_evident, is_quiet))
+            inside[here] = True
     hz, unclear = sweep.frequency_hz, (_majority(above | (ringing > _TOO_FAST), votes) | is_clear) & ~inside
     return Collisions(
         regions=tuple(regions),
@@ -211,22 +224,23 @@ def _best_split(above: Flags, low: int, high: int) -> int:
     return low + int(np.argmin(before + after))
 
 
-def _region(sweep: SweptMotion, excess: Reals, first: int, last: int) -> CollisionRegion:
-    clear = np.flatnonzero(excess[first : last + 1] > _CLEARLY) + first
-    if clear.size == 0:
-        clear = np.array([(first + last) // 2])
+def _region(
+    sweep: SweptMotion, first: int, last: int, is_clear: Flags, is_evident: Flags, is_quiet: Flags
+) -> CollisionRegion:
+    """Return a region; bounds extend from quiet intervals to the first clear and the last evident impacts."""
+    clear, evident = (np.flatnonzero(each[first : last + 1]) + first for each in (is_clear, is_evident))
+    before, after = np.flatnonzero(is_quiet[:first]), np.flatnonzero(is_quiet[last:]) + last
     return CollisionRegion(
-        start=_edge(sweep, first, first - 1, int(clear[0])),
-        stop=_edge(sweep, last, last + 1, int(clear[-1])),
+        start=_edge(sweep, first, [0, *before][-1], [*clear, last][0]),
+        stop=_edge(sweep, last, [*after, is_quiet.size - 1][0], [first, *evident][-1]),
         reaches_start=first == 0,
-        reaches_stop=last == excess.size - 1,
+        reaches_stop=last == is_quiet.size - 1,
     )
 
 
 def _edge(sweep: SweptMotion, edge: int, outside: int, inside: int) -> Edge:
-    """Return an edge, bounded by the nearest quiet and the nearest clearly colliding interval."""
-    end = sweep.frequency_hz.size - 1
-    quiet_hz, clear_hz = (float(sweep.frequency_hz[at]) for at in (min(max(outside, 0), end), inside))
+    """Return an edge, bounded by a quiet interval outside and one with impacts inside."""
+    quiet_hz, clear_hz = (float(sweep.frequency_hz[at]) for at in (outside, inside))
     half_hz = 0.5 * abs(sweep.sweep_rate_hz_per_s) * sweep.interval_s
     return Edge(
         frequency_hz=float(sweep.frequency_hz[edge]),
