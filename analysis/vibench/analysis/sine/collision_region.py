@@ -32,6 +32,8 @@ _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _RISE = 1.2
 """Ratio of the residual to that of the interval before, above which impacts must excite it."""
+_ALONE = 10.0
+"""Ratio of the residual to noise, distortion and ringing above which one interval may have impacts."""
 _UNLIKE = 2.0
 """Ratio of Response II to that without contact, or its inverse, above which an interval may have impacts."""
 _QUIET = 0.7
@@ -146,6 +148,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
         if is_struck if is_known else np.mean(_seen_impacts(sweep)[here]) >= _ENOUGH:
             regions.append(_region(sweep, first, last, is_clear, is_evident, is_quiet))
             inside[here] = True
+    is_clear |= sweep.is_clear & (residual > _ALONE * usual)
     hz, unclear = sweep.frequency_hz, (_majority(above | (ringing > _TOO_FAST), votes) | is_clear) & ~inside
     return Collisions(
         regions=tuple(regions),
