@@ -1,5 +1,7 @@
 """`vibench map` as a user runs it: a folder with a file and a picture, and one-sentence errors."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,19 @@ def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
     told = output_of("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json")
     assert sum(each["share"] for each in told["motions"]) == pytest.approx(1.0)
     assert len(told["kicks"]) == 3 * len(told["motions"])
+
+
+@pytest.mark.parametrize(("highest", "kinds"), [("6e-5", ["periodic"]), ("-4.6e-5", [])])
+def test_points_next_to_failed_ones_of_a_map_have_no_motion(vibench_here, tmp_path, highest, kinds):
+    # Starts with p beyond the rigid stops, at 45 um, are refused.
+    starts = f"y_m = {{ start = -6e-5, stop = {highest}, points = 33 }}"
+    text = BASIN.replace("y_m = { start = -4e-5, stop = 4e-5, points = 5 }", starts) + 'model = "rigid:0"\n'
+    ran = vibench_here("map", plan(tmp_path, text), "--out", "a", "--json", cwd=tmp_path)
+    assert ran.returncode == 1
+    assert "Traceback" not in ran.stderr
+    told = json.loads(ran.stdout)
+    assert [each["motion"] for each in told["motions"]] == kinds
+    assert all(abs(each["y"]) > 45e-6 for each in told["failures"])
 
 
 @pytest.mark.parametrize(

@@ -241,6 +241,50 @@ def test_another_kind_of_hdf5_file_and_a_newer_version_are_refused(small, tmp_pa
         open_study(newer)
 
 
+def reverse(file):
+    for name in ("response_i", "scene"):
+        file[name][...] = file[name][...][..., ::-1]
+
+
+def replace_column(file):
+    kept = file["response_i"][...]
+    del file["response_i"]
+    file["response_i"] = kept.astype("f4")
+
+
+def set_values(name, value):
+    def change(file):
+        file[name][...] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (reverse, "point 0 has the result of another scene"),
+        (replace_column, "column response_i has another size, type or storage"),
+        (lambda file: file.pop("response_ii"), "response_ii"),
+        (lambda file: file.attrs.pop("format_version"), "format_version"),
+        (set_values("frequency", [260.0, 200.0]), "axis frequency has other values than its study"),
+        (set_values("motion", -1), "column motion has a value without a meaning"),
+        (set_values("response_i", np.nan), "column response_i lacks a number"),
+        (set_values("state", 7), "states or points that do not exist"),
+        (set_values("sessions/n_sessions", 5000), "out of bounds"),
+    ],
+)
+def test_a_changed_study_file_is_refused_in_one_sentence_and_kept(small, tmp_path, change, said):
+    path = tmp_path / "a.h5"
+    solve_study(small, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    before = path.read_bytes()
+    for read in (open_study, lambda path: solve_study(small, path, ExistingStudy.RESUME)):
+        with pytest.raises(StudyError, match=said):
+            read(path)
+    assert path.read_bytes() == before
+
+
 def test_a_missing_folder_of_a_study_is_named_in_the_error(small, tmp_path):
     with pytest.raises(StudyError, match=r"nowhere.*choose another folder"):
         solve_study(small, tmp_path / "nowhere" / "a.h5")

@@ -143,9 +143,10 @@ def _draw_basins(axes: Axes, results: MapResults) -> None:
     numbers = results.motion_numbers[:, 0].astype(np.float64)
     numbers[numbers < 0] = np.nan
     shown = results.motions[: len(_COLOURS)]
-    colours = ListedColormap(list(_COLOURS[: len(shown)]))
-    norm = BoundaryNorm(np.arange(len(shown) + 1) - 0.5, colours.N)
-    _draw(axes, results, np.minimum(numbers, len(shown) - 1), cmap=colours, norm=norm)
+    count = max(1, len(shown))
+    colours = ListedColormap(list(_COLOURS[:count]))
+    norm = BoundaryNorm(np.arange(count + 1) - 0.5, colours.N)
+    _draw(axes, results, np.minimum(numbers, count - 1), cmap=colours, norm=norm)
     labels = [motion_words(results, each) for each in shown]
     handles = [Patch(facecolor=_COLOURS[k], label=label) for k, label in enumerate(labels)]
     axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1)

@@ -66,7 +66,7 @@ class Audit:
         """
         if not self.filled:
             return tuple(shares)
-        rest = (self.filled - self.audited) / cells
+        rest = min(1.0, (self.filled - self.audited) / cells)
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
@@ -133,10 +133,9 @@ class MapResults(GridResults[Map]):
         index. If only the start varies, periodic motions are also distinguished by their responses, so that
         each index is one attractor.
         """
-        state = self.state.reshape(-1)
-        is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
+        is_known = np.flatnonzero(self._labels != UNKNOWN)
         labels, sizes = self._labels[is_known], self._sizes[is_known] if self.plan.is_basin else None
-        numbers = np.full(state.shape, UNKNOWN)
+        numbers = np.full(self.plan.grid.size, UNKNOWN)
         numbers[is_known] = _by_frequency(_groups(labels, sizes))
         return numbers.reshape(self.plan.grid.shape)
 
@@ -187,9 +186,9 @@ class MapResults(GridResults[Map]):
 
     @cached_property
     def _labels(self) -> NDArray[np.int64]:
-        state = self.state.reshape(-1)
-        is_known = (state == PointState.DONE) | (state == PointState.FILLED)
-        return np.where(is_known, labels_of(self.arrays), UNKNOWN)
+        has_result = np.isin(self.state.reshape(-1), (PointState.DONE, PointState.FILLED))
+        # Points filled in from a failed point have no motion.
+        return np.where(has_result & (self.arrays["motion"] >= 0), labels_of(self.arrays), UNKNOWN)
 
     @cached_property
     def _sizes(self) -> Floats:
@@ -210,7 +209,7 @@ class MapResults(GridResults[Map]):
         is_free = without_impacts(self.arrays)
         trials = min(total, len(self.plan.start_labels)) if self.plan.random_starts else total
         shares = shares_of([Count(trials * len(place) / total, is_final=True) for place in places])
-        if audit is not None:
+        if audit is not None and total:
             shares = audit.corrected_shares(shares, total // self.plan.grid.shape[-2])
         return tuple(
             MapMotion(

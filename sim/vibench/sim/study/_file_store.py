@@ -205,9 +205,9 @@ class FileStore:
         self._disk = opened(path)
         try:
             _require_same(path, read_plan(path, type(plan)), plan)
-            self._places = places_of(path, plan)
             self.arrays = read_arrays(path, plan)
             """All results that the file contains."""
+            self._places = places_of(path, plan)
         except BaseException:
             self._disk.close()
             raise

@@ -12,9 +12,22 @@ from pydantic import ValidationError
 
 from ..scene.prediction import ScenePrediction
 from ..specimen.state import Floats
+from ..specimen.toml_table import fault_in_words
 from . import _grid as layout
 from ._errors import InvalidStudy, StudyError
-from ._grid import CONTINUES, ENDED, MESSAGE, GridPlan, PointState, StudyAxis
+from ._grid import (
+    CONTINUES,
+    DURATION,
+    ENDED,
+    MESSAGE,
+    MISSING_WHOLE,
+    PHASE,
+    SESSION,
+    GridPlan,
+    PointState,
+    StudyAxis,
+)
+from ._software import software
 from ._store import Arrays, prediction_at, states
 from ._study import GivenStart, Start, Study, start_name
 
@@ -47,7 +60,7 @@ class Session:
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
     """Return the plan of a file; raise StudyError if the file does not contain this ``kind`` of plan."""
     with _open_store(path, kind) as file:
-        return _plan(path, file, kind)
+        return _plan(file, kind)
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
@@ -56,16 +69,64 @@ def read_arrays(path: Path, plan: GridPlan) -> Arrays:
     Raises StudyError when the file cannot be read, or contains another kind of plan.
     """
     with _open_store(path, type(plan)) as file:
-        return _arrays(file, plan)
+        _require_layout(file, plan)
+        arrays = _arrays(file, plan)
+        _require_own_points(plan, arrays, _sessions(file))
+        return arrays
 
 
 def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
     """Return the sessions recorded in a file: time, software and executor of each."""
     with _open_store(path, kind) as file:
-        group = file[layout.SESSIONS]
-        rows = range(int(group[layout.N_SESSIONS][0]))
-        columns = [group[name][:] for name in layout.SESSION_COLUMNS]
+        return _sessions(file)
+
+
+def _sessions(file: "h5py.File") -> tuple[Session, ...]:
+    group = file[layout.SESSIONS]
+    rows = range(int(group[layout.N_SESSIONS][0]))
+    columns = [group[name][:] for name in layout.SESSION_COLUMNS]
     return tuple(Session(*(bytes(column[row]).decode() for column in columns)) for row in rows)
+
+
+def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
+    """Raise ValueError unless the axes and columns of a file are those of its plan."""
+    for axis in plan.axes:
+        kept = [each.decode() if isinstance(each, bytes) else each for each in file[axis.name][...].tolist()]
+        if kept != list(axis.values):
+            raise ValueError(f"its axis {axis.name} has other values than its {plan.called}")
+    for column in plan.columns:
+        dataset = file[column.name]
+        shape = plan.grid.shape if column.components == 1 else (*plan.grid.shape, column.components)
+        is_plain = getattr(dataset, "shape", None) == shape and dataset.dtype == np.dtype(column.dtype)
+        if not is_plain or dataset.id.get_offset() is None:
+            raise ValueError(f"its column {column.name} has another size, type or storage")
+
+
+CHECKED = 200
+"""Largest number of points whose digests are checked when a file is opened; this takes 0.1 s."""
+
+
+def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:
+    """Raise ValueError if a result is not possible, or belongs to another point.
+
+    Digests are checked for up to `CHECKED` points, evenly spread, that this version has computed.
+    """
+    state = states(arrays)
+    done = np.flatnonzero(state == PointState.DONE)
+    for column in plan.columns:
+        values = arrays[column.name][done]
+        lowest = 0 if column.meanings and column.components == 1 else MISSING_WHOLE
+        if column.meanings and not np.all((values >= lowest) & (values < len(column.meanings))):
+            raise ValueError(f"its column {column.name} has a value without a meaning")
+        if column.name in ("response_i", DURATION, PHASE) and not np.all(np.isfinite(values)):
+            raise ValueError(f"its column {column.name} lacks a number")
+    if np.any(state >= len(PointState)) or np.any(arrays[CONTINUES] >= plan.grid.size):
+        raise ValueError("it refers to states or points that do not exist")
+    own = [row for row, each in enumerate(sessions) if each.software_json == software()]
+    known = done[np.isin(arrays[SESSION][done], own)]
+    for number in known[:: max(1, len(known) // CHECKED)].tolist():
+        if not plan.is_own(number, arrays):
+            raise ValueError(f"point {number} has the result of another scene")
 
 
 def places_of(path: Path, plan: GridPlan) -> Places:
@@ -101,7 +162,7 @@ def _offset(dataset: "h5py.Dataset") -> int:
 @contextmanager
 def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     # Imported here, because results in memory do not need h5py.
-    from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
+    from ..hdf5_files.door import UNREADABLE, UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     wanted = f"give the path of a {kind.called}'s file"
     if not path.is_file():
@@ -120,8 +181,14 @@ def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
             ) from error
         raise StudyError(f"{path} is not a readable HDF5 file ({error}); {wanted}.") from error
     with file:
-        _require_ours(path, file, kind)
-        yield file
+        try:
+            _require_ours(path, file, kind)
+            yield file
+        except (*UNREADABLE, IndexError) as error:
+            raise StudyError(
+                f"{path} is damaged, changed by another program, or of another vibench version: {error}. "
+                f"Restore a copy, or compute the {kind.called} again."
+            ) from error
 
 
 def _require_ours(path: Path, file: "h5py.File", kind: type[GridPlan]) -> None:
@@ -138,14 +205,12 @@ def _require_ours(path: Path, file: "h5py.File", kind: type[GridPlan]) -> None:
         )
 
 
-def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
+def _plan(file: "h5py.File", kind: type[Plan]) -> Plan:
     text = np.asarray(file[layout.STUDY][()]).item()
     try:
         return kind.model_validate_json(text)
     except ValidationError as error:
-        raise StudyError(
-            f"{path} has a {kind.called} of another vibench version, which cannot be read: {error}"
-        ) from error
+        raise ValueError(f"its {kind.called}: {fault_in_words(error.errors()[0])}") from error
 
 
 Value = float | str
@@ -217,7 +282,7 @@ class GridResults(Generic[Plan]):
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.STOPPED) | (state == PointState.FAILED)):
             why = ENDED if state[number] == PointState.STOPPED and ENDED in self.arrays else MESSAGE
-            yield self.plan.coordinates(int(number)), bytes(self.arrays[why][number]).decode()
+            yield self.plan.coordinates(int(number)), bytes(self.arrays[why][number]).decode(errors="replace")
 
     def _place(self, fixed: Mapping[str, Value]) -> tuple[int | slice, ...]:
         unknown = sorted(fixed.keys() - {axis.name for axis in self.axes})

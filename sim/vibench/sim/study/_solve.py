@@ -1,7 +1,5 @@
 """Solve a study, with executor and store, in one call."""
 
-import hashlib
-import json
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from enum import StrEnum
@@ -10,12 +8,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
 from ..background import Cancelled, Observer
 from ..scene.cost import pilot_cost_s
 from ..scene.prediction import state_of
-from ..scene.scene import Given, Rest, Scene
+from ..scene.scene import Given, Scene
 from ..scene.solve import SolvedScene, solve_scene
 from ..specimen.outcome import Outcome
 from ..specimen.stops import member
@@ -25,7 +22,6 @@ from ._grid import (
     CONTINUES,
     FINAL_STATE,
     IDENTITY,
-    IDENTITY_DIGITS,
     PHASE,
     TAKEN,
     Cell,
@@ -35,39 +31,7 @@ from ._grid import (
 from ._queue import NOBODY, Points, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
-from ._study import GivenStart, Study, start_name, study_solver
-
-# Points of a study: their scenes, and what is stored.
-#
-# The identity of a scene is a digest of its content, the same in every process and on every machine.
-
-_scenes = TypeAdapter(Scene)
-
-
-def scene_identity(scene: Scene, continued: str = "") -> str:
-    """Return the digest of a scene's content.
-
-    Parameters
-    ----------
-    scene
-        Scene. The digest depends on every bit of its numbers, but not on the order of its fields.
-    continued
-        Identity of the scene that this scene continues, if any. It replaces initial state and phase in the
-        digest, because these are results of that scene.
-    """
-    content = _scenes.dump_python(scene, mode="python")
-    # The name of the start does not change the motion.
-    content["start"].pop("name", None)
-    if content["target"] is None:
-        # Keeps the digests of files that were written before scenes had a target.
-        del content["target"]
-    if continued:
-        content["start"] = {"continues": continued}
-        del content["drive"]["phase_rad"]
-    # Python writes floats with the shortest exact digits, and infinity as a word.
-    text = json.dumps(content, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
-
+from ._study import Study, scene_identity, start_name, study_solver
 
 BUNDLE_S, LANES_S = 0.05, 0.5
 """Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; and that of
@@ -88,10 +52,7 @@ class Expansion(Points):
 
     def new_scene(self, number: int) -> Scene:
         """Return the scene of a point that continues no other point."""
-        place = self.grid.place(number)
-        start = self._study.starts[place[-2]]
-        given = Given(start.state, start.label) if isinstance(start, GivenStart) else Rest()
-        return self._study.scene(place, given)
+        return self._study.first_scene(self.grid.place(number))
 
     def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
         """Return the scene of a point that continues the point ``before``."""

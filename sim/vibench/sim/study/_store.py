@@ -198,7 +198,7 @@ def prediction_at(
         motion=list(MotionKind)[int(arrays[layout.MOTION][number])],
         method=list(Method)[int(arrays[layout.METHOD][number])],
         outcome=Outcome(int(arrays[layout.OUTCOME][number])),
-        ended=bytes(arrays[layout.ENDED][number]).decode(),
+        ended=bytes(arrays[layout.ENDED][number]).decode(errors="replace"),
         final_state=(x, y, z, vx, vy, vz),
         start=start,
         memory=list(StartMemory)[int(arrays[layout.MEMORY][number])],

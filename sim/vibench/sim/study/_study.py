@@ -1,11 +1,15 @@
 """A study: every combination of contact laws, dampings, gaps, amplitudes, starts and frequencies."""
 
+import hashlib
+import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     AliasChoices,
@@ -13,6 +17,7 @@ from pydantic import (
     Field,
     NonNegativeFloat,
     PositiveFloat,
+    TypeAdapter,
     model_validator,
 )
 
@@ -23,7 +28,19 @@ from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.frozen_model import FrozenModel, NumberWith
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
-from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
+from ._grid import (
+    COLUMNS,
+    CONTINUES,
+    FORMAT,
+    FREQUENCY,
+    IDENTITY,
+    IDENTITY_DIGITS,
+    MODEL,
+    START,
+    Column,
+    GridPlan,
+    StudyAxis,
+)
 
 LONGEST = 1_000_000
 """Largest number of values of all ranges together; more values are probably a mistake."""
@@ -148,6 +165,34 @@ def _described_specimen(values: dict[str, Any]) -> SpecimenTable:
     return found
 
 
+_scenes = TypeAdapter(Scene)
+
+
+def scene_identity(scene: Scene, continued: str = "") -> str:
+    """Return the digest of a scene's content.
+
+    Parameters
+    ----------
+    scene
+        Scene. The digest depends on every bit of its numbers, but not on the order of its fields.
+    continued
+        Identity of the scene that this scene continues, if any. It replaces initial state and phase in the
+        digest, because these are results of that scene.
+    """
+    content = _scenes.dump_python(scene, mode="python")
+    # The name of the start does not change the motion.
+    content["start"].pop("name", None)
+    if content["target"] is None:
+        # Keeps the digests of files that were written before scenes had a target.
+        del content["target"]
+    if continued:
+        content["start"] = {"continues": continued}
+        del content["drive"]["phase_rad"]
+    # Python writes floats with the shortest exact digits, and infinity as a word.
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
+
+
 AXES_OF_SPECIMEN = 3
 """Number of leading axes of a study that define the specimen: contact law, damping, gap."""
 
@@ -262,6 +307,18 @@ class Study(GridPlan):
             budget_s=self.budget_s,
             target=self.target,
         )
+
+    def first_scene(self, place: tuple[int, ...]) -> Scene:
+        """Return the scene at a position of the grid that continues no other point."""
+        start = self.starts[place[-2]]
+        return self.scene(place, Given(start.state, start.label) if isinstance(start, GivenStart) else Rest())
+
+    def is_own(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bool:
+        """Return whether the stored digest of a point is that of its scene."""
+        before = int(arrays[CONTINUES][number])
+        known = "" if before < 0 else bytes(arrays[IDENTITY][before]).decode()
+        scene = self.first_scene(self.grid.place(number))
+        return scene_identity(scene, known).encode() == bytes(arrays[IDENTITY][number])
 
     def frequency_at(self, place: tuple[int, ...]) -> float:
         """Return the drive frequency at a position of the grid [Hz]."""
