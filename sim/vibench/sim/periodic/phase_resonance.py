@@ -21,7 +21,6 @@ from ..specimen.stops import member
 from .branch import Branch, OrbitShape
 from .branch_following import AmplitudePath, DrivePath, OrbitReport, follow
 from .continuation import ArcSteps, correct
-from .harmonic_balance import phasors_of
 from .orbit_branch import ExactFamily, OrbitFamily
 from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
@@ -34,8 +33,7 @@ FREQUENCY_SHARE = 0.1
 FARTHEST = 20.0
 """Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state [gaps] that Newton's iteration may try; larger ones take minutes on a hard spring."""
-SAMPLES = 256
+"""Largest state that Newton's iteration may try, over the gap; larger ones take minutes on a hard spring."""
 DIFFERENCE = 1e-6
 """Step of the finite differences for derivatives of the phase, over the scale of each unknown."""
 SCAN_POINTS = 400
@@ -82,10 +80,8 @@ class PhaseResonanceFamily(ExactFamily):
 
     def _error(self, point: Vector) -> float:
         """Return the sine of the phase error of m0 relative to the base."""
-        run = self.mapping.orbit(point[:6] * self.scales, self.drive_at(point), SAMPLES)
-        count = self.mapping.periods * SAMPLES
         # The base A0 sin(w t) has the phasor -i A0.
-        phasor = 1j * complex(phasors_of(run.states[:count, 0])[self.mapping.periods])
+        phasor = 1j * self.mapping.response(point[:6] * self.scales, self.drive_at(point)).line_x_m
         turned = self.of.motion(phasor / self.amplitude_m(point)) * np.exp(-1j * self.phase_rad)
         return float(turned.imag / abs(turned))
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..engine.run import start_motion
 from ..motion.integrate import Trajectory, integrate
 from ..motion.poincare import flow_derivative
-from ..motion.response import steady_response
+from ..motion.response import Response, steady_response
 from ..specimen.accuracy import Accuracy
 from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
@@ -83,6 +83,11 @@ class PeriodMap:
         if run.outcome is not Outcome.REACHED_END:
             return np.full(6, math.nan)
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
+
+    def response(self, state: Vector, drive: Harmonic) -> Response:
+        """Return the responses of the motion from a state over its whole period."""
+        period_s = self.periods / drive.frequency_hz
+        return steady_response(self.specimen, drive, Accuracy.REFERENCE, period_s, period_s, state)
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
         """Return the motion from a state over its whole period, with ``samples`` samples per drive period."""
@@ -249,12 +254,12 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
     run = mapping.orbit(state, drive, SAMPLES)
     moved = np.full((mapping.periods * SAMPLES, 3), math.nan)  # the responses are NaN if the run failed
     moved[: len(run.states)] = run.states[: len(moved), :3]
-    length_s = mapping.periods / drive.frequency_hz
-    seen = steady_response(mapping.specimen, drive, Accuracy.REFERENCE, length_s, length_s, state)
+    seen = mapping.response(state, drive)
     derivative = mapping.derivative(state, drive)
     lines = np.array(
         [seen.line_x_m, *(phasors_of(moved[:, k])[mapping.periods] for k in (Y, Z)), seen.line_p_m]
     )
+    scales = state_scales(mapping.specimen, drive)
     largest = [seen.largest_x_m, *np.abs(moved[:, [Y, Z]]).max(axis=0), seen.largest_p_m]
     defect = size_of(gone)
     found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)) and np.all(np.isfinite(lines)))
@@ -264,19 +269,23 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
         state=state,
         signs=_signs(mapping, drive, state, np.nan_to_num(derivative), run),
         defect=defect,
-        error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / abs(lines[3])),
+        error=_missing(derivative, gone, size_of(state / scales)) * float(scales[0] / abs(lines[3])),
         response_i=np.array(largest) / drive.amplitude_m,
         response_ii=np.abs(lines) / drive.amplitude_m,
         outcome=ShootingEnd.CONVERGED if found else ShootingEnd.NO_ORBIT,
     )
 
 
-def _missing(derivative: Table, gone: Vector) -> float:
-    """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1."""
+def _missing(derivative: Table, gone: Vector, size: float) -> float:
+    """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1.
+
+    The integration error grows with the ``size`` of the state over its scale, if that is above 1.
+    """
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
         return math.inf
-    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * (size_of(gone) + FLOW_ERROR))
+    off = size_of(gone) + FLOW_ERROR * max(1.0, size)
+    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * off)
 
 
 def _signs(
