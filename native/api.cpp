@@ -340,6 +340,7 @@ bool is_usable(const BatchMotion &motion, const Specimen &specimen, double toler
   if (motion.tables->flight.modes != DRIVEN || motion.now->side != 0.0) return false;
   for (double number : motion.now->motion)
     if (!is_finite(number)) return false;
+  if (motion.record != nullptr && !is_usable(*motion.record)) return false;
   return motion.periods > 0 && motion.periods <= MOST_PERIODS && is_usable(*motion.now, 0.0, tolerance);
 }
 

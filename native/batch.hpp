@@ -3,9 +3,12 @@
 // flight.hpp, until at most one lane is clear of the stops. For the other lanes the touch, the collision (by
 // polynomials) and the first step after it are then computed under masks. A lane with a finished motion takes
 // the next motion of the batch. Other lanes can delay a motion, but never change its results.
+//
+// Observed motions: lines need only the moments of each collision's force. Peaks are rare. Bounds exclude
+// almost all steps and collisions; the others are observed alone, as in observe.hpp.
 #pragma once
 #include "collision_fit.hpp"
-#include "motion.hpp"
+#include "observe.hpp"
 
 namespace vibench {
 
@@ -20,6 +23,9 @@ constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch f
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
 constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
 constexpr double LONGEST_PART = 0.25;     // longest collision over the drive period, so that LONG terms suffice
+// Bound of the largest depth of a collision, in its units, from the acceleration at its middle (2 % above).
+constexpr double DEEPEST = 1.02, DEEPER_BY_PRESS = 0.8;
+constexpr double SPARE = 2.0;             // factor on a bound of x for the force of a stop, which bends x little
 constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
@@ -56,6 +62,8 @@ template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
   }
   return {cosine, sine * angle};
 }
+
+INLINE Lanes larger(Lanes a, Lanes b) { return select(a < b, b, a); }
 
 // Returns exp(rate time), for a mode that decays little during `time`.
 template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes time) {
@@ -100,6 +108,8 @@ class BatchRun {
   LanePhasor drive = {};                     // term of the drive at the start of each drive period
   Lanes period = {}, frequency = {}, grid = {};
   Phasor shapes[LANES][FLYING][6] = {};      // motion for a term of 1 m
+  LanePhasor across[FLYING] = {};            // x for a term of 1 m
+  Lanes across_square[FLYING] = {};          // its magnitude times |rate|^2
 
   // Current state of each lane.
   LanePhasor term[FLYING] = {};              // terms of p, which is the real part of their sum [m]
@@ -111,6 +121,17 @@ class BatchRun {
   DueStates due_states[LANES] = {};
   int waiting[LANES] = {};                   // number of due states not yet computed
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
+
+  // Observation of each lane.
+  struct Limits {
+    Lanes x, p;  // a step has no new peak if |x| and |p| are below these limits at both ends
+  };
+  Lanes peak_x = {}, peak_p = {};            // peaks so far; infinite if no larger one is to be found
+  Lanes bound_x = {};                        // bound of |d2x/dt2| until the next touch
+  Limits of_step = {}, of_four = {};
+  LanePhasor impulse = {};                   // integral of the stops' force times exp(-i omega t) [N s]
+  double first[LANES][6] = {};               // motion at the start
+  unsigned observed = 0;                     // bits of observed lanes
 
   int64_t taken = 0;  // number of motions taken from the batch
   unsigned moving = 0, careful = 0;  // bits of lanes that advance, and of lanes that take only single steps
@@ -138,6 +159,8 @@ class BatchRun {
       for (int k = 0; k < ORDERS; k++) set(series[k][j], {flight.series[j][REAL][k], flight.series[j][IMAG][k]});
       square[j].set(lane, flight.squares[j]), cube[j].set(lane, flight.squares[j] * size);
       for (int i = 0; i < 6; i++) shapes[lane][j][i] = quotient(flight.shapes[j][i], flight.path[j]);
+      set(across[j], shapes[lane][j][X]);
+      across_square[j].set(lane, magnitude(shapes[lane][j][X]) * flight.squares[j]);
       if (j == DRIVEN) continue;
       Phasor impulse = (1.0 / s.m2) * flight.rows[j][VZ] - (1.0 / s.m1) * flight.rows[j][VY];
       set(kick[j], next.tables->pair * (impulse * flight.path[j]));
@@ -147,6 +170,11 @@ class BatchRun {
     period.set(lane, once), left.set(lane, once), frequency.set(lane, next.tables->drive.frequency);
     grid.set(lane, flight.grid);
     motion[lane] = &next, waiting[lane] = 0, kept[lane] = impacts[lane] = events[lane] = 0;
+    bool is_observed = next.record != nullptr && next.record->watch != WATCH_NOTHING;
+    observed = (observed & ~(1u << lane)) | unsigned(is_observed) << lane;
+    set(impulse, {0.0, 0.0});
+    __builtin_memcpy(first[lane], next.now->motion, sizeof first[lane]);
+    note_peaks(lane);
   }
 
   Phasor term_of(int lane, int j) const { return {term[j].re[lane], term[j].im[lane]}; }
@@ -192,6 +220,51 @@ class BatchRun {
     waiting[lane] = 0;
   }
 
+  // ---- Observation of one lane
+
+  Observer observer_of(int lane) const { return {*motion[lane]->record, *motion[lane]->tables, {}}; }
+
+  // Stores the peaks of the record. In flight |p| cannot exceed a peak beyond the farther stop.
+  void note_peaks(int lane) {
+    bool is_observed = observed >> lane & 1;
+    peak_x.set(lane, is_observed ? motion[lane]->record->peak_x : INFINITE);
+    peak_p.set(lane, is_observed ? motion[lane]->record->peak_p : INFINITE);
+    limit_steps(Mask::of(1u << lane));
+  }
+
+  // Observes the peaks of a flight that begins with the terms `now`. A motion ends `to_go` after its last
+  // but one due state.
+  void see_flight(int lane, const LanePhasor (&now)[FLYING], double length, double to_go) {
+    const LinearTables &flight = motion[lane]->tables->flight;
+    Phasor phasors[PHASORS];
+    for (int j = 0; j < FLYING; j++) phasors[j] = quotient({now[j].re[lane], now[j].im[lane]}, flight.path[j]);
+    if (kept[lane] + 1 == motion[lane]->periods) length = smaller(length, to_go);
+    if (length > 0.0) observer_of(lane).see_flight(phasors, {-to_go, 0.0, 0.0}, length);
+    note_peaks(lane);
+  }
+
+  // Observes the peaks of the collision that begins now. Returns false if it cannot be solved as a whole.
+  bool see_collision(int lane) {
+    const Tables &own = *motion[lane]->tables;
+    ContactStart start = contact_start(lane);
+    Collision<double> c;
+    if (!start.collide(c, period[lane], batch.tolerance, own)) return false;
+    observer_of(lane).see_shape(c, gap_at(own.specimen, start.contact.side),
+                                [&] { return times(own.collision.onto_x, c.motion); });
+    note_peaks(lane);
+    return true;
+  }
+
+  void add_lines(int lane, const Motion<double> &last) {
+    Observer observer = observer_of(lane);
+    const Phasor &start = motion[lane]->tables->drive.start;
+    observer.impulse = Phasor{impulse.re[lane], impulse.im[lane]} * conjugate(start);
+    Observer::End from{{}, {}, start}, to{{}, {double(motion[lane]->periods) * period[lane], 0.0, 0.0}, start};
+    __builtin_memcpy(from.motion, first[lane], sizeof from.motion);
+    __builtin_memcpy(to.motion, last.at, sizeof to.motion);
+    observer.add_lines(from, to);
+  }
+
   // Ends a motion in flight or on a stop.
   void end(int lane, const Contact<double> &contact) {
     BatchMotion &of = *motion[lane];
@@ -201,45 +274,85 @@ class BatchRun {
     last.clock.high = (begun + double(of.periods)) / frequency[lane];
     last.contact = contact;
     vibench::keep(*of.now, last);
+    if (observed >> lane & 1) add_lines(lane, last);
     of.outcome = REACHED_END, of.impacts = impacts[lane];
   }
   void lose(int lane) { motion[lane]->outcome = STALLED, motion[lane]->impacts = impacts[lane]; }
 
+  // A contact that begins at a touch.
+  struct ContactStart {
+    double at[6];
+    Contact<double> contact;
+    Phasor drive;
+
+    // Advances the motion by the whole collision. Returns false if that is impossible in the time `longest`.
+    bool collide(Collision<double> &c, double longest, double tolerance, const Tables &own) {
+      return vibench::collide(c, at, contact.side, contact.pace, drive, longest, tolerance, own);
+    }
+  };
+  ContactStart contact_start(int lane) const {
+    const Tables &own = *motion[lane]->tables;
+    ContactStart start{};
+    place_lane(start.at, lane);
+    double side = touched_side(start.at[Y] - start.at[Z], start.at[VY] - start.at[VZ], own.specimen);
+    begin_contact(start.contact, start.at, side, batch.tolerance, own);
+    start.contact.w = 0.0;  // removes the rounding error: the penetration at a touch is zero
+    start.drive = drive_phasor(due_clock(lane), 0.0, own);
+    return start;
+  }
+  // The next state is due at clock time zero, a whole number of drive periods after the start.
+  Clock<double> due_clock(int lane) const { return {-left[lane], 0.0, 0.0}; }
+
   enum class SlowContact { LEFT, ENDED, LOST };
 
-  // Integrates a contact of one lane in steps, and stores the states that become due during the contact.
-  SlowContact contact_by_steps(int lane) {
+  // Integrates a contact of one lane as a whole or in steps, and stores the states that become due meanwhile.
+  SlowContact contact_alone(int lane) {
     const Tables &own = *motion[lane]->tables;
-    double at[6];
-    place_lane(at, lane);
-    Contact<double> contact{};
-    double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
-    begin_contact(contact, at, side, batch.tolerance, own);
-    contact.w = 0.0;  // removes the rounding error: the penetration at a touch is zero
+    ContactStart start = contact_start(lane);
+    double(&at)[6] = start.at;
+    Contact<double> &contact = start.contact;
     HertzForce force{own.specimen.contact_stiffness};
+    bool is_observed = observed >> lane & 1;
+    Record unused{};
+    Observer observer{is_observed ? *motion[lane]->record : unused, own, {}};
+    auto seen = [&](const auto &steps, double h) {
+      if (is_observed) observer.see_step(steps, h, contact);
+    };
+    if (Collision<double> c; start.collide(c, left[lane], batch.tolerance, own)) {
+      if (is_observed) observer.see_collision(c, contact.side, start.drive);
+      add_impulse(lane, observer);
+      left.set(lane, left[lane] - c.duration);
+      contact.side = 0.0;
+    }
     while (contact.side != 0.0) {
-      // The next state is due at clock time zero, a whole number of drive periods after the start.
-      Clock<double> clock{-left[lane], 0.0, 0.0};
       double longest = STRETCH_TURN / own.omega, passed = 0.0;
       bool is_due = left[lane] <= longest;
       if (is_due) longest = left[lane];
-      BaseForce base(clock, 0.5 * longest, own);
-      ContactEnd end = advance_contact(contact, at, passed, longest, base, force, batch.tolerance, own,
-                                       [](auto &&...) {});
+      BaseForce base(due_clock(lane), 0.5 * longest, own);
+      ContactEnd end = advance_contact(contact, at, passed, longest, base, force, batch.tolerance, own, seen);
       if (end != ContactEnd::LEFT && end != ContactEnd::HELD) return SlowContact::LOST;
       left.set(lane, left[lane] - passed);
+      add_impulse(lane, observer);
       if (is_due && end == ContactEnd::HELD && keep_due(lane, at)) {
         this->end(lane, contact);
         return SlowContact::ENDED;
       }
     }
-    Phasor phasors[PHASORS], now = drive_phasor(Clock<double>{-left[lane], 0.0, 0.0}, 0.0, own);
+    Phasor phasors[PHASORS], now = drive_phasor(due_clock(lane), 0.0, own);
     start_flight(phasors, at, now, own.flight);
     for (int j = 0; j < FLYING; j++) {
       Phasor of_p = phasors[j] * own.flight.path[j];
       term[j].re.set(lane, of_p.re), term[j].im.set(lane, of_p.im);
     }
+    note_peaks(lane);
     return SlowContact::LEFT;
+  }
+
+  // Moves the impulse of a contact in steps, which has the phase of the drive, to the lane's impulse.
+  void add_impulse(int lane, Observer &observer) {
+    Phasor sum = observer.impulse * motion[lane]->tables->drive.start;
+    impulse.re.set(lane, impulse.re[lane] + sum.re), impulse.im.set(lane, impulse.im[lane] + sum.im);
+    observer.impulse = {0.0, 0.0};
   }
 
   void place_lane(double *at, int lane) const {
@@ -264,30 +377,53 @@ class BatchRun {
   // Computes the bounds of the flights from their terms.
   void bound_flights(unsigned lanes) {
     Mask of = Mask::of(lanes);
-    Lanes sizes = 0.0, squares = 0.0, cubes = 0.0;
+    Lanes sizes = 0.0, squares = 0.0, cubes = 0.0, x_squares = 0.0;
     for (int j = 0; j < FLYING; j++) {
       Lanes size = square_root(fused(term[j].re, term[j].re, term[j].im * term[j].im));
       sizes = sizes + size;
       squares = fused(size, square[j], squares), cubes = fused(size, cube[j], cubes);
+      x_squares = fused(size, across_square[j], x_squares);
     }
     Lanes margin = squares * (grid * grid) * 0.125;
     reach = select(of, sizes, reach), bound = select(of, squares, bound), jerk = select(of, cubes, jerk);
     low = select(of, margin - lower, low), high = select(of, upper - margin, high);
     low_four = select(of, FOUR * FOUR * margin - lower, low_four);
     high_four = select(of, upper - FOUR * FOUR * margin, high_four);
+    bound_x = select(of, x_squares, bound_x);
+    limit_steps(of);
+  }
+
+  // Computes the limits of |x| and |p| below which a step contains no new peak.
+  void limit_steps(Mask of) {
+    double farther = vibench::larger(lower, upper);
+    Lanes part = grid * grid * 0.125, least_p = select(peak_p < farther, peak_p, INFINITE);
+    of_step.x = select(of, peak_x - bound_x * part, of_step.x);
+    of_step.p = select(of, least_p - bound * part, of_step.p);
+    of_four.x = select(of, peak_x - FOUR * FOUR * bound_x * part, of_four.x);
+    of_four.p = select(of, least_p - FOUR * FOUR * bound * part, of_four.p);
   }
 
   // Advances until at most `enough` lanes are clear of the stops. Returns the lanes with a due state.
-  unsigned march(int enough) {
+  template <bool IS_OBSERVED> unsigned march(int enough) {
     Mask going = Mask::of(moving), one_by_one = Mask::of(careful);
     LanePhasor now[FLYING], next[FLYING];
     for (int j = 0; j < FLYING; j++) now[j] = term[j];
-    Lanes to_go = left, p = sum_of_terms(now);
+    Lanes to_go = left, p = sum_of_terms(now), x = x_of(now);
     for (;;) {
       Mask four = (low_four < p) & (p < high_four) & ~one_by_one, clear = going & (low < p) & (p < high);
       for (int j = 0; j < FLYING; j++) next[j] = fused_product(now[j], select(four, four_steps[j], one_step[j]));
       Lanes ahead = sum_of_terms(next);
       clear = clear & (select(four, low_four, low) < ahead) & (ahead < select(four, high_four, high));
+      if constexpr (IS_OBSERVED) {
+        Lanes x_ahead = x_of(next), largest_x = larger(magnitude(x), magnitude(x_ahead));
+        Lanes largest_p = larger(magnitude(p), magnitude(ahead));
+        Mask peaks = clear & ((select(four, of_four.x, of_step.x) < largest_x) |
+                              (select(four, of_four.p, of_step.p) < largest_p));
+        for_each_lane(peaks.bits(), [&](int lane) {
+          see_flight(lane, now, select(four, FOUR * grid, grid)[lane], to_go[lane]);
+        });
+        x = select(clear, x_ahead, x);
+      }
       for (int j = 0; j < FLYING; j++) now[j] = select(clear, next[j], now[j]);
       p = select(clear, ahead, p);
       to_go = to_go - select(clear, select(four, FOUR * grid, grid), 0.0);
@@ -304,6 +440,30 @@ class BatchRun {
 
   static INLINE Lanes sum_of_terms(const LanePhasor (&of)[FLYING]) {
     return (of[0].re + of[1].re) + (of[2].re + of[3].re);
+  }
+
+  INLINE Lanes x_of(const LanePhasor (&terms)[FLYING]) const {
+    Lanes sums[2] = {};
+    for (int j = 0; j < FLYING; j++) sums[j % 2] = with_real_of_product(sums[j % 2], terms[j], across[j]);
+    return sums[0] + sums[1];
+  }
+
+  // Returns which lanes may have a new peak in the next `time`, at most a grid step.
+  Mask may_peak(Mask of, Lanes time) const {
+    Lanes speed = 0.0;
+    for (int j = 0; j < FLYING; j++)
+      speed = with_real_of_product(speed, fused_product(term[j], rate[j]), across[j]);
+    Lanes most = fused(magnitude(speed), time, magnitude(x_of(term))) + 0.5 * SPARE * bound_x * (time * time);
+    return of & (peak_x < most);
+  }
+
+  // Observes the peaks of a flight of at most one grid step.
+  void see_short_flight(unsigned lanes, Lanes time) {
+    double farther = vibench::larger(lower, upper);
+    Mask of = Mask::of(lanes & observed);
+    if (of.bits() == 0) return;
+    for_each_lane((may_peak(of, time) | (of & (peak_p < farther))).bits(),
+                  [&](int lane) { see_flight(lane, term, time[lane], left[lane]); });
   }
 
   // Computes p and its derivatives, each divided by the factorial of its order.
@@ -355,18 +515,21 @@ class BatchRun {
   }
 
   // Advances the time. The drive's term is recomputed, so that its rounding errors do not accumulate.
-  void pass(Mask of, Lanes time) {
+  // Returns exp(i omega t).
+  LanePhasor pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
     // The series needs a small angle: (phase + half a turn) / 4. Its result is raised to the fourth power.
     LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
     LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
     LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};
     term[DRIVEN] = select(of, fused_product(drive, whole), term[DRIVEN]);
+    return whole;
   }
 
   void fly_to_touch(unsigned lanes) {
     Mask of = Mask::of(lanes);
     Lanes later = select(of, touch, 0.0);
+    see_short_flight(lanes, later);
     for (int j = 0; j < DRIVEN; j++)
       term[j] = select(of, fused_product(term[j], grown_by_series<SHORT>(rate[j], later)), term[j]);
     pass(of, later);
@@ -375,6 +538,7 @@ class BatchRun {
   // Advances a flight by one grid step. Returns the lanes with a due state.
   unsigned fly_step(unsigned lanes) {
     Mask of = Mask::of(lanes);
+    see_short_flight(lanes, grid);
     for (int j = 0; j < FLYING; j++) term[j] = select(of, fused_product(term[j], one_step[j]), term[j]);
     left = left - select(of, grid, 0.0);
     return (of & ~(0.0 < left)).bits();
@@ -394,6 +558,7 @@ class BatchRun {
     }
     Lanes unit = fit.unit * root, variables[VARIABLES], values[POLYNOMIALS];
     fill_variables(variables, side / speed, unit);
+    Lanes deepest = speed * unit * fused(variables[0], DEEPER_BY_PRESS, DEEPEST);
     Mask inside = Mask::of(lanes) & (Lanes(0.0) < speed);
     for (int k = 0; k < VARIABLES; k++) {
       variables[k] = (variables[k] - fit.middle[k]) * (1.0 / fit.half[k]);
@@ -402,8 +567,10 @@ class BatchRun {
     evaluate(values, variables, fit.coefficients);
     Lanes length = unit * values[0];
     inside = inside & (length * frequency < LONGEST_PART) & ~(Mask::of(last) & (left < length));
+    if (observed != 0) inside = inside & ~see_collisions(inside, side, deepest, length);
     kick_modes(inside, 0.5 * length, unit, side * speed, values);
-    pass(inside, length);
+    LanePhasor end = pass(inside, length);
+    if (observed != 0) add_impulses(inside, 0.5 * length, unit, tables.pair * side * speed, end, values);
     return lanes & ~inside.bits();
   }
 
@@ -425,21 +592,45 @@ class BatchRun {
     }
   }
 
+  // Returns the integral of F exp(rate (T / 2 - t)) dt over a collision of duration T, divided by the
+  // impulse `pair` times the approach speed.
+  static INLINE LanePhasor weighted_force(const LanePhasor &rate, Lanes unit, const Lanes (&values)[POLYNOMIALS]) {
+    LanePhasor turn{rate.re * unit, rate.im * unit}, sum{(1.0 / (MOMENTS - 1)) * values[MOMENTS], 0.0};
+    for (int m = MOMENTS - 2; m >= 0; m--) {
+      sum = {fused(sum.re, turn.re, fused(-sum.im, turn.im, values[1 + m])),
+             fused(sum.re, turn.im, sum.im * turn.re)};
+      if (m > 1) sum = {(1.0 / m) * sum.re, (1.0 / m) * sum.im};
+    }
+    return sum;
+  }
+
   // Advances the modes by half a collision, adds its impulse, and advances them by the other half.
   INLINE void kick_modes(Mask of, Lanes half, Lanes unit, Lanes push, const Lanes (&values)[POLYNOMIALS]) {
     for (int j = 0; j < DRIVEN; j++) {
-      LanePhasor by = grown_by_series<SHORT>(rate[j], half), turn{rate[j].re * unit, rate[j].im * unit};
-      LanePhasor sum{(1.0 / (MOMENTS - 1)) * values[MOMENTS], 0.0};
-      for (int m = MOMENTS - 2; m >= 0; m--) {
-        sum = {fused(sum.re, turn.re, fused(-sum.im, turn.im, values[1 + m])),
-               fused(sum.re, turn.im, sum.im * turn.re)};
-        if (m > 1) sum = {(1.0 / m) * sum.re, (1.0 / m) * sum.im};
-      }
+      LanePhasor by = grown_by_series<SHORT>(rate[j], half), sum = weighted_force(rate[j], unit, values);
       LanePhasor pushed = fused_product(sum, {push * kick[j].re, push * kick[j].im});
       LanePhasor middle = fused_product(term[j], by);
       middle = {middle.re + pushed.re, middle.im + pushed.im};
       term[j] = select(of, fused_product(middle, by), term[j]);
     }
+  }
+
+  // Observes the peaks of collisions that begin now. Returns the lanes whose collision needs steps.
+  Mask see_collisions(Mask of, Lanes side, Lanes deepest, Lanes length) {
+    Mask higher = of & (peak_p < select(Lanes(0.0) < side, upper, lower) + deepest), unsolved = Mask::of(0);
+    for_each_lane((may_peak(of, length) | higher).bits() & observed, [&](int lane) {
+      if (!see_collision(lane)) unsolved = unsolved | Mask::of(1u << lane);
+    });
+    return unsolved;
+  }
+
+  // Adds the impulses of collisions that end now, with the phase exp(-i omega t) of the force.
+  void add_impulses(Mask of, Lanes half, Lanes unit, Lanes push, const LanePhasor &end,
+                    const Lanes (&values)[POLYNOMIALS]) {
+    LanePhasor line = weighted_force(rate[DRIVEN], unit, values);
+    line = fused_product(line, turned_by_series<SHORT>(rate[DRIVEN].im * half));
+    line = fused_product(line, {end.re, -end.im});
+    impulse = select(of, {fused(push, line.re, impulse.re), fused(push, line.im, impulse.im)}, impulse);
   }
 
   // Returns the lanes whose first step after a contact has provably no touch.
@@ -475,7 +666,7 @@ inline void BatchRun::follow() {
     }
     int enough = alive == ALL_LANES ? WAITING : 0;
     if (__builtin_popcount(moving) > enough) {
-      over = keep_due(march(enough));
+      over = keep_due(observed ? march<true>(enough) : march<false>(enough));
       if (over != 0 || __builtin_popcount(moving) > enough) continue;
     }
     unsigned stopped = alive & ~moving;
@@ -499,7 +690,7 @@ inline void BatchRun::follow() {
       if (kept[lane] + 1 == motion[lane]->periods) last |= 1u << lane;
     });
     for_each_lane(collide(touched, last), [&](int lane) {
-      SlowContact ends = contact_by_steps(lane);
+      SlowContact ends = contact_alone(lane);
       if (ends == SlowContact::LOST) lose(lane);
       if (ends != SlowContact::LEFT) over |= 1u << lane;
     });

@@ -222,6 +222,7 @@ STRUCTURE(BatchMotion,
   int64_t periods;             // number of periods to simulate
   int64_t impacts;             // number of contacts
   int64_t outcome;             // REACHED_END; after TOO_LONG or STALLED simulate the motion alone
+  Record *record;              // peaks and lines, as selected by its `watch`; may be null
 )
 
 STRUCTURE(Batch,

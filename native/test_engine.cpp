@@ -229,17 +229,21 @@ void test_an_impact_keeps_momentum_and_places_and_turns_the_approach(const Body 
 
 Motion<double> at_rest() { return {}; }
 
-// A run of `until` seconds from a given motion.
+// A run of `until` seconds from a given motion, and what was observed.
 struct HarmonicRun {
   const Tables &tables;
   double until;
+  Record *seen = nullptr;
 
   template <class T> Outcome operator()(Motion<T> &motion, double tolerance) const {
     std::vector<double> times(100000);
     Record record{};
     record.impact_times = times.data(), record.impact_room = int64_t(times.size()), record.steps_left = MOST_STEPS;
+    if (seen != nullptr) record.watch = WATCH_PEAKS_AND_LINES;
     place_on_its_side(motion, tolerance, tables);
-    return with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+    Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+    if (seen != nullptr) *seen = record;
+    return outcome;
   }
 };
 
@@ -301,10 +305,13 @@ void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
   std::vector<State> states(COUNT);
   std::vector<double> sections(COUNT * PERIODS * 6);
   std::vector<BatchMotion> motions(COUNT);
+  std::vector<Record> records(COUNT);
   for (int64_t n = 0; n < COUNT; n++) {
     states[n] = {};
     states[n].motion[VX] = 1e-3 * double(n);
-    motions[n] = {&tables, &states[n], &sections[n * PERIODS * 6], 1 + n % PERIODS, 0, 0};
+    records[n].watch = WATCH_PEAKS_AND_LINES;
+    Record *record = n == 4 ? nullptr : &records[n];
+    motions[n] = {&tables, &states[n], &sections[n * PERIODS * 6], 1 + n % PERIODS, 0, 0, record};
   }
   Batch batch{motions.data(), COUNT, &fit, TOLERANCE};
   expect(vibench_follow_batch(&batch) == REACHED_END, "a batch is accepted", 0);
@@ -313,11 +320,18 @@ void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
     expect(motions[n].outcome == REACHED_END, "a motion of a batch comes to its end", double(n));
     Motion<double> alone = at_rest();
     alone.at[VX] = 1e-3 * double(n);
-    HarmonicRun{tables, double(motions[n].periods) / tables.drive.frequency}(alone, TOLERANCE);
+    Record seen{};
+    HarmonicRun{tables, double(motions[n].periods) / tables.drive.frequency, &seen}(alone, TOLERANCE);
     for (int i = 0; i < 6; i++) {
       double off = (states[n].motion[i] - alone.at[i]) / (i < 3 ? 1e-4 : 0.1);
       expect(std::fabs(off) < 1e-8, "a motion of a batch is that of a run", off);
     }
+    if (motions[n].record == nullptr) seen = {};
+    const Record &found = records[n];
+    for (double off : {found.peak_x - seen.peak_x, found.peak_p - seen.peak_p})
+      expect(std::fabs(off) <= 1e-8 * seen.peak_p, "peaks of a batch are those of a run", off);
+    for (Phasor off : {found.line_x - seen.line_x, found.line_p - seen.line_p})
+      expect(magnitude(off) <= 1e-7 * magnitude(seen.line_x), "lines of a batch are those of a run", magnitude(off));
     impacts += motions[n].impacts;
   }
   expect(impacts > COUNT, "motions of the batch strike their stops", double(impacts));

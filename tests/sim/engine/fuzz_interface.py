@@ -19,6 +19,7 @@ STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
 POINTERS = {
     *("collisions", "power_shapes", "samples", "impact_times"),
     *("growth", "impacts", "motions", "controller", "shaker", "at", "tables", "now", "sections", "fit"),
+    "record",
 }
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
@@ -133,10 +134,16 @@ def follow(engine, tables, state, tolerance, draws):
     motions["tables"], motions["periods"] = tables.ctypes.data, draws.integers(1, room + 1, 9)
     for motion, own, kept in zip(motions, states, sections, strict=True):
         motion["now"], motion["sections"] = own.ctypes.data, kept.ctypes.data
+    records = engine.rows("Record", 9)
+    records["watch"] = draws.integers(3, size=9)
+    motions["record"] = np.where(
+        draws.random(9) < 0.7, records.ctypes.data + records.strides[0] * np.arange(9), 0
+    )
     batch = engine.new("Batch", count=9, tolerance=tolerance)
     batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
     for _ in range(draws.integers(3)):
-        corrupt((batch, fit, motions[4], states[draws.integers(9)])[draws.integers(4)], draws)
+        broken = (batch, fit, motions[4], states[draws.integers(9)], records[draws.integers(9)])
+        corrupt(broken[draws.integers(5)], draws)
     batch["count"] = min(int(batch["count"]), 9)
     motions["periods"] = np.minimum(motions["periods"], room)
     try:

@@ -8,7 +8,8 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
 from vibench.sim.engine.batch import follow_batch, is_batchable
-from vibench.sim.engine.run import NativeRun, RunRecord
+from vibench.sim.engine.run import NativeRun, RunRecord, Watch
+from vibench.sim.scene.plan import linear_motion
 from vibench.sim.specimen.contact_laws import Hertz
 from vibench.sim.specimen.specimen import Specimen
 
@@ -20,13 +21,21 @@ SPECIMEN = gong2025()
 class BatchedMotion:
     states: np.ndarray
     impacts: int
+    peaks: np.ndarray
+    """Peaks of x and p."""
+    areas: np.ndarray
     run: NativeRun
 
 
-def follow(specimen, drives, starts, periods, tolerance=STANDARD):
+def follow(specimen, drives, starts, periods, tolerance=STANDARD, watch=Watch.PEAKS_AND_LINES):
     runs = [NativeRun(specimen, drive, start, tolerance) for drive, start in zip(drives, starts, strict=True)]
-    found = follow_batch(runs, periods)
-    return [BatchedMotion(each.states, each.impacts, run) for each, run in zip(found, runs, strict=True)]
+    return [
+        BatchedMotion(
+            *(found.states, found.impacts),
+            *(np.array([found.peak_x_m, found.peak_p_m]), np.array([found.area_x, found.area_p]), run),
+        )
+        for found, run in zip(follow_batch(runs, periods, watch), runs, strict=True)
+    ]
 
 
 def random_scenes(count, seed):
@@ -109,10 +118,61 @@ def test_a_motion_does_not_depend_on_its_batch():
     again = follow(SPECIMEN, *([each[k] for k in shuffled] for each in (drives, starts, periods)))
     for place, k in enumerate(shuffled):
         (alone,) = follow(SPECIMEN, [drives[k]], [starts[k]], [periods[k]])
-        for each in (alone, again[place]):
+        (unseen,) = follow(SPECIMEN, [drives[k]], [starts[k]], [periods[k]], watch=Watch.NOTHING)
+        for each in (alone, again[place], unseen):
             np.testing.assert_array_equal(each.states, together[k].states)
             np.testing.assert_array_equal(each.run.motion, together[k].run.motion)
             assert each.impacts == together[k].impacts
+        for each in (alone, again[place]):
+            np.testing.assert_array_equal(each.peaks, together[k].peaks)
+            np.testing.assert_array_equal(each.areas, together[k].areas)
+
+
+def observe_alone(specimen, drive, start, periods):
+    """Return peaks and line integrals of a single run at the accuracy *standard*."""
+    run, record = NativeRun(specimen, drive, start, STANDARD), RunRecord(1000)
+    record.watch(Watch.PEAKS_AND_LINES)
+    run.advance(periods / drive.frequency_hz, record)
+    return np.array([record.peak_x_m, record.peak_p_m]), np.array([record.area_x, record.area_p])
+
+
+@pytest.mark.parametrize("specimen", [SPECIMEN, gong2025(gap_m=(30e-6, 60e-6))])
+def test_peaks_and_lines_of_a_batch_match_those_of_single_motions(specimen: Specimen):
+    drives, starts = random_scenes(60, 11)
+    starts = [start for start in starts if -specimen.gaps_m[0] < start[1] - start[2] < specimen.gaps_m[1]]
+    drives, peaks, lines = drives[: len(starts)], [], []
+    for drive, start, found in zip(
+        drives, starts, follow(specimen, drives, starts, [2] * len(starts)), strict=True
+    ):
+        peak, line = observe_alone(specimen, drive, start, 2)
+        peaks.append(np.abs(found.peaks / peak - 1.0).max())
+        lines.append(np.abs((found.areas - line) / line).max())
+    # Errors of the collisions' polynomials grow in chaotic motions.
+    assert np.median(peaks) < 1e-9
+    assert np.median(lines) < 1e-7
+    assert max(peaks) < 1e-5
+    assert max(lines) < 1e-4
+
+
+def test_peaks_of_a_periodic_motion_are_not_missed_in_a_long_batch():
+    drive = Harmonic(130.0, 2e-5)
+    settled = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
+    found = follow(SPECIMEN, [drive] * 9, [settled] * 9, [1, 2, 3, 50, 100, 200, 500, 999, 1000])
+    peak, line = observe_alone(SPECIMEN, drive, settled, 2)
+    for each in found:
+        np.testing.assert_allclose(each.peaks, peak, rtol=1e-7)
+        np.testing.assert_allclose(each.areas / len(each.states), line / 2.0, rtol=1e-6)
+
+
+def test_peaks_of_a_batch_without_contact_have_a_closed_form():
+    drive = Harmonic(400.0, 1e-6)
+    (found,) = follow(SPECIMEN, [drive], [np.zeros(6)], [40_000])
+    (last,) = follow(SPECIMEN, [drive], [found.run.motion], [10])
+    motion = linear_motion(SPECIMEN, drive, np.zeros(6))
+    steady = np.array([motion.steady_x, motion.steady_p])
+    assert found.impacts == 0
+    np.testing.assert_allclose(last.peaks, np.abs(steady), rtol=1e-9)
+    np.testing.assert_allclose(np.abs(last.areas), 0.5 * 10.0 / 400.0 * np.abs(steady), rtol=1e-9)
 
 
 @pytest.mark.parametrize(

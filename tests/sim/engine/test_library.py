@@ -48,9 +48,11 @@ def test_batches_give_equal_digits_for_every_register_width(build):
             NativeRun(gong2025(), Harmonic(60.0 + 15.0 * k, 2e-5), start, 3e-7, engine=engine)
             for k, start in enumerate(starts)
         ]
-        found = follow_batch(runs, [10 + 5 * k for k in range(24)])
+        found = follow_batch(runs, [10 + 5 * k for k in range(24)], Watch.PEAKS_AND_LINES)
         assert sum(each.impacts for each in found) > 1000
-        answers.append(np.concatenate([*(each.states for each in found), [run.motion for run in runs]]))
+        seen = [(each.peak_x_m, each.peak_p_m, each.area_x.real, each.area_p.imag) for each in found]
+        motions = [*(each.states for each in found), [run.motion for run in runs]]
+        answers.append(np.concatenate([np.ravel(seen), np.ravel(np.concatenate(motions))]))
     for answer in answers[1:]:
         assert np.array_equal(answer, answers[0])
 

@@ -1,7 +1,7 @@
 """SIMD batches: integrate eight motions of one specimen at the same time.
 
 native/batch.hpp supports Hertz contacts at the accuracies *quick* and *standard*. It returns the state once
-per drive period (docs/decisions/0061-lanes.md). SI units.
+per drive period, and peaks and spectral lines (docs/decisions/0061-lanes.md). SI units.
 """
 
 import math
@@ -19,7 +19,7 @@ from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen
 from ..specimen.state import VY, VZ, Y, Z
 from .library import Engine, Structure
-from .run import DIRECTIONS, Floats, NativeRun, native_engine
+from .run import DIRECTIONS, Floats, NativeRun, Watch, native_engine
 from .shapes import (
     DEPTHS,
     DURATION,
@@ -214,6 +214,7 @@ FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
 MODES = 3
 MOST_DAMPED = 0.05
 """Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
+REACHED_END = Outcome.REACHED_END.value
 LEAST_PART = 1e-9
 """Smallest contribution of a mode to p, over the largest one; a batch derives all modes from p."""
 
@@ -226,6 +227,11 @@ class BatchedMotion:
     """States once per drive period, shape (periods, 6). If a period other than the last ends during a short
     collision, the state is extrapolated back from the motion after the collision."""
     impacts: int
+    peak_x_m: float
+    peak_p_m: float
+    area_x: complex
+    """Integral of x exp(-i (omega t + phase)) over the periods [m s]; zero without observation."""
+    area_p: complex
 
 
 @cache
@@ -254,7 +260,9 @@ def _turns_in_p(specimen: Specimen) -> bool:
     return len(modes.rates) == MODES and not is_damped.any() and bool(path.min() >= LEAST_PART * path.max())
 
 
-def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[BatchedMotion | None]:
+def follow_batch(
+    runs: Sequence[NativeRun], periods: Sequence[int], watch: Watch = Watch.NOTHING
+) -> list[BatchedMotion | None]:
     """Advance motions of one specimen in a batch, each by a number of its drive periods.
 
     Parameters
@@ -263,6 +271,8 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
         Motions without tangent vectors, with equal tolerances, out of contact at the end of a drive period.
     periods
         Number of drive periods for each motion.
+    watch
+        Quantities to observe; observing does not change a motion.
 
     Returns
     -------
@@ -279,16 +289,20 @@ def follow_batch(runs: Sequence[NativeRun], periods: Sequence[int]) -> list[Batc
         )
     # Sort by length, the longest first, so that motions computed in parallel end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
-    states = [np.empty((count, DIRECTIONS)) for count in periods]
-    motions = engine.rows("BatchMotion", len(runs))
-    for motion, place in zip(motions, order, strict=True):
-        motion["tables"], motion["now"] = runs[place].addresses
-        motion["sections"], motion["periods"] = states[place].ctypes.data, periods[place]
+    states = [np.empty((periods[place], DIRECTIONS)) for place in order]
+    records, motions = engine.rows("Record", len(runs)), engine.rows("BatchMotion", len(runs))
+    records["watch"] = watch
+    motions["tables"], motions["now"] = np.transpose([runs[place].addresses for place in order])
+    motions["sections"], motions["periods"] = [own.ctypes.data for own in states], np.take(periods, order)
+    motions["record"] = records.ctypes.data + records.strides[0] * np.arange(len(runs))
     batch = engine.new("Batch", count=len(runs), tolerance=first.tolerance)
     batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
     engine.call("follow_batch", batch)
+    seen = [records[name].tolist() for name in ("peak_x", "peak_p", "line_x", "line_p")]
     found: list[BatchedMotion | None] = [None] * len(runs)
-    for motion, place in zip(motions, order, strict=True):
-        if motion["outcome"] == Outcome.REACHED_END:
-            found[place] = BatchedMotion(states[place], int(motion["impacts"]))
+    for place, outcome, *values in zip(
+        order, motions["outcome"].tolist(), states, motions["impacts"].tolist(), *seen, strict=True
+    ):
+        if outcome == REACHED_END:
+            found[place] = BatchedMotion(*values)
     return found

@@ -164,7 +164,10 @@ class FollowedRun:
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
         self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
-        return Stretch(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states)
+        return Stretch(
+            *(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states),
+            *(motion.peak_x_m, motion.peak_p_m, motion.area_x, motion.area_p),
+        )
 
     def follow_tangent(self) -> None:
         """Propagate a tangent vector, in a direction without symmetry, from now on."""
@@ -176,9 +179,8 @@ class FollowedRun:
 
     def with_push(self, push: Floats) -> Self:
         """Return a copy of the motion whose current state is changed by ``push``, shape (6,)."""
-        twin, run = self.copy(), self._run.copy()
-        run.place(start_motion(self.state + push))
-        twin.__dict__.update(_run=run)
+        twin = self.copy()
+        twin._run.place(start_motion(self.state + push))  # noqa: SLF001 - of the same class
         return twin
 
     def follow(
@@ -255,17 +257,46 @@ class FollowedRun:
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
 
-def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
+def follow_together(
+    runs: Sequence[FollowedRun], periods: Sequence[int], observe: Watch = Watch.NOTHING
+) -> list[Stretch | None]:
     """Integrate motions of one specimen in a batch, each over whole drive periods, without tangent vector.
 
     The result is None for a motion that the batch cannot integrate; its state does not change.
     """
     starts_s = [run.time_s for run in runs]
-    found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
+    found = follow_batch([run._run for run in runs], periods, observe)  # noqa: SLF001 - of the same file
     return [
         None if motion is None else run._batch_stretch(start_s, motion)  # noqa: SLF001
         for run, start_s, motion in zip(runs, starts_s, found, strict=True)
     ]
+
+
+def follow_periods(
+    runs: Sequence[FollowedRun], until_s: float, length_s: float, observe: Watch = Watch.NOTHING
+) -> list[Stretch]:
+    """Integrate motions under one drive for about ``length_s`` [s], in a batch, and store their states.
+
+    All motions are at the end of a drive period, and so is the time ``until_s`` [s], which none exceeds. A
+    motion that begins in contact is integrated alone, for one drive period; so is one that fails in a batch.
+    """
+    frequency_hz = runs[0].drive.frequency_hz
+    made = [round(run.time_s * frequency_hz) for run in runs]
+    most = max(1, math.floor(length_s * frequency_hz))
+    left = [min(most, round(until_s * frequency_hz) - each) for each in made]
+    flying = [place for place, run in enumerate(runs) if run.is_in_flight]
+    together = (
+        follow_together([runs[k] for k in flying], [left[k] for k in flying], observe) if flying else []
+    )
+    found = dict(zip(flying, together, strict=True))
+    stretches = []
+    for place, run in enumerate(runs):
+        stretch = found.get(place)
+        if stretch is None:
+            end_s = (made[place] + (left[place] if place in found else 1)) / frequency_hz
+            stretch = follow_with_section(run, end_s, observe)
+        stretches.append(stretch)
+    return stretches
 
 
 BLOCKS = 10
