@@ -18,6 +18,9 @@ ALIKE = 1e-2
 OTHER_DIFFERS = 1.0
 """Assumed relative difference in response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
+PADDING = 8.0
+"""Number of starts at which the smallest and the largest one, counted twice, double the squared error."""
+TINY = 1e-300
 MOST_FREEDOM = 200
 """Degrees of freedom above which Student's t hardly changes."""
 
@@ -38,7 +41,7 @@ class Start:
 
     def mean(self, windows: int) -> Floats:
         """Return the mean of the four responses over the first ``windows`` windows, shape (4,)."""
-        return np.asarray(np.mean(self.windows[:windows], axis=0))
+        return self.windows[0] if windows == 1 else np.asarray(np.mean(self.windows[:windows], axis=0))
 
 
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
@@ -83,32 +86,45 @@ def others_of(starts: Sequence[Start]) -> int | None:
     return len(starts) - alike if 2 * alike >= len(starts) else None
 
 
-def next_size(starts: Sequence[Start], error: float | None, lead: float) -> tuple[int, int]:
-    """Return the numbers of starts and of windows per start to use next; the work at most doubles."""
-    windows = windows_of(starts)
-    if len(starts) < FEWEST_STARTS:
+def next_size(
+    starts: Sequence[Start], error: float | None, lead: float, most: float = 2.0
+) -> tuple[int, int]:
+    """Return the numbers of starts and of windows per start to use next, at the least simulated time.
+
+    Windows save the time before the first window, ``lead`` (over the window length). More starts reduce the
+    part of the variance that differs between starts, and the weight of the smallest and largest start. The
+    variance falls at most by a factor of ``most``, because it is not known well.
+    """
+    count, windows = len(starts), windows_of(starts)
+    if count < FEWEST_STARTS:
         return FEWEST_STARTS, windows
-    more = 2.0 if error is None else min(2.0, time_factor(starts, error))
-    if windows_help(starts, lead):
-        return len(starts), max(windows + 1, math.ceil(windows * more))
-    return max(len(starts) + 2, math.ceil(len(starts) * more)), windows
+    factor = most if error is None else min(most, time_factor(starts, error))
+    within = _share_within(starts)
+
+    def size(more: int) -> tuple[int, int]:
+        wanted = factor * (1.0 - within + within * windows / more) * count**2 / (count + PADDING)
+        # Solve n^2 / (n + PADDING) = wanted.
+        return max(count, math.ceil(0.5 * (wanted + math.sqrt(wanted * (wanted + 4.0 * PADDING))))), more
+
+    sizes = [size(more) for more in range(windows, 2 * windows + 1 if within > 0.0 else windows + 1)]
+    best = min(sizes, key=lambda each: each[0] * (lead + each[1]))
+    return best if best > (count, windows) else (count + 2, windows)
 
 
-def windows_help(starts: Sequence[Start], lead: float) -> bool:
-    """Return whether to add windows per start rather than starts.
+def _share_within(starts: Sequence[Start]) -> float:
+    """Return the share of a start's variance that is scatter between its windows; 1 if not yet known.
 
-    More starts also find rare motions. Windows are therefore added only if the variance within starts exceeds
-    half the variance between starts. ``lead`` is the time before the first window, over the window length.
+    Motions that repeat differ only between starts.
     """
     windows = windows_of(starts)
-    if lead < 1.0 or any(each.repeats is not None for each in starts):
-        return False
+    if any(each.repeats is not None for each in starts):
+        return 0.0
     if windows == 1:
-        return True
+        return 1.0
     worst = int(np.argmax(error_of(starts)))
     values = np.array([each.windows[:windows] for each in starts])[:, :, worst]
-    within = float(values.var(axis=1, ddof=1).mean()) / windows
-    return within > 0.5 * float(values.mean(axis=1).var(ddof=1))
+    between = float(values.mean(axis=1).var(ddof=1))
+    return min(1.0, float(values.var(axis=1, ddof=1).mean()) / windows / max(between, TINY))
 
 
 def time_factor(starts: Sequence[Start], error: float) -> float:

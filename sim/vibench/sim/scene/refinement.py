@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..engine.batch import batches_pay, is_batchable
 from ..engine.run import Watch
 from ..specimen.accuracy import Accuracy
 from ..specimen.modes import modal_form
@@ -22,6 +23,7 @@ from .followed_run import (
     FollowedRun,
     ObservedWindow,
     Stretch,
+    follow_periods,
     follow_with_section,
     states_of,
     whole_periods,
@@ -29,12 +31,12 @@ from .followed_run import (
 )
 from .mean_of_starts import (
     ALIKE,
+    FEWEST_STARTS,
     Start,
     error_of,
     next_size,
     others_of,
     time_factor,
-    windows_help,
     windows_of,
 )
 from .plan import LinearMotion, linear_motion, never_touches, plan_of
@@ -53,6 +55,12 @@ FIRST_S, GRACE_S = 0.1, 0.05
 """Time after which a first result is due [s], and nominal cost it may use even after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
+BATCH_PARTS, MOST_TOGETHER = 8, 64
+"""Nominal computing cost of a part of a batch over that of a single motion, and most motions in a batch."""
+LANES = 8
+"""Number of motions that a batch integrates at the same time."""
+FIT_S = 0.03
+"""Nominal computing cost of the collision fit for batches [s]."""
 FIRST_CYCLES = 1e4
 """Largest number of cycles of the fastest mode before the first check of the time limit."""
 CLOSE = 3e-3
@@ -194,7 +202,9 @@ class _Refinement:
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """Number of latest states that are stored, one per drive period."""
+        """Number of latest states once per drive period that are stored."""
+        self._is_batched = False
+        """Whether further starts are integrated in SIMD batches."""
 
     def answers(self) -> Iterator[ScenePrediction]:
         """Yield ever better results; raise ValueError if the time was too short for any result."""
@@ -258,26 +268,48 @@ class _Refinement:
         self, run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[Stretch] | None:
         """Integrate a motion in short parts; return the parts, or None after the time limit or a failure."""
-        parts: list[Stretch] = []
-        while run.time_s < until_s:
+        found = self._follow_all([run], until_s, watch)
+        return None if found is None else found[0]
+
+    def _follow_all(
+        self, runs: Sequence[FollowedRun], until_s: float, watch: Watch = Watch.NOTHING
+    ) -> list[list[Stretch]] | None:
+        """Integrate several motions to the same time, in batches; otherwise like `_follow_parts`."""
+        parts: list[list[Stretch]] = [[] for _ in runs]
+        at_once = 1 if len(runs) == 1 else BATCH_PARTS
+        while under_way := [place for place, run in enumerate(runs) if run.time_s < until_s]:
             if self._clock.is_over and (self._has_answered or self._spent_s > GRACE_S):
                 return None
-            spent_s, began_s = run.cost_s, time.thread_time()
-            parts.append(follow_with_section(run, min(until_s, run.time_s + self._part_s), watch))
-            if run.outcome is not Outcome.REACHED_END:
+            cost_s, began_s = sum(run.cost_s for run in runs), time.thread_time()
+            length_s = self._part_s * at_once / len(under_way)
+            if at_once == 1:
+                parts[0].append(follow_with_section(runs[0], min(until_s, runs[0].time_s + length_s), watch))
+            else:
+                seen = follow_periods([runs[place] for place in under_way], until_s, length_s, watch)
+                for place, part in zip(under_way, seen, strict=True):
+                    parts[place].append(part)
+            if any(run.outcome is not Outcome.REACHED_END for run in runs):
                 return None
-            spent_s, taken_s = max(run.cost_s - spent_s, 1e-9), time.thread_time() - began_s
+            spent_s = max(sum(run.cost_s for run in runs) - cost_s, 1e-9)
+            taken_s = time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
             # Unless far too low, the nominal cost sets the length, because it is the same on every machine.
-            self._part_s *= min(4.0, PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
+            self._part_s *= min(4.0, at_once * PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
     def _observe_next(self, run: FollowedRun, periods: int) -> ObservedWindow | None:
         """Return the next ``periods`` drive periods as a window; None after the time limit or a failure."""
-        begins = run.copy()
-        made = round(run.time_s * self._frequency_hz)
-        parts = self._follow_parts(run, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
-        return None if parts is None else window_of(begins, parts)
+        found = self._observe_all([run], periods)
+        return None if found is None else found[0]
+
+    def _observe_all(self, runs: Sequence[FollowedRun], periods: int) -> list[ObservedWindow] | None:
+        """Return a window for each of several motions at the same time, like `_observe_next`."""
+        begins = [run.copy() for run in runs]
+        made = round(runs[0].time_s * self._frequency_hz)
+        parts = self._follow_all(runs, (made + periods) / self._frequency_hz, Watch.PEAKS_AND_LINES)
+        if parts is None:
+            return None
+        return [window_of(begin, own) for begin, own in zip(begins, parts, strict=True)]
 
     def _have_parted(self, ours: Sequence[Stretch], other: Sequence[Stretch]) -> bool:
         """Return whether the runs from two starts have separated."""
@@ -452,7 +484,8 @@ class _Refinement:
         if self._clock.time_s * (1.0 + each_s / self._main.time_s) > self._due_s and not self._has_answered:
             yield from self._interim()
         starts: list[Start] = []
-        wanted, windows = FIRST_STARTS, 1
+        self._is_batched = self._needs_batches(starts, each_s)
+        wanted, windows = FEWEST_STARTS if self._is_batched else FIRST_STARTS, 1
         while len(starts) < MOST_STARTS:
             is_over = not self._observe_more(starts, wanted, windows, begins_s) or self._clock.is_over
             is_due = not self._has_answered and self._clock.time_s > self._due_s
@@ -469,42 +502,69 @@ class _Refinement:
                     yield self._lost_result()
                 return
             if is_complete:
+                self._is_batched = self._is_batched or self._needs_batches(starts, each_s)
                 lead = begins_s * self._frequency_hz / self._window_periods
                 wanted, windows = next_size(starts, self._target.error, lead)
+                if self._is_batched:
+                    wanted = LANES * math.ceil(wanted / LANES)
+
+    def _needs_batches(self, starts: Sequence[Start], each_s: float) -> bool:
+        """Return whether the missing starts save more time in batches than the collision fit takes.
+
+        ``each_s`` is the simulated time of a start. The decision uses nominal costs, so it is reproducible.
+        """
+        if not batches_pay() or self._clock.limit_s < 10.0 * FIT_S:
+            return False
+        missing, error = float(FEWEST_STARTS - len(starts)), self._target.error
+        if missing <= 0.0:
+            missing = math.inf if error is None else len(starts) * (time_factor(starts, error) - 1.0)
+        is_worth_it = missing * each_s * self._main.cost_s / self._main.time_s > FIT_S
+        return is_worth_it and is_batchable(self._scene.specimen, LOOSE)
 
     def _observe_more(self, starts: list[Start], wanted: int, windows: int, begins_s: float) -> bool:
-        """Observe one more window, or one more start; return False after the time limit or a failure."""
-        for each in starts:
-            if each.repeats is None and len(each.windows) < windows:
-                window = self._observe_next(each.run, self._window_periods)
-                if window is not None:
-                    each.windows.append(window.responses_m)
-                return window is not None
-        if len(starts) == wanted:
-            return True
-        number = len(starts)
-        if number > len(self._pushes):
-            self._pushes = self._random_changes(2 * number)
-        run = self._main if number == 0 else self._begin.with_push(self._pushes[number - 1])
-        path = self._path if number == 0 else _Path(run, np.empty((0, 6)))
-        while run.time_s < begins_s:
-            look_s = math.ceil((run.time_s + begins_s / LOOKS) * self._frequency_hz) / self._frequency_hz
-            seen = self._follow_parts(run, min(begins_s, look_s))
+        """Observe one more window or start, or several in a batch; return False after the time limit."""
+        most = MOST_TOGETHER if self._is_batched else 1
+        behind = [each for each in starts if each.repeats is None and len(each.windows) < windows][:most]
+        if not behind:
+            return self._observe_starts(starts, min(wanted - len(starts), most), begins_s)
+        seen = self._observe_all([each.run for each in behind], self._window_periods)
+        for each, window in zip(behind, seen or [], strict=False):
+            each.windows.append(window.responses_m)
+        return seen is not None
+
+    def _observe_starts(self, starts: list[Start], count: int, begins_s: float) -> bool:
+        """Add the next ``count`` starts, with a window each; return False at the end of the time."""
+        paths = [self._new_path(len(starts) + k) for k in range(count)]
+        # In a batch, simulating a settled run further takes less time than a look.
+        looks = 1 if self._is_batched else LOOKS
+        for look in range(1, looks + 1):
+            look_s = math.ceil(begins_s * look / looks * self._frequency_hz) / self._frequency_hz
+            ahead = [path for path in paths if path.run.time_s < look_s]
+            seen = self._follow_all([path.run for path in ahead], look_s)
             if seen is None:
                 return False
-            if self._approaches(path, seen):
-                orbit = path.orbit
-                assert orbit is not None
-                settled = Repetition(orbit.period, 0.0)
-                impacts = orbit.impacts * self._window_periods // orbit.period
-                starts.append(Start(run, [orbit.responses_m], settled, impacts, orbit.section))
-                return True
-        window = self._observe_next(run, self._window_periods)
-        if window is not None:
+            for path, parts in zip(ahead, seen, strict=True):
+                if self._approaches(path, parts):
+                    orbit = path.orbit
+                    assert orbit is not None
+                    settled = Repetition(orbit.period, 0.0)
+                    impacts = orbit.impacts * self._window_periods // orbit.period
+                    starts.append(Start(path.run, [orbit.responses_m], settled, impacts, orbit.section))
+                    paths.remove(path)
+        windows = self._observe_all([path.run for path in paths], self._window_periods) if paths else []
+        for path, window in zip(paths, windows or [], strict=False):
             repeats = self._nearly.repeats(window.stretches)
             section = states_of(window.stretches)
-            starts.append(Start(run, [window.responses_m], repeats, window.impacts, section))
-        return window is not None
+            starts.append(Start(path.run, [window.responses_m], repeats, window.impacts, section))
+        return windows is not None
+
+    def _new_path(self, number: int) -> _Path:
+        """Return the run from start ``number``; start 0 is the requested one."""
+        if number == 0:
+            return self._path
+        if number > len(self._pushes):
+            self._pushes = self._random_changes(2 * number)
+        return _Path(self._begin.with_push(self._pushes[number - 1]), np.empty((0, 6)))
 
     def _mean(self, starts: Sequence[Start], begins_s: float) -> ScenePrediction:
         """Return the result with mean responses over all starts and windows so far."""
@@ -537,13 +597,12 @@ class _Refinement:
         needed = None
         if self._target.error is not None:
             per_s = self._clock.time_s / sum(each.run.time_s for each in starts)
-            more = time_factor(starts, self._target.error) - 1.0
-            part_s = len(starts) * windows * window_s
-            if not windows_help(starts, begins_s / window_s):
-                part_s = sum(each.run.time_s for each in starts)
+            lead = begins_s / window_s
+            count, more = next_size(starts, self._target.error, lead, math.inf)
+            more_s = (count * (lead + more) - len(starts) * (lead + windows)) * window_s
             # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n).
             off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
-            about_s = max(0.0, self._clock.time_s + more * per_s * part_s)
+            about_s = max(0.0, self._clock.time_s + per_s * more_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         return self._clock.report(found, len(starts), needed, windows)
 
