@@ -36,8 +36,6 @@ class Start:
     """Period of a nearly periodic motion, whose windows are alike; None for other motions."""
     impacts: int
     """Number of impacts in the start's first response window."""
-    section: Floats
-    """States once per drive period in the first window, shape (n, 6)."""
 
     def mean(self, windows: int) -> Floats:
         """Return the mean of the four responses over the first ``windows`` windows, shape (4,)."""

@@ -138,6 +138,8 @@ class _Path:
     recent: Floats
     """Recent states of the run, once per drive period, shape (n, 6)."""
     orbit: _Orbit | None = None
+    is_settled: bool = False
+    """Whether the run certainly approaches the periodic motion."""
     distance: float = math.inf
     """Relative distance of the run from the periodic motion it may approach, at the last check."""
     closest: float = CLOSE
@@ -203,6 +205,8 @@ class _Refinement:
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
         """Number of latest states once per drive period that are stored."""
+        self._first_section = np.empty((0, 6))
+        """States of the first of several starts, once per drive period of its first window."""
         self._is_batched = False
         """Whether further starts are integrated in SIMD batches."""
 
@@ -539,24 +543,32 @@ class _Refinement:
         looks = 1 if self._is_batched else LOOKS
         for look in range(1, looks + 1):
             look_s = math.ceil(begins_s * look / looks * self._frequency_hz) / self._frequency_hz
-            ahead = [path for path in paths if path.run.time_s < look_s]
+            ahead = [path for path in paths if path.run.time_s < look_s and not path.is_settled]
             seen = self._follow_all([path.run for path in ahead], look_s)
             if seen is None:
                 return False
             for path, parts in zip(ahead, seen, strict=True):
-                if self._approaches(path, parts):
-                    orbit = path.orbit
-                    assert orbit is not None
-                    settled = Repetition(orbit.period, 0.0)
-                    impacts = orbit.impacts * self._window_periods // orbit.period
-                    starts.append(Start(path.run, [orbit.responses_m], settled, impacts, orbit.section))
-                    paths.remove(path)
-        windows = self._observe_all([path.run for path in paths], self._window_periods) if paths else []
-        for path, window in zip(paths, windows or [], strict=False):
-            repeats = self._nearly.repeats(window.stretches)
-            section = states_of(window.stretches)
-            starts.append(Start(path.run, [window.responses_m], repeats, window.impacts, section))
-        return windows is not None
+                path.is_settled = self._approaches(path, parts)
+        moving = [path for path in paths if not path.is_settled]
+        windows = self._observe_all([path.run for path in moving], self._window_periods) if moving else []
+        if windows is None:
+            return False
+        left = iter(windows)
+        for path in paths:
+            if path.is_settled:
+                assert path.orbit is not None
+                impacts = path.orbit.impacts * self._window_periods // path.orbit.period
+                settled, section = Repetition(path.orbit.period, 0.0), path.orbit.section
+                found = Start(path.run, [path.orbit.responses_m], settled, impacts)
+            else:
+                window = next(left)
+                section = states_of(window.stretches)
+                repeats = self._nearly.repeats(window.stretches)
+                found = Start(path.run, [window.responses_m], repeats, window.impacts)
+            if not starts:
+                self._first_section = section
+            starts.append(found)
+        return True
 
     def _new_path(self, number: int) -> _Path:
         """Return the run from start ``number``; start 0 is the requested one."""
@@ -592,7 +604,7 @@ class _Refinement:
             final_state=state_of(starts[0].run.state),
             memory=StartMemory.LOST,
             scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
-            section=self._section(starts[0].section),
+            section=self._section(self._first_section),
         )
         needed = None
         if self._target.error is not None:
