@@ -192,16 +192,6 @@ def test_the_catalogue_detects_a_change_even_if_the_file_time_was_restored(folde
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
-def test_the_journal_stores_the_seal_of_every_recording(folder):
-    for point in read_journal(folder / "c.campaign.sqlite"):
-        with open_recording(folder / point.file) as recording:
-            assert point.seal == recording.seal != ""
-    connection = sqlite3.connect(folder / "c.campaign.sqlite")
-    seals = connection.execute("SELECT seal FROM attempts").fetchall()
-    connection.close()
-    assert len({seal for (seal,) in seals}) == 3
-
-
 def test_a_campaign_whose_older_journal_has_no_seals_can_be_resumed(bench, folder):
     connection = sqlite3.connect(folder / "c.campaign.sqlite")
     for table in ("points", "attempts"):
@@ -285,13 +275,6 @@ def test_a_journal_with_two_different_seals_for_one_recording_is_reported_as_dam
         assert not recording.is_checked
     assert [each.path for each in verify_recordings(folder) if each.is_bad] == ["two.h5"]
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
-
-
-def test_a_seal_forged_in_only_one_table_of_the_journal_is_detected(folder):
-    replace_by_an_older_recording(folder)
-    with open_recording(folder / "two.h5") as recording:
-        change_journal(f"UPDATE points SET seal = '{recording.seal}' WHERE name = 'two'")(folder)
-        assert recording.check_seal(SealDepth.WHOLE).state is SealState.DAMAGED
 
 
 def test_a_recording_moved_back_after_its_point_was_repeated_is_reported_as_bad(bench, folder):

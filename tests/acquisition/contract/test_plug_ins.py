@@ -206,13 +206,19 @@ def test_contract_options_do_not_clash_with_options_of_a_project(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcard"})
-"""Names of our instruments that are part of a shipped virtual bench."""
+DRIVERS = ("afg1022x", "daqmx", "keysight33500b")
+SENSORS = sorted({row.name for row in OURS} - {"file", "none", "soundcard", *DRIVERS})
+"""Names of our sensors, which are part of a shipped virtual bench, as are the drivers."""
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("name", OUR_INSTRUMENTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(pytest.param(name, marks=pytest.mark.thorough) for name in DRIVERS),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in SENSORS),
+    ],
+)
 def test_the_built_in_drivers_pass_the_contract_tests(name):
     done = run_contract_tests(name)
     assert done.returncode == 0, done.stdout
