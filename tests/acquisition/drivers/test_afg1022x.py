@@ -38,12 +38,9 @@ def largest_peak_v(states):
 
 
 class TestOpening:
-    def test_the_first_command_switches_the_output_off(self, plugged):
-        AFG1022X.open(plugged.config).close()
-        assert plugged.log.messages[0] == "OUTP1:STAT OFF"
-
-    def test_the_identity_is_found_after_an_empty_first_answer(self, plugged):
+    def test_the_output_is_first_switched_off_and_an_empty_identity_asked_again(self, plugged):
         generator = AFG1022X.open(plugged.config)
+        assert plugged.log.messages[0] == "OUTP1:STAT OFF"
         assert plugged.log.messages.count("*IDN?") == 2
         assert generator.identity.model == "AFG1022"
         assert generator.identity.serial == plugged.instrument.serial

@@ -103,29 +103,27 @@ class TestRoundTrips:
 
 
 class TestDefaults:
-    def test_defaults_fill_in_missing_values(self, tmp_path):
-        text = 'name = "c"\n[defaults]\nramp_s = 0.7\n[defaults.dwell]\nsettle_s = 9.0\n' + DWELL_TABLE
+    @pytest.mark.parametrize(
+        ("defaults", "ramp_s", "found"),
+        [
+            ("ramp_s = 0.7\n[defaults.dwell]\nsettle_s = 9.0", 0.7, {"settle_s": 9.0, "duration_s": 2.0}),
+            ("[defaults.dwell]\nduration_s = 9.0", 1.0, {"duration_s": 2.0}),
+            ("[defaults.sine_sweep]\nstep_s = 9.0", 1.0, {"duration_s": 2.0}),
+        ],
+        ids=["missing values are filled in", "a given value remains", "other kinds have no effect"],
+    )
+    def test_defaults_fill_in_missing_values_of_their_kind(self, tmp_path, defaults, ramp_s, found):
+        text = f'name = "c"\n[defaults]\n{defaults}\n' + DWELL_TABLE
         (measurement,) = load(tmp_path, text).measurements
-        assert measurement.ramp_s == 0.7
-        assert measurement.excitation.settle_s == 9.0
+        assert measurement.ramp_s == ramp_s
+        assert found.items() <= measurement.excitation.model_dump().items()
 
-    def test_a_value_in_a_measurement_overrides_the_default(self, tmp_path):
-        text = 'name = "c"\n[defaults.dwell]\nduration_s = 9.0\n' + DWELL_TABLE
-        (measurement,) = load(tmp_path, text).measurements
-        assert measurement.excitation.duration_s == 2.0
-
-    def test_defaults_apply_only_to_their_kind_of_excitation(self, tmp_path):
-        text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
-        assert len(load(tmp_path, text).measurements) == 1
-
-    def test_a_misspelt_default_is_refused(self, tmp_path):
-        text = 'name = "c"\n[defaults]\nramp_ms = 9.0\n' + DWELL_TABLE
-        with pytest.raises(ConfigurationError, match=r"measurements\.0\.ramp_ms is not a known key"):
-            load(tmp_path, text)
-
-    def test_a_default_for_an_unknown_kind_is_refused(self, tmp_path):
-        text = 'name = "c"\n[defaults.dwel]\nsettle_s = 9.0\n' + DWELL_TABLE
-        with pytest.raises(ConfigurationError, match=r"measurements\.0\.dwel is not a known key"):
+    @pytest.mark.parametrize(
+        ("defaults", "unknown"), [("ramp_ms = 9.0", "ramp_ms"), ("[defaults.dwel]\nsettle_s = 9.0", "dwel")]
+    )
+    def test_a_misspelt_default_or_kind_is_refused(self, tmp_path, defaults, unknown):
+        text = f'name = "c"\n[defaults]\n{defaults}\n' + DWELL_TABLE
+        with pytest.raises(ConfigurationError, match=rf"measurements\.0\.{unknown} is not a known key"):
             load(tmp_path, text)
 
 
