@@ -140,13 +140,6 @@ def _set_start_trigger(task: Task, request: Any) -> None:
     task.timing.trigger_source = task.full_terminal(request.trigger_source)
 
 
-def _set_reference_trigger(task: Task, request: Any) -> None:
-    member(Edge, pick(request, "trigger_edge"), "DigEdge_RefTrig_Edge")
-    task.require_stopped()
-    task.timing.reference_source = task.full_terminal(request.trigger_source)
-    task.timing.pretrigger = request.pretrigger_samples
-
-
 def _set_logging(task: Task, request: Any) -> None:
     task.require_stopped()
     if task.outputs:
@@ -180,7 +173,6 @@ TASK_CALLS: Mapping[str, TaskCall] = {
     "CreateAOVoltageChan": _add_outputs,
     "CfgSampClkTiming": _set_clock,
     "CfgDigEdgeStartTrig": _set_start_trigger,
-    "CfgDigEdgeRefTrig": _set_reference_trigger,
     "ConfigureLogging": _set_logging,
     # The client has already closed the event stream; nothing else needs to be undone.
     "UnregisterEveryNSamplesEvent": lambda *_: None,

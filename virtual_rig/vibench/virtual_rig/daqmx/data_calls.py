@@ -100,12 +100,11 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
         return task.acquisition is not None or not task.is_running
 
     if not task.rig.pace.ask(task.rig, math.inf, has_begun, deadline_s):
-        return _nothing_in_time(task, wanted)
+        status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE) if wanted else 0
+        return Reading(np.empty((len(task.inputs), 0)), status)
     acquisition = task.acquisition
     if acquisition is None:
         raise task.refusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, samples_read=0)
-    if not task.await_reference(deadline_s):
-        return _nothing_in_time(task, wanted)
     first = acquisition.position
     count = int(min(wanted, max(0, acquisition.total - first)))
     status = 0 if count == wanted else int(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE)
@@ -130,11 +129,6 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
     if task.log is not None and volts.size:
         task.log.write(task, volts, began_s)
     return Reading(volts, status, began_s)
-
-
-def _nothing_in_time(task: Task, wanted: int) -> Reading:
-    status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE) if wanted else 0
-    return Reading(np.empty((len(task.inputs), 0)), status)
 
 
 def _await(

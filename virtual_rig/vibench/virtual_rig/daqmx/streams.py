@@ -16,9 +16,6 @@ from .errors import DaqmxRefusal
 MOST_SAMPLES = 1 << 27
 """Largest number of values in a buffer or a read: 1 GiB."""
 
-LEAST_PRETRIGGER = 2
-"""Smallest number of samples that can be stored before a reference trigger, and after one."""
-
 
 @dataclass
 class Timing:
@@ -33,10 +30,6 @@ class Timing:
     clock_source: str = ""
     trigger_source: str = ""
     """Terminal of the start trigger; if empty, sampling begins when the task is started."""
-    reference_source: str = ""
-    """Terminal of the reference trigger, around which a finite task stores samples; empty without one."""
-    pretrigger: int = 0
-    """Samples per channel stored before the reference trigger."""
 
     @property
     def total(self) -> float:
@@ -96,15 +89,11 @@ class Acquisition(Stream):
         began_s: float,
         total: float,
         buffer_size: int,
-        pretrigger: int,
         *,
         loses_samples: bool,
     ) -> None:
-        """Begin an acquisition, with ``pretrigger`` samples before a reference trigger (0 without a trigger).
-
-        ``loses_samples``: whether new samples overwrite the oldest in a full buffer, which else grows.
-        """
-        super().__init__(rate_hz, began_s, math.inf if pretrigger else total)
+        """``loses_samples``: whether new samples overwrite the oldest in a full buffer, which else grows."""
+        super().__init__(rate_hz, began_s, total)
         self.position = 0
         """Number of samples per channel that the program has read."""
         self.queried_at = -1
@@ -114,14 +103,12 @@ class Acquisition(Stream):
         self._unread = SampleQueue(channels)
         self.buffer_size = max(1, buffer_size)
         self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
-        self._samples = total
-        self._pretrigger = pretrigger
         self._is_open = True
 
     @property
     def available(self) -> int:
         """Number of samples per channel that the program has not read yet."""
-        return 0 if self.awaits_trigger else self.transferred - self.position
+        return self.transferred - self.position
 
     def advance_to(self, now_s: float) -> None:
         """Acquire all samples that are due at rig time ``now_s``."""
@@ -131,38 +118,11 @@ class Acquisition(Stream):
         if self.is_done:
             self.close()
 
-    @property
-    def awaits_trigger(self) -> bool:
-        """Whether the reference trigger is still awaited; until then only the newest samples are kept."""
-        return self._pretrigger > 0 and self._is_open and self.total == math.inf
-
-    @property
-    def enough_before_s(self) -> float:
-        """Rig time at which enough samples are stored for a trigger [s]; infinite once this is the case."""
-        kept = self._pretrigger
-        return self.began_s + kept / self.rate_hz if self.transferred < kept else math.inf
-
-    def trigger(self) -> bool:
-        """Apply the reference trigger now; return whether it is accepted.
-
-        The trigger is rejected until enough samples are stored.
-        """
-        if not self.awaits_trigger or self.transferred < self._pretrigger:
-            return False
-        self.total = self.position + self._samples
-        return True
-
     def _store(self, block: NDArray[np.float64]) -> None:
         self._unread.append(block)
         self.transferred += block.shape[1]
-        if self.awaits_trigger:
-            self._take(max(0, self.transferred - self.position - self._pretrigger))
-        elif self.available > self._capacity:
+        if self.available > self._capacity:
             self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
-
-    def _take(self, count: int) -> NDArray[np.float64]:
-        self.position += count
-        return self._unread.take(count)
 
     def read(self, count: int) -> NDArray[np.float64]:
         """Return the next ``count`` samples, shape (channels, count) [V].
@@ -171,7 +131,8 @@ class Acquisition(Stream):
         """
         if self.failure is not None:
             raise self.failure
-        return self._take(count)
+        self.position += count
+        return self._unread.take(count)
 
     def look_for_overloads(self) -> None:
         """Latch the inputs that have clipped since the last call."""

@@ -1,7 +1,6 @@
 """A simulated DAQmx task: channels, states, and the terminals of clock and trigger."""
 
 import math
-import time
 from enum import IntEnum
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +15,7 @@ from vibench.acquisition import AcquisitionError, ConfigurationError
 from .devices import AnalogInputs, AnalogOutputs, Channel, Device, InputChannel, OutputChannel, expand
 from .errors import DaqmxRefusal, unsupported_value
 from .rig import Rig
-from .streams import LEAST_PRETRIGGER, Acquisition, Generation, OutputBuffer, Timing, check_memory
+from .streams import Acquisition, Generation, OutputBuffer, Timing, check_memory
 
 
 class TdmsLog:
@@ -58,7 +57,6 @@ class TdmsLog:
             )
 
 
-_BREATH_S = 1e-4
 _OWN_CLOCKS = ("", "onboardclock")
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
 """Buffer size in samples per channel, up to each rate (NI-DAQmx Help, "How is buffer size determined?")."""
@@ -243,14 +241,6 @@ class Task:
                 self.rig.require_terminal(awaited)
             if self.inputs:
                 check_memory(self.buffer_size, len(self.inputs))
-        if self.timing.reference_source:
-            if self.timing.mode is not AcquisitionType.FINITE:
-                raise DaqmxRefusal(DAQmxErrors.REF_TRIG_WHEN_CONTINUOUS)
-            most = self.timing.samples - LEAST_PRETRIGGER
-            if not LEAST_PRETRIGGER <= self.timing.pretrigger <= most:
-                allowed = f"{LEAST_PRETRIGGER} to {most} of {self.timing.samples} samples"
-                raise unsupported_value("RefTrig_PretrigSamples", self.timing.pretrigger, allowed)
-            self.rig.require_terminal(self.timing.reference_source)
 
     def _reserve(self) -> None:
         for device in self.devices:
@@ -297,10 +287,9 @@ class Task:
             sampler = rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
             self.acquisition = Acquisition(
                 sampler, len(self.inputs), self.rate_hz, rig.now_s, timing.total,
-                self.buffer_size, timing.pretrigger, loses_samples=rig.pace.loses_samples,
+                self.buffer_size, loses_samples=rig.pace.loses_samples,
             )  # fmt: skip
             rig.run(self.acquisition)
-            self._await_reference_edge()
         else:
             physical = tuple(channel.physical for channel in self.outputs)
             self.generation = Generation(
@@ -309,29 +298,6 @@ class Task:
             )  # fmt: skip
             rig.run(self.generation)
         rig.edge(self.start_terminal)
-
-    def _await_reference_edge(self) -> None:
-        if self.timing.reference_source:
-            self.rig.arm(self.timing.reference_source, self._reference_edge)
-
-    def _reference_edge(self) -> None:
-        """Apply an edge to the reference trigger; an edge that comes too early is ignored."""
-        if self.acquisition is not None and not self.acquisition.trigger():
-            self._await_reference_edge()
-
-    def await_reference(self, deadline_s: float) -> bool:
-        """Wait for a reference trigger until the deadline; return False if it has not come by then."""
-        acquisition = self.acquisition
-        if acquisition is None:
-            return True
-
-        def is_there() -> bool:
-            return self.acquisition is not acquisition or not acquisition.awaits_trigger
-
-        while not is_there() and time.monotonic() < deadline_s:
-            self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, deadline_s)
-            self.rig.changed.wait(_BREATH_S)  # lets other callers stop the task
-        return is_there()
 
     def is_done(self) -> bool:
         """Return whether the task is finished; raise the error that ended it."""
@@ -344,7 +310,6 @@ class Task:
 
     def wait_until_done(self, deadline_s: float) -> None:
         """Wait for the end of a finite task (-200560 after the deadline)."""
-        self.await_reference(deadline_s)
         until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
         if not self.rig.pace.ask(self.rig, until_s, self.is_done, deadline_s):
             raise self.refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE)
@@ -354,7 +319,6 @@ class Task:
         if not self.is_running:
             return
         self.rig.disarm(self._begin)
-        self.rig.disarm(self._reference_edge)
         if self.stream is not None:
             self.rig.end(self.stream)
         if self.generation is not None and not self.generation.repeats:
