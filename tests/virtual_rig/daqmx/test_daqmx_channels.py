@@ -61,7 +61,7 @@ def test_settings_that_a_device_lacks_are_refused_with_the_allowed_values(
     if rate_hz is not None:
         task.timing.cfg_samp_clk_timing(rate_hz)
     with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, allowed):
-        task.control(TaskMode.TASK_VERIFY)
+        task.control(TaskMode.TASK_RESERVE)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_settings_that_a_device_lacks_are_refused_with_the_allowed_values(
 def test_output_limits_beyond_the_range_of_the_device_are_refused(task, limits, allowed):
     task.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=limits[0], max_val=limits[1])
     with daq_error(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, allowed):
-        task.control(TaskMode.TASK_VERIFY)
+        task.control(TaskMode.TASK_RESERVE)
 
 
 def test_the_smallest_sufficient_input_range_is_used(task):

@@ -217,19 +217,15 @@ class Task:
     def control(self, action: TaskMode) -> None:
         """Carry out an action that changes the state."""
         match action:
-            case TaskMode.TASK_START:
-                self.start()
-            case TaskMode.TASK_STOP:
-                self.stop()
-            case TaskMode.TASK_VERIFY:
-                self._verify()
             case TaskMode.TASK_RESERVE | TaskMode.TASK_COMMIT:
                 self._verify()
                 self._reserve()
                 if not self.is_running:
                     self.state = self._rests_in = TaskState.RESERVED
-            case _:
+            case TaskMode.TASK_UNRESERVE | TaskMode.TASK_ABORT:
                 self.abort()
+            case _:
+                raise unsupported_value("task action", action.name, "RESERVE, COMMIT, UNRESERVE, ABORT")
 
     def _verify(self) -> None:
         self.require_channels()

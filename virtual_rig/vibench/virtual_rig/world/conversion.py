@@ -135,11 +135,6 @@ OVER_RANGE = 1.02
 """Level at which the modulator clips, relative to the range; counts are limited to the range itself."""
 
 
-def clip_v(range_v: float) -> float:
-    """Return the voltage at which the modulator of an input with this range clips [V]."""
-    return range_v * OVER_RANGE
-
-
 class InputStage:
     """One input from its connector to the converter, computed together with the world."""
 
@@ -147,7 +142,7 @@ class InputStage:
         """``cables`` are the cables of all inputs, by name; they may be replaced at any time."""
         self.configured = configured
         self._cables = cables
-        self._clip_v = clip_v(configured.range_v)
+        self._clip_v = configured.range_v * OVER_RANGE
         half_turn = np.pi * AC_CUT_HZ * grid.step_s
         self._capacitor = RecursiveFilter(
             np.array([1.0, -1.0]) / (1 + half_turn), [1.0, -(1 - half_turn) / (1 + half_turn)]

@@ -110,34 +110,31 @@ _ZEROS = 6
 """Number of numerator weights that are fitted."""
 
 
-@dataclass(frozen=True)
 class LowPass:
-    """An analogue all-pole low-pass of unit gain at zero hertz."""
+    """Analogue low-pass of a sensor with a bandwidth (one pole, -3 dB) and a mounted resonance, if given.
 
-    poles: tuple[complex, ...]
-    """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
+    The default damping ratio is assumed; it is typical of piezoelectric sensors.
+    """
+
+    def __init__(
+        self,
+        bandwidth_hz: float | None = None,
+        resonance_hz: float | None = None,
+        damping_ratio: float = 0.02,
+    ) -> None:
+        self.poles: tuple[complex, ...] = ()
+        """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
+        if bandwidth_hz is not None:
+            self.poles += (complex(-2 * np.pi * bandwidth_hz),)
+        if resonance_hz is not None:
+            omega = 2 * np.pi * resonance_hz
+            pole = complex(-damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2))
+            self.poles += (pole, pole.conjugate())
 
     def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the complex gain of the low-pass, with the shape of ``frequency_hz``."""
         s = 2j * np.pi * np.asarray(frequency_hz)
         return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
-
-
-def low_pass(
-    bandwidth_hz: float | None = None, resonance_hz: float | None = None, damping_ratio: float = 0.02
-) -> LowPass:
-    """Return the response of a sensor with a bandwidth (one pole, -3 dB) and a mounted resonance, if given.
-
-    The default damping ratio is assumed; it is typical of piezoelectric sensors.
-    """
-    poles: tuple[complex, ...] = ()
-    if bandwidth_hz is not None:
-        poles += (complex(-2 * np.pi * bandwidth_hz),)
-    if resonance_hz is not None:
-        omega = 2 * np.pi * resonance_hz
-        pole = complex(-damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2))
-        poles += (pole, pole.conjugate())
-    return LowPass(poles)
 
 
 def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
@@ -225,7 +222,7 @@ class MotionSensor:
             )
         bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz) if config.bandwidth_hz else 0.0
         self.delay_steps = (config.delay_s - bandwidth_s) * grid.rate_hz
-        self._filter = running_filter(low_pass(config.bandwidth_hz, config.resonance_hz), grid.step_s)
+        self._filter = running_filter(LowPass(config.bandwidth_hz, config.resonance_hz), grid.step_s)
         self._noise_rms = noise_rms
         self._full_scale = config.full_scale_v * config.units_per_volt(role.unit)
         self._full_scale_v = config.full_scale_v
