@@ -86,8 +86,8 @@ def _share_section(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "motion. The table compares the predicted share of starts that reach each motion with the share in",
         f"{lotteries[0].starts} further runs, whose starts differ by a millionth of the gap.",
         "`periodic, 1` is a motion that repeats after one drive period. In 19 of 20 predictions, all",
-        "intervals contain the true shares. *Relative time* is a prediction's computing time over that of a",
-        "single run.",
+        "intervals contain the true shares. *Relative time* is a prediction's computing time divided by",
+        "that of a single run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -129,7 +129,7 @@ def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
         "",
         "1. state error after 0.1 s, against the independent solution;",
         "2. in brackets, the promised state error;",
-        "3. relative difference of the Responses in the second half of the run from level `reference`;",
+        "3. relative difference of the Responses (second half of the run) from those at level `reference`;",
         "4. in brackets, the stated error of these Responses, from a stricter run.",
         "",
         f"| motion | growth of a small error | {' | '.join(Accuracy)} |",
@@ -204,7 +204,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
         yield from (
             "",
-            f"In these motions, a level reduces the state error by less than a factor of {LEAST_GAIN:g}:",
+            f"In these motions, a stricter level divides the state error by less than {LEAST_GAIN:g}:",
             "",
             *lines,
         )

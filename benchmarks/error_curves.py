@@ -238,7 +238,7 @@ def section(curves, models, chaos):
         "",
         "`vibench tradeoff --out DIR` draws this picture on your machine.",
         "",
-        "- A stable periodic motion is found by Newton's iteration; a smaller error takes no longer.",
+        "- Newton's iteration finds stable periodic motions; a smaller requested error takes no longer.",
         "- In chaos, the result is a mean over runs from different initial conditions (*starts*). In 19 of",
         "  20 cases, other starts change this mean by at most the stated error, which no accuracy level",
         "  reduces. A single run may differ from the mean by far more.",

@@ -250,10 +250,10 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"The time limit of the {len(rows)} predictions is {time_s:g} s on a busy machine",
+        f"The time limit of each prediction is {time_s:g} s on a busy machine",
         f"({SHORT * time_s:g} s with *start lost*, if the requested error is {100.0 * SMALL:g} % or less).",
-        "*Covered* responses differ from the true value by at most the stated error plus the error of the",
-        "true value. True values come from level `reference`; with *start lost*, from the mean over other",
+        "*Covered* responses differ from the true value by at most the stated error plus the true",
+        "value's error. True values come from level `reference`; with *start lost*, from the mean over other",
         "starts at `quick`.",
         "",
         (
