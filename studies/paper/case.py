@@ -191,7 +191,7 @@ OPTIONS: Mapping[str, Option] = {
     "sweep-falls": Option(
         "exponent k of A0 ~ f^-k in the sweep", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
     ),
-    "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "swept {}".format),
+    "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "a {}ward sweep".format),
 }
 """Settings for `vibench reproduce --with`."""
 

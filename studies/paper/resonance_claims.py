@@ -39,7 +39,7 @@ def bound_resonances(r: Reading) -> Values:
 
 @claim(
     "3.1, Fig. 3(a)",
-    "Peak of Response I at 1 µm nearest to each resonance, on the frequency grid.",
+    "For each resonance, nearest peak of Response I at 1 µm, on the frequency grid.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
 )
 def weak_peaks(r: Reading) -> Values:

@@ -43,8 +43,8 @@ class LoopFeedback(FrozenModel):
         widths = [*(len(row) == memory for row in self.step), *(len(row) == inputs for row in self.inlet)]
         if not (all(widths) and len(self.step) == len(self.inlet) == memory and len(self.direct) == inputs):
             raise ValueError(
-                f"a law with {memory} state variables needs step of {memory} x {memory}, inlet of {memory} x "
-                f"{inputs} and direct of {inputs}; make the shapes agree"
+                f"a law with {memory} states needs 'step' of {memory} x {memory}, 'inlet' of {memory} x "
+                f"{inputs} and 'direct' of {inputs}; make the shapes agree"
             )
         return self
 

@@ -87,14 +87,14 @@ def test_loads_without_stops_are_proportional_to_the_drive(rig):
 
 def test_a_plan_that_overstretches_the_specimen_is_refused(rig):
     sweep = SineSweep(amplitude_vpp=9.9, start_hz=180, stop_hz=220, duration_s=60)
-    with pytest.raises(LimitExceeded, match=r"the specimen's amplitude \(about, at 2\d\d.*keep away from"):
+    with pytest.raises(LimitExceeded, match=r"specimen's amplitude \(estimated, at 2\d\d.*keep away from"):
         require_within_limits(Measurement(name="plan", excitation=sweep), rig)
 
 
 def test_the_limit_checks_include_the_vibrometer_range(rig):
     dwell = Measurement(name="plan", excitation=Dwell(amplitude_vpp=1, frequency_hz=266, duration_s=1))
     told = {check.what: check for check in limit_checks(dwell, rig)}
-    velocity = told["the velocity of m0 (about, at 266 Hz)"]
+    velocity = told["the velocity of m0 (estimated, at 266 Hz)"]
     vibrometer = next(each for each in rig.daq.channels if each.role == "m0_velocity")
     assert vibrometer.physical in velocity.source
     assert 0 < velocity.use < 1

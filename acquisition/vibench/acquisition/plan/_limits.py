@@ -333,7 +333,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
     amplitude = loads[BaseQuantity.AMPLITUDE]
     limit = rig.specimen.amplitude_limit_m
     yield LimitCheck(
-        f"the specimen's amplitude (about, {amplitude.cause})",
+        f"the specimen's amplitude (estimated, {amplitude.cause})",
         amplitude.peak,
         limit.value,
         "m",
@@ -346,7 +346,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
         if channel.role in RESPONSE_ROLES:
             moved = loads[BaseQuantity(channel.role.value)]
             yield LimitCheck(
-                f"the {channel.quantity} of m0 (about, {moved.cause})",
+                f"the {channel.quantity} of m0 (estimated, {moved.cause})",
                 moved.peak,
                 channel.full_scale_v * channel.units_per_volt,
                 channel.unit,

@@ -27,7 +27,7 @@ _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
 def _is_of_a_file(value: object) -> object:
     if isinstance(value, str) and re.search(_NAME, value) is None:
-        raise ValueError("it names a file; use 1 to 64 of a-z, 0-9, _ and -, starting with a letter or digit")
+        raise ValueError("a file name has 1 to 64 of a-z, 0-9, _ and -, and starts with a letter or digit")
     return value
 
 

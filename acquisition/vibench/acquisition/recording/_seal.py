@@ -370,7 +370,7 @@ def _missing_seal(excuse: str, key: SealKey | None) -> SealCheck:
     """Report a missing seal, which is an error if a key is given: a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
-    return SealCheck(SealState.OTHER_KEY, f"it has no seal, so none made with the key ({key.name})", "")
+    return SealCheck(SealState.OTHER_KEY, f"it has no seal to check with the key ({key.name})", "")
 
 
 def _signature_check(
@@ -382,7 +382,7 @@ def _signature_check(
         return SealCheck(SealState.INTACT, f"{as_sealed}{also}", seal)
     if not signature or key_id != key.name:
         by = f"with the key {key_id}" if key_id else "without a key"
-        sentence = f"{as_sealed}, but {by}, not with the given key ({key.name})"
+        sentence = f"{as_sealed}, but sealed {by}, not with the given key ({key.name})"
         return SealCheck(SealState.OTHER_KEY, sentence, seal)
     if not hmac.compare_digest(signature.encode(), key.signature(text.encode()).encode()):
         return SealCheck(SealState.DAMAGED, "its signature does not match the key: it was forged", seal)

@@ -220,8 +220,8 @@ class BranchDiagram(Tabular):
             return "No periodic motion was found"
         harmonics = self.request.balance_options.most
         return (
-            f"Harmonic balance with at most {harmonics} harmonics found no motion: no motion has the period "
-            "of the drive, or more harmonics are needed, as with impacts; use the method 'shooting'"
+            f"Harmonic balance with at most {harmonics} harmonics found no motion. Either no motion has the "
+            "drive's period, or more harmonics are needed, as with impacts; use the method 'shooting'"
         )
 
     @property

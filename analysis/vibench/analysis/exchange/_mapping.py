@@ -152,7 +152,7 @@ class Part(FrozenModel):
     def _rises(self) -> Self:
         if self.stop_s <= self.start_s:
             raise ValueError(
-                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}, both from file start"
+                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g} (from file start)"
             )
         return self
 

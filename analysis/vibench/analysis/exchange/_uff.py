@@ -414,7 +414,7 @@ def _dataset(recording: RecordingDescription, function: UniversalFunction, numbe
     yield id_line(f"{recording.path.name.removesuffix('.part').removesuffix('.h5')} {recording.recording_id}")
     yield id_line(date_line(recording.started_utc))
     yield id_line(function.note)
-    moved = "" if hz is lines_hz else f" moved from lines every {lines_hz[1] - lines_hz[0]:.10g} Hz"
+    moved = "" if hz is lines_hz else f" interpolated from lines {lines_hz[1] - lines_hz[0]:.10g} Hz apart"
     yield id_line(f"origin={recording.origin.value}{moved}")
     names = "".join(
         f" {'NONE':<10}{_node(each, recording):10d}{each.direction:4d}" for each in (response, reference)

@@ -182,7 +182,7 @@ def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
     return (
         f"Measured {rising[0].view.symbol} of {rising[0].facts.response} at {len(rising)} noise levels. "
         f"{'; '.join(levels)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
-        "m2, which strong collisions approach."
+        "m2 (limit of strong collisions)."
     )
 
 

@@ -235,7 +235,7 @@ def _caption(analysis: SweepAnalysis) -> str:
         if order != 1.0
     )
     return (
-        f"Above: amplitude in the recorded velocity, {found.resolution_hz:.2g} Hz wide at half power. Below: "
+        f"Above: velocity spectrum, lines {found.resolution_hz:.2g} Hz wide at half power. Below: "
         f"displacement of {analysis.facts.mass} at orders of the recorded drive, grey where the "
         f"masses collide; there, orders also contain chaotic motion near their frequency. Strongest after "
         f"order 1: {loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB re order 1 (median)."

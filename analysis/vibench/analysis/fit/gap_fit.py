@@ -72,7 +72,7 @@ def fit_gap(sweeps: Sequence[SweepAnalysis], linear: Specimen, fit: SpecimenFit 
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit)]
     if not found:
         raise NotEnoughData(
-            "no sweep goes from motion without collisions, as the specimen predicts it, to collisions, so "
+            "no sweep goes from predicted motion without collisions to collisions, so "
             "the gap is not determined; sweep with more drive, or start at a frequency without collisions"
         )
     return _narrowest(found, linear)

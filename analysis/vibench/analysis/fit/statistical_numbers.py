@@ -390,7 +390,7 @@ def _require_likely(made: _Runs, measured: Reals) -> None:
     if not 1 / _LIKELY < seen / drawn < _LIKELY:
         raise UnusableData(
             f"the recorded voltage should give {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} "
-            "m/s2 were recorded, so it cannot be simulated; correct the description of amplifier and shaker"
+            "m/s2 were recorded, so no simulation is possible; correct the described amplifier and shaker"
         )
 
 

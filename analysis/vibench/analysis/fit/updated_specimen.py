@@ -243,11 +243,11 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     named = ", or ".join(alike)
     if not best.mends:
         return (
-            "no single changed assumption makes it fit; the best one, with chi² = "
+            "no single changed assumption makes the model fit; the best one, with chi² = "
             f"{best.reduced_chi_square:.3g}, is {named}"
         )
-    choice = "it fits with any of these, which the data do not distinguish: " if len(alike) > 1 else ""
-    return f"{choice}{named}" if choice else f"it fits with {named}"
+    choice = "the model fits with any of these, which the data do not distinguish: " if len(alike) > 1 else ""
+    return f"{choice}{named}" if choice else f"the model fits with {named}"
 
 
 def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ...]:

@@ -375,7 +375,7 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
         if worth >= 1:
             off = float(np.median(chosen.magnitude[lines] / referenced.magnitude[lines])) - 1
             if abs(off) > np.median(sd[lines]) * max(0.5, _SURELY / np.sqrt(worth)):
-                deviations.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} drive {where}")
+                deviations.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} 'drive' {where}")
     name = chosen.settings.estimator
     return f"noise biases {name}; use 'drive'. {name} is {' and '.join(deviations)}" if deviations else ""
 

@@ -239,7 +239,7 @@ class FrequencyResponseSums:
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
             raise InvalidRequest(
-                "the estimator 'drive' needs a reference channel; create these sums for that estimator"
+                "the estimator 'drive' needs a reference channel; create the sums with this estimator"
             )
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:

@@ -159,7 +159,7 @@ class EnsembleCurve(Tabular):
     def sentence(self) -> str:
         """Result of the comparison in words."""
         if not self.compared:
-            return f"{self.name}: too few draws to compare (with the same kind of motion as measured)"
+            return f"{self.name}: too few draws to compare (few show the measured kind of motion)"
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
             agrees = "agrees with" if self.agrees else "differs from"

@@ -100,7 +100,7 @@ def fit_shaker(
     chi2 = float(2 * best.cost / degrees)
     if chi2 > LARGEST_CHI2:
         raise UnusableData(
-            f"no shaker explains the base motion under the voltage in {analysis.facts.name} (chi² {chi2:.3g} "
+            f"no shaker explains how the voltage moves the base in {analysis.facts.name} (chi² {chi2:.3g} "
             f"per degree of freedom, at most {LARGEST_CHI2:g}): the amplifier, the table or the specimen "
             "differs from its description, or masses collide; check the bench file, or choose weaker noise"
         )

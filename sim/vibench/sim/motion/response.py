@@ -122,7 +122,7 @@ def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
     """Return the number of whole drive periods in a window; raise ValueError for an unusable window."""
     if drive.amplitude_m == 0.0:
         raise ValueError(
-            "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
+            "A response over a drive amplitude of 0 m is not defined: give a positive amplitude."
         )
     require_positive("Duration", duration_s, "s")
     if not 0.0 < window_s <= duration_s:

@@ -158,7 +158,7 @@ class Scene(Strict):
             msg = f"A scene in which nothing is observed is not allowed: give one of {', '.join(Observable)}."
             raise ValueError(msg)
         if self.drive.amplitude_m == 0.0:
-            msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
+            msg = "A response over a drive amplitude of 0 m is not defined: give a positive amplitude."
             raise ValueError(msg)
         for length_s in (self.duration.longest_s, self.duration.window_s):
             if length_s * self.drive.frequency_hz > MOST_PERIODS:

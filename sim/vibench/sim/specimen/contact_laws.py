@@ -289,7 +289,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = {
     ),
     "power": LawWord(
         "power:3+5+7 or power:3@0.2+7@0.8[:M]",
-        "odd powers of p instead of stops, with shares",
+        "instead of stops: odd powers of p, each with its share of the force",
         "power:5",
         _parse_power_law,
     ),

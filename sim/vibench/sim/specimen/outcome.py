@@ -4,7 +4,7 @@ from enum import IntEnum
 
 _TEXTS = (
     "reached the end time",
-    "more impacts than allowed: raise max_impact_rate_hz, cut runs of over 6e7 impacts, or suspect chatter",
+    "more impacts than allowed: raise max_impact_rate_hz, shorten the run, or look for chatter",
     "the motion overflows or loses all its digits: lower the drive, or check the specimen's numbers",
     "a contact made no progress: start less deep in a stop, request less accuracy, or check the specimen",
     "more steps than allowed: a mode is very fast; check masses and stiffnesses, or run shorter",

@@ -114,10 +114,10 @@ NUMBERS = {
         "response_ii", REAL, "1", "displacement of m0 at the drive frequency over the drive amplitude"
     ),
     "relative_i": Column(
-        "relative_i", REAL, "1", "largest displacement of m1 against m2 over the drive amplitude"
+        "relative_i", REAL, "1", "largest displacement of m1 relative to m2 over the drive amplitude"
     ),
     "relative_ii": Column(
-        "relative_ii", REAL, "1", "displacement of m1 against m2 at the drive frequency over its amplitude"
+        "relative_ii", REAL, "1", "displacement of m1 relative to m2 at the drive frequency, over the drive"
     ),
     "impacts": Column("impacts", WHOLE, "1", "impacts within the window"),
     "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts a second within the window"),
@@ -125,10 +125,10 @@ NUMBERS = {
     "duration_s": Column(DURATION, REAL, "s", "duration of the run"),
     "window_s": Column("window", REAL, "s", "duration of the window at the end of the run"),
     "settled_s": Column("settled", REAL, "s", "time at which the motion was found to have settled"),
-    "response_i_error": Column("response_i_error", REAL, "1", "relative error of Response I, estimated"),
-    "response_ii_error": Column("response_ii_error", REAL, "1", "relative error of Response II, estimated"),
-    "relative_i_error": Column("relative_i_error", REAL, "1", "relative error of relative_i, estimated"),
-    "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
+    "response_i_error": Column("response_i_error", REAL, "1", "estimated relative error of Response I"),
+    "response_ii_error": Column("response_ii_error", REAL, "1", "estimated relative error of Response II"),
+    "relative_i_error": Column("relative_i_error", REAL, "1", "estimated relative error of relative_i"),
+    "relative_ii_error": Column("relative_ii_error", REAL, "1", "estimated relative error of relative_ii"),
     "error_estimate": Column("error_estimate", REAL, "1", "largest of the four responses' errors"),
     "integration_error": Column("integration_error", REAL, "1", "error that a stricter accuracy reduces"),
     "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
@@ -149,7 +149,7 @@ FOUND_NUMBERS = {
     "response_ii": _of_motion("found_response_ii", REAL, "Response II of this motion"),
     "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
     "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
-    "error_estimate": _of_motion("found_error", REAL, "relative error of this motion's responses, estimated"),
+    "error_estimate": _of_motion("found_error", REAL, "estimated relative error of this motion's responses"),
     "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }
 """Columns by the field of `FoundMotion` whose value they store."""
@@ -162,8 +162,8 @@ FOUND_SHARE = {
 ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "number of starts with sensitive dependence on the start"),
     "requested_motion": Column("found_asked", WHOLE, "1", "index of the motion from the requested start"),
-    "unseen_share": Column("unseen_share", REAL, "1", "largest share of a motion that was not found"),
-    "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
+    "unseen_share": Column("unseen_share", REAL, "1", "upper bound on the share of a motion not found"),
+    "scatter": Column("scatter_of_starts", REAL, "1", "relative standard deviation of Response I"),
     "followed_s": Column("followed_in_all", REAL, "s", "total simulated time of all starts"),
 }
 """Columns by the field of `Ensemble` whose value they store."""

@@ -271,7 +271,7 @@ def _mark(check: LimitCheck) -> str:
 
 
 def _short(what: str) -> str:
-    return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")
+    return what.removeprefix("the ").replace("(at ", "(").replace("_", " ")
 
 
 _SHOWN = {
