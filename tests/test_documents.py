@@ -222,7 +222,7 @@ def test_the_readme_has_at_most_120_lines():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
 
-def test_the_changelog_describes_the_version_in_three_minutes_and_with_a_date():
+def test_the_changelog_of_the_version_has_a_date_and_takes_three_minutes_to_read():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     section = re.search(
@@ -232,7 +232,7 @@ def test_the_changelog_describes_the_version_in_three_minutes_and_with_a_date():
     assert len(section[1].split()) <= 3 * 200
 
 
-def test_the_readme_links_tasks_verdicts_units_and_a_glossary_with_undecided():
+def test_the_readme_links_tasks_verdicts_units_and_a_glossary_that_defines_undecided():
     linked = LINK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
     assert {"docs/tasks.md", "docs/verdicts.md", "docs/sensor-units.md", "docs/glossary.md"} <= {*linked}
     assert "| undecided |" in (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
@@ -251,7 +251,7 @@ def test_the_package_states_system_and_status_and_no_bound_expires_within_a_year
 
 
 @pytest.mark.thorough
-def test_the_transmissibility_by_hand_equals_that_of_the_analysis(tmp_path, monkeypatch):
+def test_the_transmissibility_computed_by_hand_equals_that_of_the_analysis(tmp_path, monkeypatch):
     path = tmp_path / "noise_recordings" / "weak.h5"
     path.parent.mkdir()
     band = {"band_start_hz": 50, "band_stop_hz": 600, "repetition_hz": 1}

@@ -123,7 +123,7 @@ def test_the_wheel_contains_every_source_file_at_its_import_path(wheel):
 
 
 @pytest.mark.thorough
-def test_a_script_imports_vibench_even_beside_local_files_with_names_of_its_folders(python, users_folder):
+def test_a_script_imports_vibench_even_beside_local_files_named_like_its_folders(python, users_folder):
     script = users_folder / "script.py"
     script.write_text(f"{FACES}\nimport vibench.sim\nprint(vibench.sim.__file__)\n")
     imported = Path(run(python, script, cwd=users_folder).strip())

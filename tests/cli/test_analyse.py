@@ -154,7 +154,7 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
     assert said in sentence(changed_copy(good, tmp_path, change))
 
 
-def test_channels_that_are_dead_or_clipped_or_lost_are_named_in_a_sentence(noise, tmp_path):
+def test_dead_clipped_or_lost_channels_are_named_in_a_readable_message(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
     assert "all samples of m0_velocity have the same value" in sentence(dead)

@@ -122,7 +122,7 @@ def test_an_existing_file_is_refused_before_a_folder_is_analysed(run, h5_path):
 
 
 @pytest.mark.parametrize("kind", ["stepped_level", "dwell"])
-def test_branches_like_a_recording_at_one_frequency_are_refused_before_its_analysis(run, tmp_path, kind):
+def test_the_like_option_refuses_a_recording_at_one_frequency_before_its_analysis(run, tmp_path, kind):
     channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
     plan = json.dumps({"name": "n", "excitation": {"kind": kind, "amplitude_vpp": 1.0, "frequency_hz": 20.0}})
     header = RecordingHeader((channel,), 1000.0, 9, Origin.SIMULATED, plan_json=plan)

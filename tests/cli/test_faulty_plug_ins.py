@@ -144,7 +144,7 @@ DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "
         ("digitizer", "read", raise_error),
     ],
 )
-def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(bench_with, kind, member, does, outcome):
+def test_a_faulty_third_party_instrument_gives_a_readable_message(bench_with, kind, member, does, outcome):
     inside = AFG1022_MODEL if kind == "generator" else DaqmxDigitizer
     path = bench_with(kind, FaultyDriver(inside, member, does))
     code, said = outcome(path)
@@ -158,7 +158,7 @@ def test_a_faulty_third_party_instrument_is_reported_in_a_sentence(bench_with, k
 
 
 @pytest.mark.parametrize(("does", "words"), [(return_nan, "not numbers"), (drop_a_row, "of shape")])
-def test_invalid_samples_end_a_check_or_a_run_with_a_sentence(bench_with, does, words, tmp_path):
+def test_invalid_samples_end_a_check_or_a_run_with_a_readable_message(bench_with, does, words, tmp_path):
     path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", does))
     with open_bench(path) as bench:
         with pytest.raises(AcquisitionError, match=words):
@@ -233,9 +233,7 @@ def test_a_failure_during_output_ends_in_silence_with_a_recorded_reason(bench_wi
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
-def test_an_error_on_closing_after_a_complete_recording_calls_the_recording_complete(
-    bench_with, kind, inside, outcome
-):
+def test_an_error_while_closing_states_that_the_recording_is_complete(bench_with, kind, inside, outcome):
     path = bench_with(kind, FaultyDriver(inside, "close", run_then_raise))
     code, said = outcome(path)
     assert "recorded out/dwell.h5 (the plan was carried out)" in said

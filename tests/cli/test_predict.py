@@ -137,7 +137,7 @@ def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_he
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_non_numeric_budget_is_refused_in_a_sentence(refusal):
+def test_a_non_numeric_budget_is_refused_with_a_readable_message(refusal):
     for given, said in (("soon", "--budget was given as 'soon'"), ("-1", "--budget was given as -1")):
         assert said in refusal("predict", *FORGETFUL, f"--budget={given}")
 

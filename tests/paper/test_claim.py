@@ -62,7 +62,7 @@ def test_a_claim_that_holds_under_no_option_fails_and_keeps_all_findings():
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
 
 
-def test_a_claim_that_holds_for_some_initial_states_states_their_share():
+def test_a_claim_that_holds_for_some_initial_states_gives_their_share():
     last_hz = (310.0, 288.0, 291.0, 330.0)
     sweep = make(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
     found = judgement(sweep, Evidence(no_studies), CASE)

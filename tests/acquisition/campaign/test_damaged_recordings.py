@@ -302,7 +302,7 @@ def test_a_recording_moved_back_after_its_point_was_repeated_is_reported_as_bad(
         change_journal("ALTER TABLE points RENAME COLUMN file TO fine"),
     ],
 )
-def test_an_inconsistent_journal_is_refused_in_a_sentence(bench, folder, damage):
+def test_an_inconsistent_journal_is_refused_with_a_readable_message(bench, folder, damage):
     damage(folder)
     older = sorted((folder / "older").iterdir())
     with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite has invalid contents"):

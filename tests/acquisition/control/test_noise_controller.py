@@ -106,7 +106,7 @@ def test_an_unreachable_spectrum_ends_with_a_ramp_down(record_noise):
         record_noise(noise(amplitude_vpp=0.1))
 
 
-def test_a_density_above_its_abort_limit_ramps_down_the_run(record_noise):
+def test_a_run_with_a_density_above_its_abort_limit_is_ramped_down(record_noise):
     # The first realisation already exceeds the limit of m0 by far, so that no equalisation can help.
     limits = corners((40, 1e-10))
     with pytest.raises(LimitExceeded, match=r"velocity of m0 reached .* dB above 1e-10; abort_db = 6"):

@@ -120,7 +120,7 @@ def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, perio
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
-def test_a_motion_with_one_order_that_does_not_repeat_is_aperiodic(kept):
+def test_a_motion_with_a_non_repeating_order_is_aperiodic(kept):
     """The order keeps its statistics but does not repeat, with and without a constant part."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))

@@ -153,7 +153,7 @@ def test_an_output_in_use_is_reported_as_busy_to_a_second_program(digitizer, out
         open_output(digitizer)
 
 
-def test_a_rate_that_the_output_would_change_is_refused_and_frees_the_output(digitizer):
+def test_the_output_is_freed_if_it_would_change_the_requested_rate(digitizer):
     # The USB-6211 divides 20 MHz by an integer, which cannot give 12 345.6 Hz.
     with pytest.raises(SettingRefused, match=r"daq\.output\.sample_rate_hz"):
         DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_345.6}), digitizer)

@@ -183,7 +183,7 @@ class TestStoppedChecks:
 
 
 class TestRefusals:
-    def test_requests_not_allowed_in_a_state_are_refused_with_a_sentence(self, client, tmp_path):
+    def test_requests_not_allowed_in_a_state_are_refused_with_a_readable_message(self, client, tmp_path):
         with pytest.raises(EngineError, match=r"is closed and cannot start now; it must be armed first"):
             client.start()
         with pytest.raises(EngineError, match="cannot mark now"):

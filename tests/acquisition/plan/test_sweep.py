@@ -104,7 +104,7 @@ class TestChains:
         assert [point.chain for point in plan.points()] == ["line-0p5vpp-up"] * 3 + ["line-0p5vpp-down"] * 3
         assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
 
-    def test_a_limited_lead_in_keeps_the_nearest_points(self):
+    def test_a_limited_lead_in_keeps_the_last_points(self):
         def pick(points, **bound):
             return campaign(
                 amplitude_vpp=[0.5],

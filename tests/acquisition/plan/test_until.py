@@ -35,7 +35,7 @@ def plan(kind, until):
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 @pytest.mark.parametrize("name", sorted(NOISE | SINE))
-def test_until_accepts_only_results_of_its_kind_of_excitation(kind, name):
+def test_the_key_until_accepts_only_results_of_the_excitation(kind, name):
     if name in ALLOWED.get(kind, set()):
         assert plan(kind, {name: "1 %"}).until.required_bounds == {name: 0.01}
         return
@@ -56,12 +56,12 @@ def test_an_invalid_until_bound_is_refused(said):
         plan("dwell", {"response_i": said})
 
 
-def test_until_without_a_bound_is_refused():
+def test_the_key_until_without_a_bound_is_refused():
     with pytest.raises(ValidationError, match="until contains no result"):
         plan("dwell", {"shortest_s": 3.0})
 
 
-def test_a_plan_without_until_is_accepted():
+def test_a_plan_without_the_key_until_is_accepted():
     assert plan("dwell", None).until is None
     assert (
         Measurement.model_validate({"name": "a", "excitation": {"kind": "dwell", **KINDS["dwell"]}}).until
@@ -70,7 +70,7 @@ def test_a_plan_without_until_is_accepted():
 
 
 @pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
-def test_an_until_time_longer_than_the_planned_recording_is_refused(kind, most_s):
+def test_a_shortest_time_longer_than_the_planned_recording_is_refused(kind, most_s):
     """Steps shorter than the default of 2 s are analysed at their end if the plan gives no shortest_s."""
     name = sorted(ALLOWED[kind])[0]
     assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s

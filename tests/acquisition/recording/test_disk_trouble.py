@@ -77,7 +77,7 @@ def test_a_part_file_of_a_full_disk_can_be_recovered_later(tmp_path, make_header
         assert recording.samples == 500
 
 
-def test_a_commit_succeeds_after_the_disk_has_refused_two(trouble):
+def test_a_commit_succeeds_after_the_disk_has_refused_two_commits(trouble):
     trouble.fill(2)
     for _ in range(2):
         with pytest.raises(OSError, match="No space") as refusal:

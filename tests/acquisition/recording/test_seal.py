@@ -395,7 +395,7 @@ def test_a_result_that_expands_beyond_the_size_limit_is_not_read(with_result, mo
 
 
 @pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])
-def test_an_invalid_group_of_results_is_refused_in_a_sentence(make_file, what):
+def test_an_invalid_group_of_results_is_refused_with_a_readable_message(make_file, what):
     path = make_file()
     with h5py.File(path, "r+") as file:
         del file["results"]

@@ -46,7 +46,7 @@ def terminal(virtual, duration_s):
     return virtual.generator.render(start_s, 1e-4, round(duration_s / 1e-4))
 
 
-def test_a_stalled_run_is_silent_after_its_dead_man_burst(guarded, tmp_path):
+def test_a_stalled_run_is_silent_after_the_last_burst(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)
@@ -57,7 +57,7 @@ def test_a_stalled_run_is_silent_after_its_dead_man_burst(guarded, tmp_path):
     assert run.outcome.state is RunState.STOPPED
 
 
-def test_the_low_level_check_is_silent_after_its_dead_man_burst(guarded, tmp_path):
+def test_the_low_level_check_is_silent_after_its_burst(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         next(progress for progress in run if progress.state is RunState.CHECKING and progress.amplitude_vpp)
@@ -68,7 +68,7 @@ def test_the_low_level_check_is_silent_after_its_dead_man_burst(guarded, tmp_pat
 
 
 @pytest.mark.parametrize("dead_man_s", [0.2, 0.5, 5.0])
-def test_the_low_level_check_gives_the_same_value_with_a_dead_man(laboratory, tmp_path, dead_man_s):
+def test_the_low_level_check_gives_the_same_value_with_a_dead_man_switch(laboratory, tmp_path, dead_man_s):
     _, connected = laboratory()
     found = []
     for each_s in (None, dead_man_s):
@@ -96,7 +96,7 @@ def test_the_bench_check_plays_one_burst_that_ends_by_itself(guarded, monkeypatc
     assert report.verdict is Verdict.OK
 
 
-def test_dead_man_bursts_are_whole_periods_with_short_gaps(guarded, tmp_path):
+def test_bursts_are_whole_periods_with_short_gaps(guarded, tmp_path):
     _, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         deque(run, maxlen=0)
@@ -113,7 +113,7 @@ def test_dead_man_bursts_are_whole_periods_with_short_gaps(guarded, tmp_path):
     assert max(b - a for a, b in gaps) < GUARD_S + 1e-3
 
 
-def test_the_generator_can_play_again_after_a_dead_man_run(guarded, tmp_path):
+def test_the_generator_can_play_again_after_a_run_with_bursts(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)
@@ -137,7 +137,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_plans_that_a_dead_man_cannot_play_are_refused_before_the_campaign(kind, guarded, tmp_path):
+def test_plans_that_bursts_cannot_play_are_refused_before_the_campaign(kind, guarded, tmp_path):
     virtual, bench = guarded
     before_s = virtual.world.time_s
     refused = {"name": "second", "excitation": {"amplitude_vpp": 1.0, **REFUSED[kind]}}
@@ -148,7 +148,7 @@ def test_plans_that_a_dead_man_cannot_play_are_refused_before_the_campaign(kind,
     assert virtual.world.time_s == before_s
 
 
-def test_a_dead_man_with_an_analogue_output_is_refused(tmp_path):
+def test_a_dead_man_switch_with_an_analogue_output_is_refused(tmp_path):
     rig = load_rig("virtual_rig_streaming")
     generator = rig.generator.model_copy(update={"dead_man_s": DEAD_MAN_S})
     output = rig.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
@@ -160,7 +160,7 @@ def test_a_dead_man_with_an_analogue_output_is_refused(tmp_path):
         deque(Run(bench, PLAN, tmp_path / "run.h5"), maxlen=0)
 
 
-def test_a_dead_man_needs_a_channel_with_bursts(rig):
+def test_a_dead_man_switch_needs_a_channel_with_bursts(rig):
     content = rig.generator.model_dump() | {"dead_man_s": 1.0, "channel": 2}
     with pytest.raises(ValueError, match="only channel 1 has"):
         type(rig.generator).model_validate(content)

@@ -153,7 +153,7 @@ def test_a_stop_is_confirmed_only_after_the_output_is_off(announced):
         assert fate_of(stop) is Fate.SILENT
 
 
-def test_a_stop_without_output_read_back_is_not_confirmed(announced, monkeypatch):
+def test_a_stop_is_not_confirmed_if_the_output_was_not_read_back(announced, monkeypatch):
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
     guard = DriveGuard(Output(*[InstrumentLost("gone")] * 1000), StopSwitch())
     with guard:

@@ -152,7 +152,7 @@ def test_a_changed_specimen_ends_a_run_only_if_the_plan_says_so(rig, ending):
             assert "vibench twin --new-baseline" in text
 
 
-def test_a_flagged_over_range_does_not_count_as_an_exceeded_amplitude_limit(rig):
+def test_a_flagged_overload_does_not_count_as_an_exceeded_amplitude_limit(rig):
     monitor = monitor_of(rig)
     for first in range(0, 20 * BLOCK, BLOCK):
         volts = np.zeros((4, BLOCK))

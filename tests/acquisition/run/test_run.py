@@ -271,7 +271,7 @@ class TestEndsOfARun:
         assert run.outcome.state is RunState.FINISHED
 
     @every_state
-    def test_a_run_over_a_limit_ramps_down_and_the_limit_is_named(self, bench, tmp_path, state):
+    def test_a_run_over_a_limit_is_ramped_down_and_the_limit_is_named(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
         with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):

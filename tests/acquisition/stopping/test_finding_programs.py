@@ -252,7 +252,7 @@ except AcquisitionError as error:
 """
 
 
-def test_a_full_state_folder_refuses_the_program_without_leftovers(own_state):
+def test_a_program_is_refused_without_leftovers_if_the_state_folder_is_full(own_state):
     script = [sys.executable, "-c", ON_A_FULL_DISK]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
     assert "a script cannot be entered in the state folder" in ended.stdout, ended.stderr

@@ -70,14 +70,14 @@ def test_the_zero_one_test_is_invariant_to_shift_and_scale():
     [(logistic(4.0, 3000), 1, np.log(2)), (henon(5000), 2, 0.41922)],
     ids=["logistic", "henon"],
 )
-def test_neighbours_of_a_map_diverge_at_the_rate_of_the_lyapunov_exponent(series, delays, exponent):
+def test_neighbouring_points_of_a_map_diverge_at_the_rate_of_the_exponent(series, delays, exponent):
     found = divergence(delay_vectors(series, delays), steps=25)
     assert found.is_resolved
     assert found.exponent == pytest.approx(exponent, rel=0.03)
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
 
 
-def test_neighbours_of_a_flow_diverge_at_the_rate_of_the_lyapunov_exponent(lorenz):
+def test_neighbouring_points_of_a_flow_diverge_at_the_rate_of_the_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
     # The exponent over 400 s differs from the limit value by some per cent.

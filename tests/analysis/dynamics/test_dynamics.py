@@ -96,7 +96,7 @@ def paper_diagram():
         ({"gap_m": -1.0}, "greater than 0"),
     ],
 )
-def test_invalid_branch_requests_are_refused_in_a_sentence(options, said):
+def test_invalid_branch_requests_are_refused_with_a_readable_message(options, said):
     with pytest.raises(ValidationError, match=said):
         BranchRequest(**options)
 
@@ -177,7 +177,7 @@ def test_a_recorded_level_is_the_median_per_bin_in_ascending_frequency():
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_a_figure_dashes_unstable_parts_and_marks_events(along):
+def test_a_figure_draws_unstable_parts_dashed_and_marks_events(along):
     request = BranchRequest(along=along, start=1e-6 if along is Parameter.AMPLITUDE else 100.0, stop=120.0)
     drawn = branches_figure(BranchDiagram(request, (FOLDED,), 1.0))
     first, second = drawn.figure.axes

@@ -119,7 +119,7 @@ def test_a_sampling_rate_that_wav_cannot_state_is_refused(known, tmp_path):
 
 
 @pytest.mark.parametrize(("to", "hours", "said"), [(Format.MAT, 1, "2 GiB"), (Format.WAV, 6, "4 GiB")])
-def test_data_that_exceeds_a_format_is_refused_before_writing(known, tmp_path, to, hours, said):
+def test_data_too_large_for_a_format_are_refused_before_writing(known, tmp_path, to, hours, said):
     samples = round(hours * 3600 * RATE_HZ)
     with pytest.raises(InvalidRequest, match=said):
         export_samples(excerpt(replace(known, samples=samples)), to, tmp_path / "a")

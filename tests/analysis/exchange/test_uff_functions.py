@@ -154,7 +154,7 @@ def test_a_recording_without_drive_has_no_densities(tmp_path):
                 next(spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest()))
 
 
-def test_spectra_in_a_format_without_spectra_are_refused_with_a_suitable_format(known, tmp_path):
+def test_a_format_without_spectra_is_refused_and_a_suitable_one_named(known, tmp_path):
     with pytest.raises(InvalidRequest, match=r"spectra were requested as csv.*choose uff"):
         export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())

@@ -181,7 +181,7 @@ def test_a_stepped_sine_figure_has_one_marker_per_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_the_check_of_parts_names_feedback_as_the_reason_for_more_parts_than_planned(dwell_file):
+def test_more_parts_than_planned_are_attributed_to_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]

@@ -63,7 +63,7 @@ def test_a_table_10_percent_heavier_than_described_is_named_as_suspect(update):
     assert heavier.values == update.values
 
 
-def test_a_table_that_fits_no_shaker_is_not_blamed_on_collisions_alone(weak_noise):
+def test_a_failed_fit_of_the_shaker_is_not_blamed_on_collisions_alone(weak_noise):
     specimen = gong2025()
     heavier = replace(specimen, masses=tuple(3.0 * each for each in specimen.masses))
     with (

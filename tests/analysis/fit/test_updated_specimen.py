@@ -130,7 +130,7 @@ def test_base_motion_from_collisions_does_not_bias_the_gap(campaign):
 
 
 @pytest.mark.parametrize("amplitude_m", [6.5e-5, 8e-5])
-def test_a_sweep_that_collides_smoothly_before_its_regions_gives_no_gap(tmp_path, amplitude_m):
+def test_a_sweep_with_smooth_collisions_before_its_regions_gives_no_gap(tmp_path, amplitude_m):
     """The gap was given as 150 and 63 um instead of 45."""
     sweep = {"start_hz": 60.0, "stop_hz": 92.0, "duration_s": 20.0}
     motion = synthetic.chirp(sweep["duration_s"], sweep["start_hz"], sweep["stop_hz"], amplitude_m)

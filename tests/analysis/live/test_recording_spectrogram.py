@@ -70,7 +70,7 @@ def test_the_density_of_white_noise_does_not_depend_on_window_length(request_):
         assert found.time_s == pytest.approx((3.0, 3.0 + stretch_s), abs=0.05)
 
 
-def test_a_range_shorter_than_a_window_is_refused_in_a_sentence(request_):
+def test_a_range_shorter_than_a_window_is_refused_with_a_readable_message(request_):
     with pytest.raises(NotEnoughData, match="10 samples"):
         recording_spectrogram(replace(request_, stop=10))
 

@@ -22,7 +22,7 @@ def test_collision_bands_extend_half_way_to_the_next_point():
     assert bands_of(frequency_hz, inside) == ((10.0, 15.0), (25.0, 45.0))
 
 
-def test_no_colliding_points_give_no_collision_band():
+def test_without_colliding_points_there_is_no_collision_band():
     assert bands_of(np.array([10.0, 20.0]), np.array([False, False])) == ()
 
 

@@ -95,7 +95,7 @@ def test_a_prediction_below_the_gap_equals_the_linear_response():
     np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 
 
-def test_only_the_three_drive_levels_of_the_paper_map_to_an_amplitude_of_the_paper():
+def test_only_the_three_levels_in_the_paper_have_an_amplitude_from_the_paper():
     assert [paper_amplitude_m(each) for each in (0.05, 1.5, 10.0)] == [1e-6, 5e-6, 50e-6]
     assert paper_amplitude_m(2.0) is None
 

@@ -76,7 +76,7 @@ def test_a_coarsely_quantised_channel_with_impacts_has_no_drop_outs(quantum, noi
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [6, 8])
-def test_a_sweep_with_zero_drop_outs_gives_no_wrong_result(number, tmp_path):
+def test_a_sweep_with_drop_outs_to_zero_gives_no_wrong_result(number, tmp_path):
     """Sweep 6 once gave 3.452 +- 0.031; 3.538 is true."""
     chance = random.Random(f"4303:{number}")
     assert dark_recording(generator(chance), tmp_path).faults == ()

@@ -165,7 +165,7 @@ def model_of(rig):
 
 
 @pytest.mark.thorough
-def test_a_branch_starts_from_rest_with_a_sinusoidal_base_of_the_set_level(rig, tmp_path):
+def test_a_branch_starts_from_rest_with_sinusoidal_base_motion_of_the_set_level(rig, tmp_path):
     hard = hardening(rig)
     points, notes = follow_branch(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
     branch, _ = model_of(hard)

@@ -153,7 +153,7 @@ def test_an_unstable_law_is_ended_by_the_controller():
     assert "at its limit of 2 V" in wired.report().reason
 
 
-def test_invalid_requests_are_refused_in_a_sentence(wired):
+def test_invalid_requests_are_refused_with_a_readable_message(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=100, reference_v=((1.0, 0.0),)))
     for line in (b"{}", b"nonsense", b'{"ask": "play"}', b'{"ask": "play", "program": {"frequency_hz": -1}}'):
         told = json.loads(wired.controller.execute(line).data)

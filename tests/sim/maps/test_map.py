@@ -62,7 +62,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
     ],
 )
-def test_invalid_maps_are_refused_in_a_sentence(said, complaint):
+def test_invalid_maps_are_refused_with_a_readable_message(said, complaint):
     with pytest.raises(ValueError, match=complaint):
         Map.model_validate(said)
 

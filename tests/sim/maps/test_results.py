@@ -74,7 +74,7 @@ def test_shares_over_common_initial_states_have_the_uncertainty_of_these_states(
             assert each.share.high >= of_starts.high - 1e-12
 
 
-def test_a_basin_map_distinguishes_attractors_the_motion_returns_to_after_a_small_kick():
+def test_a_basin_map_shows_that_attractors_return_after_a_small_kick():
     plan = Map(
         frequency_hz=160.0,
         amplitude_m=4e-6,

@@ -114,7 +114,7 @@ def test_no_impact_of_a_finely_sampled_motion_is_missed(frequency_hz, amplitude_
     assert run.impacts.count >= len(onsets)
 
 
-def test_too_many_impacts_end_the_run_with_a_statement_of_what_to_change():
+def test_too_many_impacts_end_the_run_with_advice_on_what_to_change():
     run = integrate(paper(), PERIODIC, 30.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.end_time_s < 30.0

@@ -11,7 +11,7 @@ from vibench.sim.operating_system.this import Place, is_process, place_of, proce
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 
 
-def test_the_start_of_a_process_distinguishes_containers_and_computers():
+def test_the_start_time_of_a_process_distinguishes_containers_and_computers():
     own = process_start(os.getpid())
     boot, container, ticks = own.split("_")
     assert place_of(own) is Place.HERE

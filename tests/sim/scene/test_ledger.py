@@ -85,7 +85,7 @@ def test_invalid_computing_times_are_not_learnt(ledger):
     assert ledger.expected_time(KIND, 1.0).runs == 0
 
 
-def test_costs_of_kinds_of_run_not_yet_used_adapt_to_a_slower_machine(ledger):
+def test_costs_of_unused_kinds_of_run_adapt_to_a_slower_machine(ledger):
     random = np.random.default_rng(8)
     kinds = [f"method {number}/law" for number in range(6)]
     for run in range(60):

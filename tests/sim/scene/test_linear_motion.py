@@ -62,6 +62,6 @@ def test_contact_is_excluded_only_if_a_bound_proves_it():
     assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))
 
 
-def test_overflowing_parameters_are_refused_in_a_sentence():
+def test_overflowing_parameters_are_refused_with_a_readable_message():
     with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
         linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

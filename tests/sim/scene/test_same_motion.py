@@ -93,7 +93,7 @@ def test_intermittent_chaos_is_not_classified_as_a_torus():
         ((MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED), (True, False, False)),
     ],
 )
-def test_of_several_chaotic_motions_one_that_may_turn_into_another_is_not_called_final(kinds, final):
+def test_a_chaotic_motion_that_may_turn_into_another_is_not_called_final(kinds, final):
     """Of 400 runs, 2 % were in the motion after 300 s that nine of sixteen runs had after 60 s."""
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final

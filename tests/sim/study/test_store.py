@@ -200,7 +200,7 @@ def test_a_study_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     FileStore(path, small).close()
 
 
-def test_a_study_starts_even_while_its_file_is_read_for_a_moment(small, tmp_path):
+def test_a_study_starts_even_while_its_file_is_briefly_read(small, tmp_path):
     """A reader holds the HDF5 lock for a moment; a study that starts then must wait for its file."""
     path = tmp_path / "a.h5"
     make_file(path, small)

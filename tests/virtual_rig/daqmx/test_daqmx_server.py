@@ -64,7 +64,7 @@ def test_closing_ends_every_thread_of_the_server(connect):
     assert not [name for name in after - before if name.startswith(("daqmx", "rig clock"))]
 
 
-def test_an_address_in_use_is_refused_in_a_sentence(daq):
+def test_an_address_in_use_is_refused_with_a_readable_message(daq):
     with pytest.raises(ConfigurationError, match=f"{daq.server.address}.*port 0"):
         DaqServer(daq.world, address=daq.server.address)
 

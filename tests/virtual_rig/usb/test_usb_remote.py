@@ -84,7 +84,7 @@ def test_an_address_where_no_rig_answers_is_named_in_the_error():
 
 
 @pytest.mark.parametrize("method", ["BulkIn", "Control"])
-def test_a_frame_that_is_too_short_is_refused_in_a_sentence(rig, method):
+def test_a_frame_that_is_too_short_is_refused_with_a_readable_message(rig, method):
     with grpc.insecure_channel(rig.address) as channel:
         call = channel.unary_unary(f"/vibench.virtual.UsbDevice/{method}")
         with pytest.raises(grpc.RpcError) as refused:

@@ -395,7 +395,7 @@ def test_the_summary_of_a_recording_shows_its_state_once(begin_recording, tmp_pa
         assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_the_size_of_its_data_and_not_of_its_space(begin_recording, tmp_path, wait_for):
+def test_a_growing_file_shows_the_size_of_its_data_without_free_space(begin_recording, tmp_path, wait_for):
     """A long run was shown as 512 MB one second after its start."""
     writer, part = begin_recording(tmp_path, "grows")
     wait_for(lambda: writer.committed_samples == 6400)

@@ -100,7 +100,7 @@ def test_cost_and_error_are_shown_beside_the_accuracy(page):
     assert quick != strict
 
 
-def test_exponents_and_similarity_and_impacts_and_motion_are_drawn_as_computed(page):
+def test_exponents_similarity_impacts_and_motion_are_drawn_while_computed(page):
     simulate(page, step_hz=100.0)
     page.simulator.cancel()
     page._grow(
