@@ -97,6 +97,9 @@ UNITS = (
     "Time,u,a,v\ns,mV,g,mm/s\nDC,AC,AC,AC",
     "Name,u,a,v\nUnit,mV,g,mm/s",
     "Time,u,a,v\nhh:mm:ss.ms,mV,g,mm/s",
+    "# units: s, mV, g, mm/s\nt,u,a,v",
+    "units = s mV g mm/s\nt,u,a,v",
+    "# Unit u: mV\n# Unit a: g\n# v unit = mm/s\nt,u,a,v",
 )
 
 
@@ -105,6 +108,34 @@ def test_units_in_channel_names_or_heading_rows_set_the_scales(tmp_path, head):
     volts, base, velocity = signal(TIMES)
     columns = (TIMES, 1e3 * volts, base / G, 1e3 * velocity)
     is_right(read_import(text(tmp_path / "a.csv", head, columns), "234"))
+
+
+@pytest.mark.parametrize("head", ["u {mV};a {g};v {mm/s}", "u <mV>;a-g;v mm/s", "u: mV;a: g;v-mm/s"])
+def test_units_after_other_separators_in_names_set_the_scales(tmp_path, head):
+    volts, base, velocity = signal(TIMES)
+    path = text(tmp_path / "a.csv", f"t;{head}", (TIMES, 1e3 * volts, base / G, 1e3 * velocity), ";")
+    is_right(read_import(path, "234"))
+
+
+@pytest.mark.parametrize(
+    ("head", "said"),
+    [
+        ("t,u,a [g],v\ns,V,m/s2,m/s", "is in 'g or m/s2'"),
+        ("t,u,a,v\ns,V,m/s2,m/s\ns,V,g,mm/s", "is in 'm/s2 or g'"),
+        ("t,u,sensor g,v", r"is in 'g\?'"),
+        ("Scale,1,9.80665,0.001\nt,u,a,v", "states Scale = 9.80665 for 3, but not whether"),
+        ("# gain of v: 1\n# v gain: 0.001\nt,u,a,v", "states gain = 0.001 for 4, but not whether"),
+    ],
+)
+def test_contradictory_units_and_scales_in_a_heading_are_refused(tmp_path, head, said):
+    with pytest.raises(InvalidRequest, match=said):
+        read_import(text(tmp_path / "a.csv", head, (TIMES, *signal(TIMES))), "234")
+
+
+@pytest.mark.parametrize("line", ["XINCR 2.0E-4", "Acquisition frequency [Hz]: 5000", "recorded at 5000 Hz"])
+def test_a_rate_in_a_heading_line_of_another_form_is_compared(tmp_path, line):
+    with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping 5120"):
+        read_import(text(tmp_path / "a.csv", f"{line}\nu\ta\tv", signal(TIMES), "\t"))
 
 
 @pytest.mark.parametrize(("head", "between"), [("t u a v\n  mV g mm/s", " "), ("t,u,a,v\nmV,g,mm/s", ",")])
@@ -154,6 +185,43 @@ def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
     savemat(tmp_path / "b.mat", {**content, "Ts": 1 / 4096})
     with pytest.raises(InvalidRequest, match="states 4096 samples/s"):
         read_import(tmp_path / "b.mat", names)
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".h5"])
+@pytest.mark.parametrize(
+    ("facts", "said"),
+    [
+        ({"unit_a": "g"}, ""),
+        ({"info": {"a": {"unit": "g"}}}, ""),
+        ({"a_scale": 0.1}, "states scale = 0.1 for /?a, but not whether"),
+        ({"gain a": 0.1}, "states gain = 0.1 for /?a, but not whether"),
+        ({"v_t0": 0.0025}, "states the start of some channels, but not of"),
+        ({"t": TIMES, "t_v": TIMES + 0.0025}, "has different times in"),
+        ({"delays": np.array([0.0, 0.0, 0.0025])}, "several different values of delays"),
+    ],
+)
+def test_facts_named_after_a_channel_apply_to_that_channel(tmp_path, suffix, facts, said):
+    columns = dict(zip("uav", signal(TIMES), strict=True))
+    is_unit = not said
+    columns["a"] = columns["a"] / G if is_unit else columns["a"]
+    path, slash = tmp_path / f"a{suffix}", "/" * (suffix == ".h5")
+    if suffix == ".mat":
+        savemat(path, {**columns, **{name.replace(" ", "_"): fact for name, fact in facts.items()}})
+    else:
+        with h5py.File(path, "w") as file:
+            for name, values in {**columns, **facts}.items():
+                if isinstance(values, dict):
+                    file.create_group(f"{name}/a").attrs.update(values["a"])
+                elif np.size(values) > 3:
+                    file[name] = values
+                else:
+                    file.attrs[name] = values
+    names = tuple(f"{slash}{each}" for each in "uav")
+    if is_unit:
+        is_right(read_import(path, names))
+    else:
+        with pytest.raises(InvalidRequest, match=said):
+            read_import(path, names)
 
 
 def hdf5(path, columns, **facts):

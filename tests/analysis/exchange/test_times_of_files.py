@@ -406,7 +406,7 @@ def test_jittered_times_are_refused_unless_the_mapping_ignores_them(tmp_path, su
     else:
         with nptdms.TdmsWriter(path) as writer:
             writer.write_segment([nptdms.ChannelObject("g", *each) for each in columns.items()])
-    with pytest.raises(InvalidRequest, match=r"times that jitter by .*, more than their digits explain"):
+    with pytest.raises(InvalidRequest, match=r"jitter by|off an evenly spaced axis"):
         import_recording(path, mapping(suffix[1:], RATE_HZ), tmp_path / "made.h5")
     even = mapping(suffix[1:], RATE_HZ).model_copy(update={"time": "even"})
     with open_recording(import_recording(path, even, tmp_path / "made.h5")) as recording:

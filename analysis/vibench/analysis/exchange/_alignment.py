@@ -18,14 +18,14 @@ from vibench.acquisition import shorten
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 from ._mapping import ImportMapping
-from ._source_channel import MOST_CHANNELS, SECONDS, SourceChannel, rate_bounds, text_of
+from ._source_channel import MOST_CHANNELS, SECONDS, SourceChannel, own_facts, rate_bounds, text_of
 
 _HERTZ = {"hz": 1.0, "s/s": 1.0, "khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6}
 UNITS = {*_HERTZ, *SECONDS, "\u00b5s"} - {""}
 _WORDS = "|".join(re.escape(each) for each in sorted(UNITS, key=len, reverse=True))
 _UNIT = rf"(?:[ _/,]*(?:in )?[\[(]?(?P<unit>{_WORDS})[\])]?)?"
 _RATE = re.compile(
-    rf"(?:(?:(?:samp\w*?|scan|acq\w*|daq|(?:nominal[ _]?)?s)[ _]?)?rate|sampl\w*?[ _]?freq\w*"
+    rf"(?:(?:(?:samp\w*?|scan|acq\w*|daq|(?:nominal[ _]?)?s)[ _]?)?rate|(?:sampl|acq)\w*?[ _]?freq\w*"
     rf"|samples[ _]?per[ _]?sec\w*|f_?s(?:amp\w*)?|freq\w*[ _]?sampl\w*|sr|sps|sfreq"
     rf"|abtast(?:rate|frequenz)){_UNIT}",
     re.IGNORECASE,
@@ -33,7 +33,7 @@ _RATE = re.compile(
 _INTERVAL = re.compile(
     r"(?:(?:samp\w*?|scan)[ _]?(?:interval|period|time)|(?:t(?:ime)?[ _]?)?interval|t_?s(?:amp\w*)?"
     r"|(?:d|delta)[ _]?[tx]|[tx][ _]?(?:d|delta|step)|time[ _]?(?:step|delta)"
-    r"|(?:(?:time|wf|x|abscissa)[ _]?)?(?:inc(?:rement)?|spacing))"
+    r"|(?:(?:time|wf|x|abscissa)[ _]?)?(?:incr?(?:ement)?|spacing))"
     rf"{_UNIT}",
     re.IGNORECASE,
 )
@@ -42,6 +42,7 @@ _START = re.compile(
     rf"|(?:time|t|x|abscissa)[ _]?(?:offset|zero|origin|first|min)|first[ _]?(?:time|t|x)){_UNIT}",
     re.IGNORECASE,
 )
+_DELAY = re.compile(r".*(?:delay|latenc|skew|shift).*", re.IGNORECASE)
 _SHIFT = re.compile(
     r".*(?:delay|latency|skew|shift|clock|trigger|first[ _]?sample|sample[ _]?offset).*"
     r"|(?:.*[ _])?(?:lag|begin)(?:[ _].*)?",
@@ -108,7 +109,7 @@ def stated_times(
     other = next((each for each in rates_hz if not agrees(each, (rates_hz[0], rates_hz[0]))), None)
     trouble = "" if other is None else f"states both {rates_hz[0]:.9g} and {other:.9g} samples/s"
     for name, value in facts:
-        is_of_times = any(form.fullmatch(name.strip()) for form in (_RATE, _INTERVAL, _START))
+        is_of_times = any(form.fullmatch(name.strip()) for form in (_RATE, _INTERVAL, _START, _DELAY))
         if is_of_times and _are_several(value) and len({*np.ravel(value)}) > 1:
             trouble = f"states several different values of {name}"
     if axis.casefold() not in SECONDS:
@@ -214,6 +215,11 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     # Values under another name may have any unit, so the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
     return replace(axis, unit=unit if unit in SECONDS else "", uncertainty=uncertainty)
+
+
+def is_time_of(name: str, label: str) -> bool:
+    """Return whether a name means the time of the channel with a label, such as ``t_v`` or ``v time``."""
+    return any(_TIME.fullmatch(rest) for rest, _ in own_facts([(name, None)], label))
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
@@ -413,15 +419,15 @@ class _Scan:
             _COARSE_SPREAD * self._rounding if self.is_coarse else 2 * _PLACED * interval + self._rounding
         )
         trouble = self._trouble or _time_fault(self._runs, self._samples, span)
-        if not trouble and self._jitter > _JITTER * interval:
-            trouble = (
-                f"has times that jitter by {self._jitter / interval:.2g} sample intervals, more than their "
-                "digits explain"
-            )
         if not trouble and spread > allowed:
             trouble = (
                 f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis: they "
                 "are uneven, or have too few digits to count lost samples"
+            )
+        if not trouble and self._jitter > _JITTER * interval:
+            trouble = (
+                f"has times that jitter by {self._jitter / interval:.2g} sample intervals, more than their "
+                "digits explain"
             )
         is_exact = spread < EVEN * interval
         if is_exact:

@@ -19,7 +19,7 @@ import numpy as np
 from ..signals.arrays import Reals
 from ._alignment import UNITS, stated_times
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
-from ._source_channel import Source, SourceChannel, read_from
+from ._source_channel import Source, SourceChannel, own_facts, read_from, scale_among, unit_among
 
 _NAMES = (
     "jan feb mar apr may jun jul aug sep oct nov dec jan feb m\u00e4r apr mai jun jul aug sep okt nov dez"
@@ -127,9 +127,11 @@ TITLE = re.compile(r"\W*(?:(?:y[ _])?units?(?:[ _]labels?)?|einheit(?:en)?|names
 """First cell of a heading row that names the content of the row, such as "Units"."""
 NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
 STATEMENT = re.compile(
-    r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
+    r"\W*([A-Za-z][^:=;,\t]*?)[\s\":=;,\t]+([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)[\s;,\t\"]*([\w/]*)"
 )
 """Name, number and unit in a line of the heading: ``"Sample rate: 51.2 kHz"``."""
+STATED_TEXT = re.compile(r"\W*([A-Za-z][^:=]*?)\s*[:=]\s*([^\s:=;,]+)\W*")
+"""Name and text without blanks in a line of the heading: ``"Unit v: mm/s"``."""
 SENTENCE = re.compile(
     r"(?:sampled|recorded|acquired) (?:at|with) ([\d.]+) ?(k?hz)|([\d.]+) ?(k?s)(?:a|amples?)?(?:/| per )s",
     re.I,
@@ -199,19 +201,21 @@ def open_csv(path: Path) -> Iterator[Source]:
             rows = (layout.cells(line) for line in islice(file, first, None))
             _require_decimals(int(place), [row[place].strip() for row in rows if len(row) > place])
     columns = zip(*_headings(head, layout), _facts(head, layout), table.T, strict=True)
+    stated = (STATED_TEXT.fullmatch(line.strip()) for line in head)
+    texts = [(found[1], found[2]) for found in stated if found]
     yield Source(
         {
-            _channel(str(number), len(table), label, unit, *facts): read_from(np.ascontiguousarray(column))
+            SourceChannel(
+                name=str(number),
+                samples=len(table),
+                label=label,
+                unit=unit or unit_among(own_facts(texts, label)) or unit_among(texts),
+                stated_scale=scale_among((*own_facts(facts, label), *facts)),
+                **stated_times((*own_facts(facts, label), *facts)),
+            ): read_from(np.ascontiguousarray(column))
             for number, (label, unit, facts, column) in enumerate(columns, start=1)
         }
     )
-
-
-Facts = Sequence[tuple[str, float]]
-
-
-def _channel(name: str, samples: int, label: str, unit: str, own: Facts, shared: Facts) -> SourceChannel:
-    return SourceChannel(name, samples, label, unit=unit, **stated_times((*own, *shared)))
 
 
 def _may_be_grouped(column: Reals) -> bool:
@@ -340,12 +344,13 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
                 "column a unit, or - for a column without a unit"
             )
     rows = [row for line in head if any(row := _row(line, layout))]
-    named = [row for row in rows if not _are_units(row)] or rows or [[""] * layout.columns]
-    labels, units = named[-1], next((row for row in reversed(rows) if _are_units(row)), [""] * layout.columns)
-    matches = [UNIT.search(each) for each in labels]
+    none = [""] * layout.columns
+    labels = ([row for row in rows if not _are_units(row)] or rows or [none])[-1]
+    own = [(found := UNIT.search(each)) and found[1] for each in labels]
+    units = [[each.strip("[]() -") for each in row] for row in rows if _are_units(row)]
     return (
         [UNIT.sub("", each).strip() for each in labels],
-        [other.strip("[]() ") if own is None else own[1] for own, other in zip(matches, units, strict=True)],
+        [" or ".join(dict.fromkeys(filter(None, each))) for each in zip(own, none, *units, strict=True)],
     )
 
 
@@ -357,7 +362,7 @@ def _are_units(row: Sequence[str]) -> bool:
 
 def _row(line: str, layout: _Layout) -> list[str]:
     """Return a heading line as one cell per column; empty if it cannot be split that way."""
-    line = line.strip("\r\n ").lstrip("#% ")
+    line = re.sub(rf"^{TITLE.pattern}[:=]\s*", "", line.strip("\r\n ").lstrip("#% "), flags=re.I)
     tries = [layout.cells(line), *(replace(layout, delimiter=each).cells(line) for each in DELIMITERS)]
     tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
     tries += [each[1:] for each in tries if len(each) == layout.columns + 1 and TITLE.fullmatch(each[0])]
@@ -366,8 +371,8 @@ def _row(line: str, layout: _Layout) -> list[str]:
     return [each.strip().strip('"') for each in found]
 
 
-def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]]:
-    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``) and the facts of all columns."""
+def _facts(head: Sequence[str], layout: _Layout) -> Iterator[Sequence[tuple[str, float]]]:
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), and then those of all columns."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:
@@ -379,13 +384,13 @@ def _facts(head: Sequence[str], layout: _Layout) -> Iterator[tuple[Facts, Facts]
                 facts.append((name.strip(), number))
         else:
             shared += _statements(line)
-    return ((each, shared) for each in own)
+    return ([*each, *shared] for each in own)
 
 
 def _statements(line: str) -> Iterator[tuple[str, float]]:
-    if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
+    if (found := SENTENCE.search(line)) and _are_numbers([number := found[1] or found[3]]):
+        yield f"rate {found[2] or f'{found[4]}/s'}", float(number)
+    elif (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
         # The cell after the number may be its unit, or another name.
         unit = found[3] if found[3].casefold() in UNITS else ""
         yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))
-    elif (found := SENTENCE.search(line)) and _are_numbers([number := found[1] or found[3]]):
-        yield f"rate {found[2] or f'{found[4]}/s'}", float(number)

@@ -17,7 +17,7 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 from ..errors import UnusableData
 from ..signals.arrays import Reals
 from ._alignment import stated_times
-from ._source_channel import Read, Source, SourceChannel, exact_step, scale_among, unit_among
+from ._source_channel import Read, Source, SourceChannel, exact_step, own_facts, scale_among, unit_among
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
@@ -56,20 +56,23 @@ def open_hdf5_source(path: Path) -> Iterator[Source]:
 def _readers(file: h5py.File) -> Iterator[tuple[SourceChannel, Read]]:
     known: dict[str, Facts] = {}
     items = [item for _, item in walk(file)]
-    elsewhere = [fact for item in items if isinstance(item, h5py.Group) for fact in _facts(item, known)]
+    groups = [item for item in items if isinstance(item, h5py.Group)]
+    elsewhere = [fact for group in groups for fact in _facts(group, known)]
+    named = [(f"{group.name.rsplit('/')[-1]}_{n}", x) for group in groups for n, x in _facts(group, known)]
     for dataset in filter(_holds_samples, items):
         beside = _facts(dataset.parent, known)
-        own = (*dataset.attrs.items(), *beside, *_facts_above(dataset.parent, known))
-        times = stated_times(own, elsewhere)
+        own = own_facts((*beside, *named), dataset.name.rsplit("/", 1)[-1])
+        facts = (*dataset.attrs.items(), *own, *beside, *_facts_above(dataset.parent, known))
+        times = stated_times(facts, elsewhere)
         if dataset.ndim == 1:
-            channel = _channel(dataset, dataset.name, dataset.shape[0], 0, beside)
+            channel = _channel(dataset, dataset.name, dataset.shape[0], 0, own, beside)
             yield replace(channel, **times), partial(_read, file, dataset.name, 0, 0)
             continue
         axis = int(dataset.shape[0] < dataset.shape[1])
         samples, rows = dataset.shape[axis], dataset.shape[1 - axis]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            channel = _channel(dataset, name, samples, row, beside)
+            channel = _channel(dataset, name, samples, row, own, beside)
             yield replace(channel, **times), partial(_read, file, dataset.name, axis, row)
 
 
@@ -107,15 +110,17 @@ def _holds_samples(item: h5py.HLObject) -> bool:
     )
 
 
-def _channel(dataset: h5py.Dataset, name: str, samples: int, place: int, beside: Facts) -> SourceChannel:
-    own = tuple(dataset.attrs.items())
+def _channel(
+    dataset: h5py.Dataset, name: str, samples: int, place: int, named: Facts, beside: Facts
+) -> SourceChannel:
+    own = (*dataset.attrs.items(), *named)
     step = exact_step(dataset.dtype) if _number(dataset, "add_offset", 0.0, place) == 0.0 else None
     scale = scale_among((*own, *beside), are_counts=step is not None)
     return SourceChannel(
         name=name,
         samples=samples,
         label=name.rsplit("/", 1)[-1],
-        unit=unit_among(own, place) or unit_among(beside, place, dataset.name.rsplit("/", 1)[-1]),
+        unit=unit_among(own, place) or unit_among(beside, place),
         stated_scale="" if "scale_factor" in dataset.attrs else scale,
         step=None if step is None else step * abs(_number(dataset, "scale_factor", 1.0, place)),
         origin=_origin(dataset.file),

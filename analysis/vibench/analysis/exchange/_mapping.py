@@ -38,19 +38,21 @@ def _is_another_quantity(file_unit: str) -> bool:
 def unit_in_name(name: str) -> str:
     """Return the unit at the end of a name, as in ``"v / mm/s"``, ``"v_mm_s"``; empty if there is none."""
     for found in _BEFORE_UNIT.finditer(name):
-        unit, sign = name[found.end() :].strip(" ])"), found[0].strip()
+        unit, sign = name[found.end() :].strip(" ])}>\uff3d\uff09"), found[0].strip()
         unit = unit.replace("_", "/") if sign == "_" else unit
-        is_letter = sign in {"", "_"} and (len(unit) == 1 or unit == "in")
+        is_letter = sign in {"", "_", "-"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
         # DIN 461 writes "a / Gal". More than four letters after " / " may belong to the name of the channel.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
+        if unit == "g" and found[0].isspace():
+            return "g?"  # a unit, or the name of a channel
         if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit
     return ""
 
 
 _LIKE_A_UNIT = re.compile(r"\S{1,4}|\S*[/^*\u00b2]\S*")
-_BEFORE_UNIT = re.compile(r"^|\s*[\[(/,;_]\s*|\s+in\s+(?=.)")
+_BEFORE_UNIT = re.compile(r"^|\s*[\[({<\uff3b\uff08/,;:_-]\s*|\s+(?:in\s+)?(?=.)")
 
 
 class ChannelMapping(FrozenModel):

@@ -29,6 +29,7 @@ from ._source_channel import (
     Source,
     SourceChannel,
     exact_step,
+    own_facts,
     read_from,
     scale_among,
     unit_among,
@@ -211,7 +212,7 @@ def open_mat(path: Path) -> Iterator[Source]:
     own = {name: value for name, value in content.items() if not name.startswith("__")}
     # Files exported by vibench state the sample rate beside the channels.
     about = tuple(_part(own, "recording").items())
-    numbers = _numbers(own, "", about, tuple(_all_facts(own)))
+    numbers = _numbers(own, "", about, tuple(_all_facts(own)), tuple(_named_facts(own)))
     yield Source({channel: read_from(values) for channel, values in numbers})
 
 
@@ -221,11 +222,22 @@ def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         yield from _all_facts(value) if isinstance(value, dict) else ((name, value),)
 
 
+def _named_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the values in all structs inside a struct, with the name of their struct: ``"v_unit"``."""
+    for name, value in struct.items():
+        if isinstance(value, dict):
+            yield from (
+                (f"{name}_{each}", one) for each, one in value.items() if np.size(one) <= MOST_CHANNELS
+            )
+            yield from _named_facts(value)
+
+
 def _numbers(
     struct: Mapping[str, Any],
     prefix: str,
     around: tuple[tuple[str, Any], ...],
     elsewhere: tuple[tuple[str, Any], ...],
+    named: tuple[tuple[str, Any], ...],
 ) -> Iterator[tuple[SourceChannel, Any]]:
     # Some programs store start and increment in a struct beside the values.
     axis, quantity = _part(struct, "x_values"), _part(struct, "quantity")
@@ -233,16 +245,17 @@ def _numbers(
     own = {**{name: label for name, label in labels.items() if label}, **struct, **axis}
     own |= _part(quantity, "unit_transformation")
     facts = (*((name, value) for name, value in own.items() if np.size(value) <= MOST_CHANNELS), *around)
-    times = stated_times(facts, elsewhere)
     for name, value in struct.items():
         match value:
             case dict():
-                yield from _numbers(value, f"{prefix}{name}.", facts, elsewhere)
+                yield from _numbers(value, f"{prefix}{name}.", facts, elsewhere, named)
             case np.ndarray() if _holds_samples(value):
                 step = exact_step(value.dtype)
-                scale = "" if "scale_factor" in struct else scale_among(facts, are_counts=step is not None)
+                known = own_facts((*facts, *named), name)
+                times, said = stated_times((*known, *facts), elsewhere), (*known, *facts)
+                scale = "" if "scale_factor" in struct else scale_among(said, are_counts=step is not None)
                 for place, (channel, row) in enumerate(_channels(f"{prefix}{name}", value)):
-                    unit = unit_among(own.items(), place, name)
+                    unit = unit_among(known, place) or unit_among(own.items(), place)
                     yield replace(channel, unit=unit, step=step, stated_scale=scale, **times), row
 
 

@@ -15,7 +15,7 @@ from vibench.sim.hdf5_files.door import system_error
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import time_axis
+from ._alignment import is_time_of, time_axis
 from ._csv import open_csv
 from ._hdf5_source import open_hdf5_source
 from ._mapping import unit_in_name
@@ -98,6 +98,9 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
     """Yield the channels, each with the times that the file contains for it."""
     read = {each: time_axis(each, source.blocks(each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
+    for time, axis in axes.items():  # such as t_v beside t
+        if any(is_time_of(time.label, each.label) for each in source.channels):
+            axes[time] = replace(axis, is_named=True)
     for number, each in enumerate(source.channels):
         ranks = {time: _rank(time, each, is_named=axes[time].is_named) for time in axes}
         best = max(ranks.values(), default=())

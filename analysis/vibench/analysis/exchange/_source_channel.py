@@ -56,7 +56,8 @@ _UNIT = re.compile(
     re.I,
 )
 _SCALE = re.compile(
-    r"scale|scaling|(?:(?:scal\w*|cal\w*)[ _]?)?factor|gain|slope|lsb|(?:volts?|v)[ _]?per[ _]?\w+", re.I
+    r"(?:scale|scaling|(?:(?:scal\w*|cal\w*)[ _]?)?factor|gain|slope|lsb)s?|(?:volts?|v)[ _]?per[ _]?\w+",
+    re.I,
 )
 
 
@@ -67,17 +68,20 @@ _COUNT_SCALE = re.compile(
 )
 
 
-def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0, label: str = "") -> str:
+def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0) -> str:
     """Return the stated unit, or the unit at ``place`` in a list of units; empty if not stated.
 
-    ``LABEL_unit`` is the unit of the channel with that label only. Several units are joined by "or".
+    Several units are joined by "or".
     """
-    own = re.compile(rf"{re.escape(label)}[ _.-]?units?", re.I)
-    named = [(name, value) for name, value in facts if label and own.fullmatch(name)]
-    found = dict.fromkeys(
-        _text_at(np.ravel(value), place) for name, value in named or facts if named or _UNIT.fullmatch(name)
-    )
-    return " or ".join(filter(None, found))
+    named = (value for name, value in facts if _UNIT.fullmatch(name))
+    return " or ".join(filter(None, dict.fromkeys(_text_at(np.ravel(value), place) for value in named)))
+
+
+def own_facts(facts: Iterable[tuple[str, Any]], label: str) -> tuple[tuple[str, Any], ...]:
+    """Return the facts of the channel with a label, such as ``v_gain`` or ``Unit v``, without the label."""
+    before = re.compile(rf"{re.escape(label)}(?=[A-Z _.-])[ _.-]*(.+)|(.+?)[ _.-]+(?:of )?{re.escape(label)}")
+    found = ((before.fullmatch(name), value) for name, value in facts if label and label in name)
+    return tuple((name[1] or name[2], value) for name, value in found if name)
 
 
 def _text_at(texts: NDArray[Any], place: int) -> str:
