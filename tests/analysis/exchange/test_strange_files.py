@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 import h5py
 import numpy as np
 import pytest
-from scipy.io import savemat
+from scipy.io import savemat, wavfile
 
 from vibench.acquisition import open_recording, validate
 from vibench.analysis.errors import InvalidRequest, UnusableData
@@ -449,6 +449,18 @@ def test_a_unit_or_scale_that_changes_within_a_tdms_file_is_refused(tmp_path, fa
             writer.write_segment(objects)
     with pytest.raises((InvalidRequest, UnusableData), match=r"mm/s|gain = 0.5|NI_Scale"):
         read_import(tmp_path / "a.tdms")
+
+
+@pytest.mark.parametrize("peak", [0.9, 1.5])
+def test_floating_point_sound_within_full_scale_needs_a_scale(tmp_path, peak):
+    """Floats in sound files are usually fractions of full scale; larger values cannot be."""
+    values = peak * signal(TIMES) / np.array([[1.0], [30.0], [0.5]])
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), values.T.astype(np.float32))
+    if peak < 1:
+        with pytest.raises(InvalidRequest, match="has fractions of full scale without a unit for 1"):
+            read_import(tmp_path / "a.wav", "123")
+    samples = read_import(tmp_path / "a.wav", "123", scale=1.0)
+    np.testing.assert_allclose(samples, values, atol=1e-6)
 
 
 def test_single_precision_in_the_wrong_byte_order_is_refused(tmp_path):

@@ -75,12 +75,15 @@ UNKNOWN_SIZE = 2**32 - 1
 def open_wav(path: Path) -> Iterator[Source]:
     """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped except for 24 bits.
 
+    Floats of at most 1 are fractions of full scale too, as audio programs write them.
+
     Raises ValueError when the file is not WAV, or is compressed or truncated.
     """
     bits = _valid_bits(path)
     rate, data = _read(path)
     table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
     is_integer = table.dtype.kind in "iu"
+    are_fractions = is_integer or (table.size and table.min() >= -1 and table.max() <= 1)
     unused = 2 ** max(8 * table.itemsize - bits, 0) - 1
     if table.dtype.kind == "i" and np.bitwise_or.reduce(table, axis=None) & unused:
         raise ValueError(f"it states {bits} bits per sample, but its samples have more")
@@ -91,7 +94,7 @@ def open_wav(path: Path) -> Iterator[Source]:
                 samples=len(table),
                 sample_rate_hz=float(rate),
                 step=1 / _full_count(table.dtype) if is_integer else None,
-                full_scale=1.0 if is_integer else None,
+                full_scale=1.0 if are_fractions else None,
             ): partial(_read_column, column)
             for number, column in enumerate(table.T, start=1)
         }
