@@ -148,7 +148,7 @@ def collisions(sweep: SweptMotion) -> Collisions:
         if is_struck if is_known else np.mean(_seen_impacts(sweep)[here]) >= _ENOUGH:
             regions.append(_region(sweep, first, last, is_clear, is_evident, is_quiet))
             inside[here] = True
-    is_clear |= sweep.is_clear & (residual > _ALONE * usual)
+    is_clear |= is_known & sweep.is_clear & (residual > _ALONE * usual)
     hz, unclear = sweep.frequency_hz, (_majority(above | (ringing > _TOO_FAST), votes) | is_clear) & ~inside
     return Collisions(
         regions=tuple(regions),
