@@ -189,6 +189,16 @@ def test_wrong_values_of_the_gaps_and_m1_are_corrected_from_the_motion(world_rec
 
 
 @pytest.mark.thorough
+def test_bounds_hold_at_a_low_sample_rate_without_noise(world_recording):
+    """Gaps were once 1.8 bounds off, and dampers 1.2."""
+    recorded = world_recording(260.0, 1.5, duration_s=3.4, noise=0.0, rate_hz=12_800.0)
+    found = [each for each in estimate(recorded).parameters if each.is_determined]
+    assert {Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.C0, Hidden.C2} <= {each.what for each in found}
+    for each in found:
+        assert each.low < each.described < each.high
+
+
+@pytest.mark.thorough
 def test_wrong_values_of_springs_and_dampers_are_corrected_from_the_motion(world_recording):
     recorded = world_recording("noise", 10.0, seed=41)
     (k0, k1, k2), dampings = recorded.specimen.stiffnesses, recorded.specimen.dampings

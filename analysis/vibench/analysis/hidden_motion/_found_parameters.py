@@ -6,7 +6,7 @@ found without a contact model: m1, springs and dampers from flights, gaps from i
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import hypot, isfinite
 from typing import ClassVar, TypeGuard
 
 import numpy as np
@@ -44,6 +44,16 @@ _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
 """Relative standard error of a squared frequency due to the unknown clock error of up to 50 ppm."""
+_COARSE_HZ = 12_800.0
+_COARSE_SD = {
+    Hidden.LOWER_GAP: 2e-4,
+    Hidden.UPPER_GAP: 2e-4,
+    Hidden.MEAN_GAP: 2e-4,
+    Hidden.C0: 5e-4,
+    Hidden.C2: 1e-3,
+}
+"""Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; it is proportional to the
+squared sample interval."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
@@ -187,16 +197,16 @@ def _refine(
         if not np.any(is_beyond):
             break
     shared = {} if all(map(isfinite, described.specimen.gaps_m)) else _ONE_SIDED_SD
-    parameters = tuple(
-        _parameter(
-            what,
-            found.values[n],
-            float(np.hypot(found.half[n], _Z * shared.get(what, 0.0))),
-            value_of(described, what),
-            is_known=bool(is_determined[n] and not is_beyond[n]),
-        )
-        for n, what in enumerate(wanted)
-    )
+    coarse = (_COARSE_HZ / motion.sample_rate_hz) ** 2
+
+    def parameter(n: int, what: Hidden) -> FoundParameter:
+        value, is_known = float(found.values[n]), bool(is_determined[n] and not is_beyond[n])
+        why = "" if is_known else "this motion gives no narrower bounds than the description"
+        relative = hypot(_CLOCK_SD.get(what, 0.0), coarse * _COARSE_SD.get(what, 0.0))
+        half = hypot(found.half[n], _Z * shared.get(what, 0.0), _Z * relative * value)
+        return FoundParameter(what, value, value - half, value + half, value_of(described, what), why)
+
+    parameters = tuple(parameter(n, what) for n, what in enumerate(wanted))
     values = {each.what: each.value for each in parameters if each.is_determined}
     return FoundSpecimen(with_values(start, values), parameters, len(good), searched=False)
 
@@ -288,14 +298,6 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
     scale = found.prior_sd**2
     return found.start_values + found.prior_sd * moved, variance * scale, likely * scale
-
-
-def _parameter(
-    what: Hidden, value: float, half: float, described: float, *, is_known: bool
-) -> FoundParameter:
-    why = "" if is_known else "this motion gives no narrower bounds than the description"
-    half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
-    return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 
 
 def _undetermined(described: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
