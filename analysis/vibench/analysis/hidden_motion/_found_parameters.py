@@ -50,6 +50,7 @@ _COARSE_SD = {
     Hidden.UPPER_GAP: 2e-4,
     Hidden.MEAN_GAP: 2e-4,
     Hidden.C0: 5e-4,
+    Hidden.C1: 1.5e-2,
     Hidden.C2: 1e-3,
 }
 """Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; it is proportional to the
