@@ -3,9 +3,10 @@
 `basin` draws random initial states from the rectangle of a basin map, and compares the motions they reach
 with the stated shares. `map` computes a map with the given number of points, and prints processor time, time
 to the first picture, points computed, and the estimate made before; with `--one-by-one` without SIMD lanes.
-`lanes` follows random motions in SIMD lanes and one by one, and prints the time per impact on one core and
-the error of both; with heyoka too, if installed. Then it settles points of a map in both ways. It counts the
-points that reached another motion, and those at which several initial states agree.
+`lanes` follows random motions in SIMD lanes and one by one, and prints the time per impact on one core,
+without observation and with peaks and spectral lines, and the error of both; with heyoka too, if installed.
+Then it settles points of a map in both ways. It counts the points that reached another motion, and those at
+which several initial states agree.
 """
 
 import argparse
@@ -21,6 +22,7 @@ import numpy as np
 
 from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
+from vibench.sim.engine.run import Watch
 from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
 from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_together, follow_with_section
 from vibench.sim.scene.solve import Question, solve_scenes
@@ -136,24 +138,29 @@ def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
     return runs
 
 
-def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[Stretch]:
+def in_lanes(runs: list[FollowedRun], periods: list[int], watch: Watch = Watch.NOTHING) -> list[Stretch]:
     """Follow motions together in SIMD lanes."""
-    return follow_together([each.copy() for each in runs], periods)
+    return follow_together([each.copy() for each in runs], periods, watch)
 
 
-def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | None = None) -> list[Stretch]:
+def one_by_one(
+    runs: list[FollowedRun],
+    periods: list[int],
+    watch: Watch = Watch.NOTHING,
+    tolerance: float | None = None,
+) -> list[Stretch]:
     """Follow the same motions one after the other."""
     twins = [each.copy(tolerance) for each in runs]
     return [
-        follow_with_section(each, (each.periods + count) / each.drive.frequency_hz)
+        follow_with_section(each, (each.periods + count) / each.drive.frequency_hz, watch)
         for each, count in zip(twins, periods, strict=True)
     ]
 
 
-def ns_per_impact(follow, runs: list[FollowedRun], periods: list[int]) -> float:
+def ns_per_impact(follow, runs: list[FollowedRun], periods: list[int], watch: Watch) -> float:
     """Follow motions by one method, and return the time per impact [ns]."""
     began_s = time.thread_time()
-    found = follow(runs, periods)
+    found = follow(runs, periods, watch)
     return 1e9 * (time.thread_time() - began_s) / sum(each.impacts for each in found)
 
 
@@ -162,17 +169,19 @@ def lanes(asked: argparse.Namespace) -> int:
     rng = np.random.default_rng(asked.seed)
     runs = random_runs(asked.motions, rng)
     periods = [asked.periods] * len(runs)
-    timed = [
-        (ns_per_impact(in_lanes, runs, periods), ns_per_impact(one_by_one, runs, periods))
-        for _ in range(ROUNDS)
-    ]
-    beside_ns, alone_ns = np.min(timed, axis=0)
-    print(
-        f"{len(runs)} random motions, {asked.periods} drive periods each, one core: {beside_ns:.0f} ns per "
-        f"impact in lanes, {alone_ns:.0f} ns one by one: {alone_ns / beside_ns:.2f} times"
-    )
+    print(f"{len(runs)} random motions, {asked.periods} drive periods each, one core:")
+    for watch in (Watch.NOTHING, Watch.PEAKS_AND_LINES):
+        timed = [
+            [ns_per_impact(follow, runs, periods, watch) for follow in (in_lanes, one_by_one)]
+            for _ in range(ROUNDS)
+        ]
+        beside_ns, alone_ns = np.min(timed, axis=0)
+        print(
+            f"observing {watch.name.lower()}: {beside_ns:.0f} ns per impact in lanes, {alone_ns:.0f} ns one "
+            f"by one: {alone_ns / beside_ns:.2f} times"
+        )
     short = [math.ceil(COMPARED_S * each.drive.frequency_hz) for each in runs]
-    exact = one_by_one(runs, short, Accuracy.REFERENCE.tolerance)
+    exact = one_by_one(runs, short, tolerance=Accuracy.REFERENCE.tolerance)
     gap_m = runs[0].specimen.gap_m
     for name, found in (("in lanes", in_lanes(runs, short)), ("one by one", one_by_one(runs, short))):
         off = [
@@ -193,7 +202,9 @@ def peer(runs: list[FollowedRun]) -> None:
 
     gap_m, best = runs[0].specimen.gap_m, [AtHome(constants_of(each)) for each in runs]
     periods = [math.ceil(COMPARED_S * each.drive.frequency_hz) for each in runs]
-    exact = [each.states[-1, :3] for each in one_by_one(runs, periods, Accuracy.REFERENCE.tolerance)]
+    exact = [
+        each.states[-1, :3] for each in one_by_one(runs, periods, tolerance=Accuracy.REFERENCE.tolerance)
+    ]
 
     def off(states) -> float:
         apart = [np.abs(one[:3] - other).max() for one, other in zip(states, exact, strict=True)]

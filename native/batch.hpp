@@ -174,6 +174,7 @@ class BatchRun {
     observed = (observed & ~(1u << lane)) | unsigned(is_observed) << lane;
     set(impulse, {0.0, 0.0});
     __builtin_memcpy(first[lane], next.now->motion, sizeof first[lane]);
+    if (is_observed) see_end(*next.record, first[lane]);
     note_peaks(lane);
   }
 
@@ -232,6 +233,12 @@ class BatchRun {
     limit_steps(Mask::of(1u << lane));
   }
 
+  // Observes the start or the end of a motion. Elsewhere x has a peak only where its rate is zero.
+  static void see_end(Record &record, const double (&at)[6]) {
+    record.peak_x = vibench::larger(record.peak_x, magnitude(at[X]));
+    record.peak_p = vibench::larger(record.peak_p, magnitude(at[Y] - at[Z]));
+  }
+
   // Observes the peaks of a flight that begins with the terms `now`. A motion ends `to_go` after its last
   // but one due state.
   void see_flight(int lane, const LanePhasor (&now)[FLYING], double length, double to_go) {
@@ -274,7 +281,7 @@ class BatchRun {
     last.clock.high = (begun + double(of.periods)) / frequency[lane];
     last.contact = contact;
     vibench::keep(*of.now, last);
-    if (observed >> lane & 1) add_lines(lane, last);
+    if (observed >> lane & 1) see_end(*of.record, last.at), add_lines(lane, last);
     of.outcome = REACHED_END, of.impacts = impacts[lane];
   }
   void lose(int lane) { motion[lane]->outcome = STALLED, motion[lane]->impacts = impacts[lane]; }
@@ -417,11 +424,14 @@ class BatchRun {
       if constexpr (IS_OBSERVED) {
         Lanes x_ahead = x_of(next), largest_x = larger(magnitude(x), magnitude(x_ahead));
         Lanes largest_p = larger(magnitude(p), magnitude(ahead));
-        Mask peaks = clear & ((select(four, of_four.x, of_step.x) < largest_x) |
-                              (select(four, of_four.p, of_step.p) < largest_p));
-        for_each_lane(peaks.bits(), [&](int lane) {
-          see_flight(lane, now, select(four, FOUR * grid, grid)[lane], to_go[lane]);
-        });
+        Mask over_x = clear & (select(four, of_four.x, of_step.x) < largest_x);
+        Mask over_p = clear & (select(four, of_four.p, of_step.p) < largest_p);
+        if ((over_x | over_p).bits() != 0) {
+          Lanes step = select(four, FOUR * grid, grid);
+          Mask may_turn = ~(bound_x * step < magnitude(rate_of_x(now)));
+          for_each_lane((over_p | (over_x & may_turn)).bits(),
+                        [&](int lane) { see_flight(lane, now, step[lane], to_go[lane]); });
+        }
         x = select(clear, x_ahead, x);
       }
       for (int j = 0; j < FLYING; j++) now[j] = select(clear, next[j], now[j]);
@@ -448,13 +458,16 @@ class BatchRun {
     return sums[0] + sums[1];
   }
 
-  // Returns which lanes may have a new peak in the next `time`, at most a grid step.
+  INLINE Lanes rate_of_x(const LanePhasor (&terms)[FLYING]) const {
+    Lanes sum = 0.0;
+    for (int j = 0; j < FLYING; j++) sum = with_real_of_product(sum, fused_product(terms[j], rate[j]), across[j]);
+    return sum;
+  }
+
+  // Returns which lanes may have a new peak of x in the next `time`, at most a grid step or a collision.
   Mask may_peak(Mask of, Lanes time) const {
-    Lanes speed = 0.0;
-    for (int j = 0; j < FLYING; j++)
-      speed = with_real_of_product(speed, fused_product(term[j], rate[j]), across[j]);
-    Lanes most = fused(magnitude(speed), time, magnitude(x_of(term))) + 0.5 * SPARE * bound_x * (time * time);
-    return of & (peak_x < most);
+    Lanes speed = magnitude(rate_of_x(term)), bend = SPARE * bound_x * time;
+    return of & ~(bend < speed) & (peak_x < fused(speed + bend, time, magnitude(x_of(term))));
   }
 
   // Observes the peaks of a flight of at most one grid step.

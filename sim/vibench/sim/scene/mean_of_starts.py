@@ -48,19 +48,19 @@ def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     It is the larger of two estimates. The first is Student's 95 % interval with the smallest and the largest
     value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which allows for a rare motion. The
     second applies if most starts reached one repeating motion and ``others`` starts did not. It assumes that
-    the share of other motions is at the upper end of Wilson's interval.
+    the share of other motions is at the upper end of Wilson's interval. Motions that some starts reached
+    differ by at most the range of the responses; motions that no start reached may differ more.
     """
     responses = np.array(seen)
     padded = np.vstack([responses, responses.min(axis=0), responses.max(axis=0)])
     mean, count = responses.mean(axis=0), len(seen)
     times = student_quantile(min(count - 1, MOST_FREEDOM), COVERED) / math.sqrt(count)
-    unseen = 0.0
+    rare: Floats | float = 0.0
     if others is not None:
         share = wilson_share(others, count)
-        unseen = (share.high - share.share) * max(
-            OTHER_DIFFERS, float((np.ptp(responses, axis=0) / mean).max())
-        )
-    return np.asarray(np.maximum(times * padded.std(axis=0, ddof=1) / mean, unseen) + ROUNDING)
+        seen_differ = (share.high - share.share) * np.ptp(responses, axis=0) / mean
+        rare = np.maximum(seen_differ, _unseen(count))
+    return np.asarray(np.maximum(times * padded.std(axis=0, ddof=1) / mean, rare) + ROUNDING)
 
 
 def error_of(starts: Sequence[Start]) -> Floats:
@@ -127,5 +127,12 @@ def _share_within(starts: Sequence[Start]) -> float:
 
 def time_factor(starts: Sequence[Start], error: float) -> float:
     """Return the factor by which the simulated time must grow to reach the requested error."""
-    power = 2.0 if others_of(starts) is None else 1.0
-    return 1.05 * math.pow(float(error_of(starts).max()) / error, power)
+    worst = float(error_of(starts).max())
+    # The share of motions that no start reached falls with the number of starts, other errors with its root.
+    is_unseen = others_of(starts) is not None and worst <= 1.01 * _unseen(len(starts))
+    return 1.05 * math.pow(worst / error, 1.0 if is_unseen else 2.0)
+
+
+def _unseen(count: int) -> float:
+    """Return the relative error due to motions that none of ``count`` starts reached."""
+    return wilson_share(0, count).high * OTHER_DIFFERS
