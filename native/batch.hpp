@@ -250,16 +250,23 @@ class BatchRun {
     note_peaks(lane);
   }
 
-  // Observes the peaks of the collision that begins now. Returns false if it cannot be solved as a whole.
-  bool see_collision(int lane) {
+  // Observes the peaks of the collision that begins now, without changing the motion.
+  void see_collision(int lane) {
     const Tables &own = *motion[lane]->tables;
     ContactStart start = contact_start(lane);
+    Observer observer = observer_of(lane);
     Collision<double> c;
-    if (!start.collide(c, period[lane], batch.tolerance, own)) return false;
-    observer_of(lane).see_shape(c, gap_at(own.specimen, start.contact.side),
-                                [&] { return times(own.collision.onto_x, c.motion); });
+    if (start.collide(c, period[lane], batch.tolerance, own)) {
+      double gap = gap_at(own.specimen, start.contact.side);
+      observer.see_shape(c, gap, [&] { return times(own.collision.onto_x, c.motion); });
+    } else {
+      auto seen = [&](const auto &steps, double h) { observer.see_step(steps, h, start.contact); };
+      double longest = STRETCH_TURN / own.omega, passed = 0.0;
+      // The deepest point of every collision that the polynomials can compute lies in this stretch.
+      advance_contact(start.contact, start.at, passed, longest, BaseForce(due_clock(lane), 0.5 * longest, own),
+                      HertzForce{own.specimen.contact_stiffness}, batch.tolerance, own, seen);
+    }
     note_peaks(lane);
-    return true;
   }
 
   void add_lines(int lane, const Motion<double> &last) {
@@ -475,7 +482,7 @@ class BatchRun {
     double farther = vibench::larger(lower, upper);
     Mask of = Mask::of(lanes & observed);
     if (of.bits() == 0) return;
-    for_each_lane((may_peak(of, time) | (of & (peak_p < farther))).bits(),
+    for_each_lane((may_peak(of, time) | (of & (peak_p < farther) & (peak_p < reach))).bits(),
                   [&](int lane) { see_flight(lane, term, time[lane], left[lane]); });
   }
 
@@ -580,7 +587,7 @@ class BatchRun {
     evaluate(values, variables, fit.coefficients);
     Lanes length = unit * values[0];
     inside = inside & (length * frequency < LONGEST_PART) & ~(Mask::of(last) & (left < length));
-    if (observed != 0) inside = inside & ~see_collisions(inside, side, deepest, length);
+    if (observed != 0) see_collisions(inside, side, deepest, length);
     kick_modes(inside, 0.5 * length, unit, side * speed, values);
     LanePhasor end = pass(inside, length);
     if (observed != 0) add_impulses(inside, 0.5 * length, unit, tables.pair * side * speed, end, values);
@@ -628,13 +635,10 @@ class BatchRun {
     }
   }
 
-  // Observes the peaks of collisions that begin now. Returns the lanes whose collision needs steps.
-  Mask see_collisions(Mask of, Lanes side, Lanes deepest, Lanes length) {
-    Mask higher = of & (peak_p < select(Lanes(0.0) < side, upper, lower) + deepest), unsolved = Mask::of(0);
-    for_each_lane((may_peak(of, length) | higher).bits() & observed, [&](int lane) {
-      if (!see_collision(lane)) unsolved = unsolved | Mask::of(1u << lane);
-    });
-    return unsolved;
+  // Observes the peaks of collisions that begin now.
+  void see_collisions(Mask of, Lanes side, Lanes deepest, Lanes length) {
+    Mask higher = of & (peak_p < select(Lanes(0.0) < side, upper, lower) + deepest);
+    for_each_lane((may_peak(of, length) | higher).bits() & observed, [&](int lane) { see_collision(lane); });
   }
 
   // Adds the impulses of collisions that end now, with the phase exp(-i omega t) of the force.
