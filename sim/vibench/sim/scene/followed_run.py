@@ -121,6 +121,8 @@ class FollowedRun:
         self.cost_s = 0.0
         """Nominal computing cost since the start of the run [s]; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
+        self.tries = 0
+        """Number of successive calls of `follow_together` that ended in contact; at `TRIES` it stays."""
 
     @property
     def tolerance(self) -> float:
@@ -256,46 +258,36 @@ class FollowedRun:
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
 
+TRIES = 8
+"""Most drive periods to wait for a period that ends without contact, at which a batch can begin."""
+
+
 def follow_together(
     runs: Sequence[FollowedRun], periods: Sequence[int], observe: Watch = Watch.NOTHING
-) -> list[Stretch | None]:
-    """Integrate motions of one specimen in a batch, each over whole drive periods, without tangent vector.
-
-    The result is None for a motion that the batch cannot integrate; its state does not change.
-    """
-    starts_s = [run.time_s for run in runs]
-    found = follow_batch([run._run for run in runs], periods, observe)  # noqa: SLF001 - of the same file
-    return [
-        None if motion is None else run._batch_stretch(start_s, motion)  # noqa: SLF001
-        for run, start_s, motion in zip(runs, starts_s, found, strict=True)
-    ]
-
-
-def follow_periods(
-    runs: Sequence[FollowedRun], until_s: float, length_s: float, observe: Watch = Watch.NOTHING
 ) -> list[Stretch]:
-    """Integrate motions under one drive for about ``length_s`` [s], in a batch, and store their states.
+    """Integrate motions of one specimen from the end of a drive period, and store a state per period.
 
-    All motions are at the end of a drive period, and so is the time ``until_s`` [s], which none exceeds. A
-    motion that begins in contact is integrated alone, for one drive period; so is one that fails in a batch.
+    They advance by ``periods`` in a batch, without tangent vector. A motion in contact is first integrated
+    alone for a period. After `TRIES` contacts, or a failure of the batch, it is integrated without batches.
     """
-    frequency_hz = runs[0].drive.frequency_hz
-    made = [round(run.time_s * frequency_hz) for run in runs]
-    most = max(1, math.floor(length_s * frequency_hz))
-    left = [min(most, round(until_s * frequency_hz) - each) for each in made]
-    flying = [place for place, run in enumerate(runs) if run.is_in_flight]
-    together = (
-        follow_together([runs[k] for k in flying], [left[k] for k in flying], observe) if flying else []
-    )
-    found = dict(zip(flying, together, strict=True))
-    stretches = []
+    flying = [place for place, run in enumerate(runs) if run.is_in_flight and run.tries < TRIES]
+    starts_s = [runs[place].time_s for place in flying]
+    motions = [runs[place]._run for place in flying]  # noqa: SLF001 - of the same file
+    batched = follow_batch(motions, [periods[place] for place in flying], observe) if flying else []
+    found: dict[int, Stretch] = {}
+    for place, start_s, motion in zip(flying, starts_s, batched, strict=True):
+        if motion is None:
+            runs[place].tries = TRIES
+        else:
+            found[place] = runs[place]._batch_stretch(start_s, motion)  # noqa: SLF001
     for place, run in enumerate(runs):
-        stretch = found.get(place)
-        if stretch is None:
-            end_s = (made[place] + (left[place] if place in found else 1)) / frequency_hz
-            stretch = follow_with_section(run, end_s, observe)
-        stretches.append(stretch)
-    return stretches
+        if place not in found:
+            count = 1 if run.tries < TRIES else periods[place]
+            end_s = (round(run.time_s * run.drive.frequency_hz) + count) / run.drive.frequency_hz
+            found[place] = follow_with_section(run, end_s, observe)
+        if run.tries < TRIES:
+            run.tries = 0 if run.is_in_flight else run.tries + 1
+    return [found[place] for place in range(len(runs))]
 
 
 BLOCKS = 10

@@ -23,7 +23,7 @@ from .followed_run import (
     FollowedRun,
     ObservedWindow,
     Stretch,
-    follow_periods,
+    follow_together,
     follow_with_section,
     states_of,
     whole_periods,
@@ -289,7 +289,9 @@ class _Refinement:
             if at_once == 1:
                 parts[0].append(follow_with_section(runs[0], min(until_s, runs[0].time_s + length_s), watch))
             else:
-                seen = follow_periods([runs[place] for place in under_way], until_s, length_s, watch)
+                most, group = max(1, int(length_s * self._frequency_hz)), [runs[k] for k in under_way]
+                left = [round((until_s - run.time_s) * self._frequency_hz) for run in group]
+                seen = follow_together(group, [min(most, each) for each in left], watch)
                 for place, part in zip(under_way, seen, strict=True):
                     parts[place].append(part)
             if any(run.outcome is not Outcome.REACHED_END for run in runs):

@@ -110,21 +110,13 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Drive periods that a batch may integrate next; 0 within a period, in contact, or at the end."""
+        """Drive periods that a batch may integrate next; 0 within a period, or at the end."""
         run = self.run
-        if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
+        if self.is_over or run.periods is None or not run.cost_s < self.cost_s:
             return 0
         frequency_hz = run.drive.frequency_hz
         left = whole_periods(self.until_s, frequency_hz) - run.periods
         return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
-
-    def follow_to_flight(self) -> None:
-        """Integrate until a drive period ends without contact, for at most `TRIES` periods."""
-        run = self.run
-        for _ in range(TRIES):
-            if run.is_in_flight or run.periods is None:
-                return
-            self.follow((run.periods + 1) / run.drive.frequency_hz)
 
     def note(self, stretch: Stretch) -> Repetition | None:
         """Store the states of a stretch; return the repetition of the motion, or None."""
@@ -172,8 +164,6 @@ ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
 """Longest time [s] and most drive periods between two checks of a batch; limited by the stored states."""
 HELD_STATES, FULL = 1 << 20, 16
 """Most stored states of all motions in a batch, and number of motions that fill the SIMD registers."""
-TRIES = 8
-"""Most drive periods to wait for a period that ends without contact, at which a batch can begin."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
@@ -194,8 +184,6 @@ def in_batches(several: Sequence[StatesAlone]) -> None:
 def _follow_rounds(group: Sequence[StatesAlone]) -> None:
     under_way = list(group)
     while under_way:
-        for each in under_way:
-            each.follow_to_flight()
         ready = [(each, periods) for each in under_way if (periods := each.batch_periods) > 0]
         longest = max((periods for _, periods in ready), default=1)
         size = max(FULL, HELD_STATES // longest)
@@ -207,9 +195,4 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
     """Integrate each motion in a batch for its number of periods; return the motions that must go on."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
-    # A motion that the batch cannot integrate keeps its state and is integrated without a batch.
-    return [
-        each
-        for (each, _), stretch in zip(ready, found, strict=True)
-        if stretch is not None and each.note(stretch) is None
-    ]
+    return [each for (each, _), stretch in zip(ready, found, strict=True) if each.note(stretch) is None]
