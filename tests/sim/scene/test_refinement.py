@@ -197,4 +197,4 @@ def test_the_stated_error_of_a_mean_over_two_motions_holds_and_is_not_too_large(
         errors.append(mean_error([np.full(4, each) for each in values], int(is_other.sum()))[0])
         held.append(abs(values.mean() - true) <= errors[-1] * values.mean())
     assert np.mean(held) > 0.92
-    assert np.median(errors) * true < 1.8 * 1.96 * scatter
+    assert np.median(errors) * true < 1.35 * 1.96 * scatter
