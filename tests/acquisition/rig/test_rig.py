@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.rig import Rig, Role, channels_of, load_rig
+from vibench.acquisition.rig import Role, channels_of, load_rig
 
 CONFIGS = Path(__file__).resolve().parents[3] / "hardware_configs"
 VIRTUAL = CONFIGS / "virtual_rig.toml"
@@ -38,16 +38,6 @@ def edited_config(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -
         ('physical = "ai1"', 'physical = "ai0"', r"daq: physical ai0 is given twice"),
         ("calibrated = 2026-02-10", "calibrated = 2026-02-30", r"not valid TOML.*line"),
         ("[specimen]", "[specimen", r"not valid TOML"),
-    ],
-)
-def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
-    with pytest.raises(ConfigurationError, match=said):
-        load_rig(edited_config(tmp_path, old, new))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
         ('physical = "ao0"', 'physical = "ai0"', r"daq\.output\.physical = 'ai0': .*match pattern"),
         ("limit_v = 3.5\n", "", r"daq\.output\.limit_v is missing"),
         ("limit_v = 3.5", "limit_v = 35.0", r"daq\.output\.limit_v = 35\.0: .*less than or equal to 10"),
@@ -55,28 +45,21 @@ def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old
         ("ahead_s = 0.5", "ahead_s = 0.05", r"daq\.output\.ahead_s = 0\.05: .*greater than or equal to 0\.3"),
         ("ahead_s = 0.5", "ahead_s = 60", r"daq\.output\.ahead_s = 60: .*less than or equal to 5"),
         ("ahead_s = 0.5", "ahead = 0.5", r"daq\.output\.ahead is not a known key"),
-        (
-            'plays = "tones_and_streams"',
-            'plays = "all"',
-            r"plays = 'all': .*'streams' or 'tones_and_streams'",
-        ),
+        ('plays = "tones_and_streams"', 'plays = "all"', r"'all': .*'streams' or 'tones_and_streams'"),
         ("sample_rate_hz = 51200\n# What", "sample_rate_hz = 0\n# What", r"output\.sample_rate_hz = 0: .*0"),
     ],
 )
-def test_a_wrong_output_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
+def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
+    streaming = CONFIGS / "virtual_rig_streaming.toml"
+    shipped = VIRTUAL if old in VIRTUAL.read_text(encoding="utf-8") else streaming
     with pytest.raises(ConfigurationError, match=said) as failure:
-        load_rig(edited_config(tmp_path, old, new, CONFIGS / "virtual_rig_streaming.toml"))
-    assert "\n" not in str(failure.value)
+        load_rig(edited_config(tmp_path, old, new, shipped))
+    assert "TOML" in said or "\n" not in str(failure.value)
 
 
 def test_a_missing_file_is_refused_with_its_path(tmp_path):
     with pytest.raises(ConfigurationError, match=r"nowhere\.toml: cannot be read"):
         load_rig(tmp_path / "nowhere.toml")
-
-
-def test_a_configuration_is_unchanged_after_writing_and_reading_json():
-    rig = load_rig(VIRTUAL)
-    assert Rig.model_validate_json(rig.model_dump_json()) == rig
 
 
 @pytest.mark.parametrize(("load", "factor"), [('"high-z"', 1.0), ("50.0", 2.0)])
@@ -86,14 +69,11 @@ def test_a_generator_set_to_50_ohm_gives_twice_the_displayed_voltage(tmp_path, l
     assert rig.generator.terminal_factor() == pytest.approx(factor * loading)
 
 
-def test_the_vibrometer_range_scales_its_channel():
+def test_vibrometer_range_and_voltage_divider_scale_their_channels():
     rig = load_rig(VIRTUAL)
-    velocity = {channel.role: channel for channel in channels_of(rig)}[Role.M0_VELOCITY]
+    by_role = {channel.role: channel for channel in channels_of(rig)}
+    velocity = by_role[Role.M0_VELOCITY]
+    assert by_role[Role.DRIVE_VOLTAGE].units_per_volt == 2.0
     assert velocity.units_per_volt == pytest.approx(rig.vibrometer.range_mm_per_s_per_v * 1e-3)
     assert velocity.full_scale_v == 4.0
     assert velocity.delay_s == rig.vibrometer.delay_s
-
-
-def test_the_ratio_of_a_voltage_divider_is_corrected_in_its_channel():
-    drive = {channel.role: channel for channel in channels_of(load_rig(VIRTUAL))}[Role.DRIVE_VOLTAGE]
-    assert drive.units_per_volt == 2.0
