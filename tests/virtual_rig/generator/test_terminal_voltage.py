@@ -111,19 +111,6 @@ def test_samples_already_rendered_do_not_change():
     assert rig.render(3) == pytest.approx([3, 3, 3])
 
 
-def test_interval_means_of_a_waveform_agree_with_a_fine_staircase():
-    rig = Rig()
-    codes = np.random.default_rng(1).integers(0, 16384, 1000)
-    rig.upload(codes)
-    repetition_hz, oversampling = 3.7, 2000
-    rig.send(f"FUNC EMEM;:FREQ {repetition_hz};:VOLT 2;:PHAS:INIT;:OUTP ON")
-    count = 600
-    times = (np.arange(count * oversampling) + 0.5) * INTERVAL_S / oversampling
-    points = np.floor((times * repetition_hz % 1.0) * 1000).astype(int)
-    staircase = (2 * codes[points] / 16383 - 1).reshape(count, oversampling).mean(axis=1)
-    assert rig.render(count) == pytest.approx(staircase, abs=2.0 / oversampling)
-
-
 def test_a_waveform_changed_in_memory_is_played_at_once():
     rig = Rig()
     rig.upload([0, 0])
@@ -278,10 +265,6 @@ def test_the_lowest_and_highest_codes_are_minus_one_and_plus_one():
 
 def test_a_mean_over_a_tiny_part_of_a_point_equals_the_point():
     assert mean(TABLE, 0.3, 1e-15) == mean(TABLE, 0.3, 0.0)
-
-
-def test_a_sine_averages_to_zero_over_a_whole_cycle():
-    assert mean(Sine(), 0.3, 1.0) == pytest.approx(0, abs=1e-15)
 
 
 DAY_S = 86_400.0
