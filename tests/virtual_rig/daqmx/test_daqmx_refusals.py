@@ -63,6 +63,12 @@ def test_waiting_for_a_task_that_does_not_end_times_out(task):
         task.wait_until_done(timeout=0.01)
 
 
+def test_an_unknown_trigger_terminal_is_refused(task):
+    task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI12")
+    with daq_error(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING):
+        task.start()
+
+
 def test_a_missing_trigger_times_out_without_samples(daq, task):
     task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
     with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:

@@ -107,6 +107,27 @@ def test_a_reader_waits_for_samples_in_real_time(connect, clock):
     assert len(brought[0]) == 100
 
 
+def test_a_reader_that_waits_gets_an_error_when_its_task_is_stopped(connect, clock, monkeypatch):
+    pace, asked, ended = WallPace(clock=clock), threading.Event(), []
+    daq = connect(pace)
+    task = continuous(daq)
+    task.start()
+
+    def read():
+        with daq_error(DAQmxErrors.RUNTIME_ABORTED_ROUTING):
+            task.read(100, timeout=20.0)
+        ended.append(True)
+
+    reader, ask = threading.Thread(target=read), pace.ask
+    # The reader holds the rig's lock from here until it waits, so that the stop comes during the wait.
+    monkeypatch.setattr(pace, "ask", lambda *given: (asked.set(), ask(*given))[1])
+    reader.start()
+    assert asked.wait(20.0)
+    task.stop()
+    reader.join(20.0)
+    assert ended == [True]
+
+
 def test_the_speed_setting_makes_simulated_time_pass_faster(connect, clock):
     daq = connect(WallPace(speed=20.0, clock=clock))
     task = continuous(daq, samples=10000)
