@@ -132,6 +132,11 @@ class TestStates:
         with pytest.raises(InstrumentError, match=r"not sampling"):
             digitizer.read(10)
 
+    def test_a_closed_digitizer_cannot_be_started(self, digitizer):
+        digitizer.close()
+        with pytest.raises(InstrumentError, match=r"closed"):
+            digitizer.start()
+
 
 class TestConfiguration:
     def test_coupling_and_sensor_current_reach_the_device(self, rig, digitizer):
