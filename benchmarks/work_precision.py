@@ -6,7 +6,7 @@ and the page says so.
 
 Every solver starts in the same settled state. A solver's error is the difference from the independent
 solution after 0.2 s (in chaos, 0.03 s). A solver's cost is processor time divided by simulated time, in the
-fastest of several runs of 3 s (scipy: 0.3 s), without preparation such as compilation. Of the solver heyoka,
+fastest of several runs of 3 s (scipy: 0.3 s), without preparation such as compilation. For the solver heyoka,
 "at its best" means equations transformed to suit Taylor series, and "eight at a time" means batch mode, with
 the time divided by eight.
 """

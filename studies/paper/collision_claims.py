@@ -89,7 +89,7 @@ def damping_shrinks_regions(r: Reading) -> Values:
 @claim(
     "3.1, Fig. 5(b, d)",
     "Median ratio of Response II (without damping; at 7 µm) to Response II at 5 µm with damping, over the "
-    "frequencies from 220 to 320 Hz at which the former collides.",
+    "frequencies from 220 to 320 Hz with collisions (without damping; at 7 µm).",
     at_most("Response II, undamped over damped", "", 1.0),
     at_most("7 over 5 µm", "", 1.0),
 )

@@ -71,7 +71,7 @@ def print_estimate(
     console.print(paragraph(estimate_text(expected)))
     for name, (end_s, longest_s) in ends_s.items():
         length = "an unknown time" if end_s is None else f"about {end_s:.3g} s"
-        console.print(f"{name}: records {length} until its results are known, at most {longest_s:.4g} s")
+        console.print(f"{name}: records {length} until its targets are met, at most {longest_s:.4g} s")
     for name, found in known.items():
         for each in found:
             console.print(f"{name}: {each.sentence}")

@@ -39,7 +39,7 @@ def test_the_key_until_accepts_only_results_of_the_excitation(kind, name):
     if name in ALLOWED.get(kind, set()):
         assert plan(kind, {name: "1 %"}).until.required_bounds == {name: 0.01}
         return
-    with pytest.raises(ValidationError, match=f"until contains {name}, which {kind} does not support"):
+    with pytest.raises(ValidationError, match=f"'until' contains {name}, which {kind} does not support"):
         plan(kind, {name: "1 %"})
 
 
@@ -57,7 +57,7 @@ def test_an_invalid_until_bound_is_refused(said):
 
 
 def test_the_key_until_without_a_bound_is_refused():
-    with pytest.raises(ValidationError, match="until contains no result"):
+    with pytest.raises(ValidationError, match="until names no result"):
         plan("dwell", {"shortest_s": 3.0})
 
 

@@ -1,4 +1,4 @@
-"""Recordings that last until their results are known, on the virtual rig with analysis during the run."""
+"""Recordings that last until their targets are met, on the virtual rig with analysis during the run."""
 
 import pytest
 

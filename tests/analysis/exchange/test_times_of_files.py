@@ -480,7 +480,7 @@ def test_samples_between_segments_of_a_tdms_file_count_as_lost(tmp_path, fact, a
 )
 def test_tdms_segments_without_a_consistent_time_axis_are_refused(tmp_path, more):
     write_restarted_tdms(tmp_path / "a.tdms", more, 7001)
-    with pytest.raises(InvalidRequest, match=r"samples/s|has a new start|go back|intervals, but only"):
+    with pytest.raises(InvalidRequest, match=r"samples/s|has a second start|go back|intervals, but only"):
         import_recording(tmp_path / "a.tdms", mapping("tdms", RATE_HZ), tmp_path / "made.h5")
 
 

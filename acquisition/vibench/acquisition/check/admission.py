@@ -232,7 +232,7 @@ def _valid_check(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | 
         case BenchKind.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; run 'vibench bench check --bench FILE', or measure with "
-                "--check now, or skip the check with --check waived"
+                "'--check now', or skip the check with '--check waived'"
             )
 
 

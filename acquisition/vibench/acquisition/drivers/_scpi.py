@@ -301,7 +301,7 @@ class Word:
 def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
         f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument uses another value "
-        "but reports no error. Stop, check the setting on its panel, and check that its limits allow it"
+        "but reports no error. Stop, and check this setting and its limits on the panel"
     )
 
 

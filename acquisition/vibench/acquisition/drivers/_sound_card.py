@@ -246,7 +246,7 @@ class SoundCardOutput:
             raise ConfigurationError(
                 f"daq.output is set to {config.limit_v:g} V at {config.sample_rate_hz:g} samples a second; "
                 f"the card gives {output._full_scale_v:g} V at {digitizer.sample_rate_hz:g}, the rate of its "
-                "inputs. Lower limit_v, or give the same rate"
+                "inputs. Lower limit_v, or use this rate"
             )
         return output
 
@@ -326,7 +326,7 @@ def _input(channel: Channel, rig: Rig) -> int:
         raise ConfigurationError(
             f"{channel.role.value}: a sound card's input is AC-coupled, gives no sensor current, and reaches "
             f"{full_scale_v:g} V here; {channel.coupling}, {1e3 * channel.iepe_current_a:g} mA and "
-            f'{channel.range_v:g} V were requested. Set coupling = "AC" and a range_v within that, and use a '
+            f'{channel.range_v:g} V were requested. Set coupling = "AC", lower range_v, and use a '
             "separate IEPE supply"
         )
     return _number(name, "in")

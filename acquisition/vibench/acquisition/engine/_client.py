@@ -102,7 +102,7 @@ def the_engine(pid: int | None) -> Announcement:
         raise EngineError(f"{wanted}; {_names(others)} drives a bench itself: only 'vibench stop' reaches it")
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: "
-        "an engine of another user or VIBENCH_STATE_DIR can be watched and stopped only from there"
+        "engines of other users, or with another VIBENCH_STATE_DIR, are not found"
         + "".join(f". {each}" for each in [out_of_reach()] if each)
     )
 

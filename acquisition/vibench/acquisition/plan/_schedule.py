@@ -136,9 +136,9 @@ class Measurement(FrozenModel):
             return self
         allowed = () if isinstance(self.excitation, AbstractFeedback) else self.excitation.wishes
         if unknown := [name for name in self.until.required_bounds if name not in allowed]:
-            known = f"give {' or '.join(allowed)}" if allowed else "leave until out"
+            known = f"give {' or '.join(allowed)}" if allowed else "leave 'until' out"
             raise ValueError(
-                f"until contains {unknown[0]}, which {self.excitation.kind} does not support; {known}"
+                f"'until' contains {unknown[0]}, which {self.excitation.kind} does not support; {known}"
             )
         longest_s = max(each.record_s for each in self.excitation.steps())
         if self.excitation.period_points is None and self.until.shortest_s > max(longest_s, SHORTEST_S):

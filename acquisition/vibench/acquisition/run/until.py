@@ -56,8 +56,8 @@ class UntilWatch(ClosedOnLeaving):
             )
         except OSError as error:
             raise AcquisitionError(
-                f"{measurement.name} uses until, but its analysis could not be started ({error}). "
-                "Nothing was played; close other programs, or leave until out"
+                f"{measurement.name} uses 'until', but its analysis could not be started ({error}). "
+                "Nothing was played; close other programs, or leave 'until' out"
             ) from error
         excitation = measurement.excitation
         self._labels = excitation.result_labels

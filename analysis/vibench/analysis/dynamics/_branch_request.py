@@ -107,7 +107,7 @@ class BranchRequest(SpecimenChoice):
         pairs = self.recorded_level
         if pairs and self.along is Parameter.AMPLITUDE:
             raise ValueError(
-                "a recorded level is for branches along frequency only; along amplitude, give one frequency"
+                "a recorded level needs branches along frequency; along amplitude, give one frequency"
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")

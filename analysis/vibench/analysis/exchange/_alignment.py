@@ -500,7 +500,7 @@ def restarts(
         if start_s == before_s or abs(place - sample - runs[-1][1] + runs[-1][0]) < _PLACED:
             continue
         if not abs(place - np.rint(place)) <= _PLACED:
-            return (), f"has a new start at sample {sample}, {place:.3f} sample intervals after its first one"
+            return (), f"has a second start at sample {sample}, {place:.3f} sample intervals after the first"
         runs.append((sample, round(place)))
     return tuple(runs), _time_fault(runs, samples, runs[-1][1] + samples - runs[-1][0])
 
@@ -700,7 +700,7 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     if unknown:
         raise InvalidRequest(
             f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
-            f"only channels that state it, or only others{_or_ignore(channels)}"
+            f"only channels with a stated start, or only the others{_or_ignore(channels)}"
         )
     if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
         raise InvalidRequest(

@@ -31,7 +31,7 @@ def test_a_test_with_an_until_bound_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
     page._on_result(preview.predict_test(preview.TestPreview(test, RIG)))
-    assert page.expectation.text().startswith("Records until the results are known, about 2 s. Expected")
+    assert page.expectation.text().startswith("Records until the targets are met, about 2 s. Expected")
 
 
 def test_a_branch_that_the_fast_loop_cannot_hold_is_refused_with_the_reason(page):

@@ -458,7 +458,7 @@ class TestPage(Page):
         known = [each.sentence for each in prediction.expected if each.scatter is not None]
         text = f"Expected uncertainty: {known[0]} …" if known and sentences[1:] else "".join(sentences[:1])
         if prediction.recorded_s is not None:
-            text = f"Records until the results are known, about {prediction.recorded_s:.3g} s. {text}"
+            text = f"Records until the targets are met, about {prediction.recorded_s:.3g} s. {text}"
         self.expectation.setText(text)
         self.expectation.setToolTip("\n".join(sentences))
 
