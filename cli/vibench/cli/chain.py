@@ -149,7 +149,7 @@ def _run_in_words(run: ChainRun) -> str:
         return f"{count_text(run.cells, 'cell')}{where}: {run.outcome}, {run.elapsed_s:.1f} s"
     rates = run.impacts / run.observed_s
     return (
-        f"{count_text(run.cells, 'cell')}{where}: {across}impacts a second {rates[0]:.4g} in the first cell, "
-        f"{rates[-1]:.4g} in the last; mean energy {1e6 * run.energy_j[0]:.4g} µJ in the first cell, "
+        f"{count_text(run.cells, 'cell')}{where}: {across}impacts per second {rates[0]:.4g} in the first cell"
+        f", {rates[-1]:.4g} in the last; mean energy {1e6 * run.energy_j[0]:.4g} µJ in the first cell, "
         f"{1e6 * run.energy_j[-1]:.4g} µJ in the last{exponent}; {run.outcome}, {run.elapsed_s:.1f} s"
     )

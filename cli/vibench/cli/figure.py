@@ -85,7 +85,7 @@ def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iter
     if folder is None:
         raise InvalidRequest(
             f"figure {wanted[0]} shows the experiment; give its recordings with --recordings DIR, such as "
-            "the folder of vibench demo"
+            "the folder of 'vibench demo'"
         )
     from vibench.analysis.report import check_warnings
 

@@ -126,15 +126,15 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
         held = f"the branch from {plan.start_hz:.5g} to {hold.held_hz:.5g} Hz{behind}"
     if hold.multiplier > LARGEST_MULTIPLIER:
         raise LimitExceeded(
-            f"the fast loop would not hold the branch: in the model, its largest multiplier is "
+            f"the fast loop would not hold the branch: the modelled loop's largest multiplier is "
             f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {1e3 * timing.latency_s:.3g} ms of latency "
             f"at {timing.rate_hz:g} samples a second; at most {LARGEST_MULTIPLIER:g} is allowed. It would "
             f"hold {held}. Nothing was played; narrow the range, shorten the latency, or lower the level"
         )
     if hold.end not in (ArcEnd.REACHED_BOUND, ArcEnd.CLOSED):
         raise LimitExceeded(
-            f"{unknown}the model follows {held} only ({hold.end}). Nothing was played; narrow the range, or "
-            "change the level"
+            f"{unknown}the model can follow only {held} ({hold.end}). Nothing was played; narrow the range, "
+            "or change the level"
         )
 
 

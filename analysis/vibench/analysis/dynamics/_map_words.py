@@ -86,8 +86,8 @@ def map_caption(results: MapResults) -> str:
         share = audit.wrong_share
         sentences.append(
             "The other points were filled in, because their neighbours agree. To check this, "
-            f"{audit.audited} of them were drawn at random and computed: {audit.wrong} had another motion "
-            f"({share.low:.1%} to {share.high:.1%} of the filled points)."
+            f"{audit.audited} of them were drawn at random and computed: {audit.wrong} had a different motion"
+            f" ({share.low:.1%} to {share.high:.1%} of the filled points)."
         )
     return " ".join(sentences)
 

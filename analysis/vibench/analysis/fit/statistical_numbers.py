@@ -332,7 +332,7 @@ def statistical_numbers(
     if not found.fits:
         raise UnusableData(
             f"no simulated specimen has similar statistics (distance {found.distance:.2g} times the scatter "
-            "of repeated simulations): the description of rig or specimen is wrong in another value"
+            "of repeated simulations): another value in the description of rig or specimen is wrong"
         )
     return tuple(_determined_parameters(found, specimen)), found.distance
 

@@ -120,7 +120,7 @@ NUMBERS = {
         "relative_ii", REAL, "1", "displacement of m1 relative to m2 at the drive frequency, over the drive"
     ),
     "impacts": Column("impacts", WHOLE, "1", "impacts within the window"),
-    "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts a second within the window"),
+    "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts per second within the window"),
     "period": Column("period", WHOLE, "1", "drive periods after which the motion repeats"),
     "duration_s": Column(DURATION, REAL, "s", "duration of the run"),
     "window_s": Column("window", REAL, "s", "duration of the window at the end of the run"),
