@@ -484,7 +484,7 @@ class Rig(FrozenModel):
             return self
         raise ValueError(
             f"controller.rate_hz = {self.controller.rate_hz:g} would take {steps:.4g} steps of the virtual "
-            f"rig ({self.virtual.grid_rate_hz:g} a second) from sample to sample; give a rate with a whole "
+            f"rig ({self.virtual.grid_rate_hz:g} a second) between samples; give a rate with a whole "
             f"number of steps, for example {self.virtual.grid_rate_hz / max(round(steps), 1):g}"
         )
 

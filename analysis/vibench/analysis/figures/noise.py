@@ -97,7 +97,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     parts = [
         (
             f"From {periodic.realisations} realisations: standard deviation of one realisation, relative to "
-            f"the transmission (median): {_percent(found.noise_share)} by noise of the channels or chaos of "
+            f"the transmission (median): {_percent(found.noise_share)} due to channel noise or chaos of "
             "the specimen, which do not repeat each period"
         )
     ]

@@ -121,7 +121,7 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
         np.nan,
         np.nan,
         f"{100 * rest.rms_m / motion_m:.2g} % of the motion does not repeat, which may be noise or motion: "
-        "no silence was recorded before the test to tell them apart; measure with the check of the bench",
+        "no silence was recorded before the test to tell them apart; measure with the bench check",
     )
 
 
