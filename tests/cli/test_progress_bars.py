@@ -36,7 +36,7 @@ def test_progress_is_printed_as_lines_if_the_output_is_not_a_terminal():
     assert log.getvalue().splitlines()[-1] == "progress: noise 15 of 60 (25 %); opening, after 0 s"
 
 
-def test_a_stage_of_unknown_length_shows_no_numbers_of_the_stage_before():
+def test_a_stage_of_unknown_length_shows_no_numbers_of_the_previous_stage():
     bars = Progress(console=Console(file=io.StringIO()))
     with _bar(bars, "opening", None) as draw:
         draw(Stage(15, 60, 1.0, ""))

@@ -72,7 +72,7 @@ def test_a_tracked_resonance_is_listed_with_the_range_of_its_search():
     assert _band(plan.model_dump()) == (240, 290)
 
 
-def test_only_new_and_changed_files_are_read_again(folder, reads):
+def test_only_new_and_changed_files_are_read(folder, reads):
     before = list_recordings(folder)
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
     reads.clear()

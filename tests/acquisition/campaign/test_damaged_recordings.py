@@ -398,7 +398,7 @@ def test_a_stopped_recording_left_unfinished_on_disk_is_recovered_later(bench, t
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_the_point_of_a_complete_recording_unfinished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
+def test_a_complete_recording_unfinished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
     run_until_disk_refuses(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()

@@ -222,7 +222,7 @@ class TestWatching:
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
-    def test_a_notification_command_is_told_of_faults_and_of_the_end_and_may_fail(self, bench, tmp_path):
+    def test_a_notification_command_receives_faults_and_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (

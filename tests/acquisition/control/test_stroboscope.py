@@ -54,7 +54,7 @@ def test_a_subharmonic_alternates_from_one_drive_period_to_the_next():
 
 
 @pytest.mark.parametrize("drives", [2, 3])
-def test_a_motion_with_several_drive_periods_gives_one_row_per_repetition(drives):
+def test_a_motion_that_repeats_after_several_drive_periods_gives_one_row_each_time(drives):
     motion = observe(lambda a: np.sin(a - 1) + 0.1 * np.sin(a / drives), drives=drives)
     periods = motion.periods()
     assert periods.count == int(12 * 0.2 * NEAR_HZ / drives)

@@ -86,7 +86,7 @@ def test_the_stream_is_played_from_its_first_sample_without_gaps(digitizer, outp
     assert np.max(np.abs(drive_v[late] - basis @ fitted)) < NOISE_V
 
 
-def test_an_output_underflow_is_lost_data_and_ends_at_zero(digitizer, output):
+def test_an_output_underflow_is_reported_as_lost_data_and_ends_at_zero(digitizer, output):
     output.write(np.full(1280, 1.0))
     output.arm()
     digitizer.start()

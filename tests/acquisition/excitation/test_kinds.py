@@ -62,7 +62,7 @@ by_kind = {each.kind: each for each in EXAMPLES}
 every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
 
 
-def test_the_excitation_union_and_the_registry_list_the_same_plans():
+def test_the_excitation_union_and_the_registry_contain_the_same_plans():
     union = get_args(Excitation)[0]
     assert get_args(union) == tuple(kind.plan for kind in EXCITATION_KINDS.values())
     assert list(EXCITATION_KINDS) == list(by_kind)

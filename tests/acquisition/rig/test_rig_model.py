@@ -104,7 +104,7 @@ def test_electrical_power_equals_heat_and_friction(frequency_hz):
     assert delivered == pytest.approx(heat + friction, rel=1e-9)
 
 
-def test_results_for_an_array_of_frequencies_have_its_shape():
+def test_results_for_an_array_of_frequencies_have_the_shape_of_the_array():
     frequency_hz = np.geomspace(1, 1000, 12).reshape(3, 4)
     for quantity in BaseQuantity:
         assert MODEL.transfer(quantity, frequency_hz).shape == (3, 4)

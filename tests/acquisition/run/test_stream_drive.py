@@ -191,7 +191,7 @@ class TestEndsOfARun:
         assert_faded_without_a_step(streaming_bench)
 
     @heard_state
-    def test_a_stop_at_level_off_discards_samples_already_written(self, streaming_bench, tmp_path, state):
+    def test_an_immediate_stop_discards_samples_already_written(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
         (listened,) = list(run)  # until the silence after the cut

@@ -834,7 +834,7 @@ def test_a_mapping_cannot_declare_simulated_samples_to_be_real(known, tmp_path):
         import_recording(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head), tmp_path / "b.h5")
 
 
-def test_a_text_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
+def test_a_text_file_with_fewer_numbers_than_declared_is_refused(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
     lines = path.read_bytes().split(b"\n")
     place = next(n for n, line in enumerate(lines) if line.startswith(b"    58b"))

@@ -190,7 +190,7 @@ def test_the_scatter_of_a_maximum_is_estimated_from_one_window(bounded):
     assert 0.9 * true < np.median(told) < 1.6 * true
 
 
-def test_the_bound_of_a_largest_value_of_chaos_covers_other_windows():
+def test_the_bound_of_the_largest_value_in_chaos_covers_other_windows():
     """Windows of four chaotic motions at drives [Hz, m], damping times [s] and gaps [m]."""
     held = []
     for drive, damping_time_s, gap_m in (

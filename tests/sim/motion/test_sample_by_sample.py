@@ -15,7 +15,7 @@ def ramped_sine_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
 
 
 @pytest.mark.parametrize("amplitude_m", [0.0, 1e-7, 2e-6, 2e-5])
-def test_following_a_base_sample_by_sample_equals_integration(amplitude_m):
+def test_following_a_base_motion_sample_by_sample_equals_integration(amplitude_m):
     drive = ramped_sine_base(amplitude_m)
     followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
     duration_s = (len(drive.displacement_m) - 1) / RATE_HZ

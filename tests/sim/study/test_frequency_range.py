@@ -17,7 +17,7 @@ def test_a_range_ends_before_its_stop_if_the_step_does_not_fit():
 
 
 @given(st.floats(0.1, 100.0), st.integers(0, 500), st.floats(1e-3, 10.0))
-def test_a_range_has_one_value_more_than_steps_despite_rounding(start, steps, step):
+def test_a_range_has_one_more_value_than_steps_despite_rounding(start, steps, step):
     values = frequency_range(start, start + steps * step, step)
     assert len(values) == steps + 1
     assert np.allclose(np.diff(values), step)
