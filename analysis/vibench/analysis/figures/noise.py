@@ -106,7 +106,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     else:
         # Near a narrow mode with a drifting frequency, some of the drift remains and counts as distortion.
         most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
-        parts.append(f"; {most}{_percent(found.distortion_share)} by distortion.")
+        parts.append(f"; {most}{_percent(found.distortion_share)} due to distortion.")
     if periodic.drift is not None:
         parts.append(f" The {periodic.drift.text}; this is not distortion.")
     return "".join(parts) + _quiet_text(found)
