@@ -83,85 +83,44 @@ def test_a_mirrored_drive_and_initial_state_mirror_the_motion_bit_for_bit(contac
         np.testing.assert_array_equal(here.impacts.times_s, there.impacts.times_s)
 
 
-def longer(specimen, scale):
-    """Return the specimen with lengths and forces multiplied by ``scale``."""
+def scaled_specimen(specimen, length, time, mass):
+    """Return the specimen with all lengths, times and masses multiplied by these factors."""
+    stiffness, damping, force = mass / time**2, mass / time, mass * length / time**2
     match specimen.contact:
-        case Hertz(stiffness=stiffness):
-            law = Hertz(stiffness / math.sqrt(scale))
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            law = HuntCrossley(stiffness / math.sqrt(scale), loss / scale)
+        case Hertz(stiffness=contact):
+            law = Hertz(contact * stiffness / math.sqrt(length))
+        case LinearGap(stiffness=contact):
+            law = LinearGap(contact * stiffness)
+        case HuntCrossley(stiffness=contact, loss=loss):
+            law = HuntCrossley(contact * stiffness / math.sqrt(length), loss * time / length)
         case PowerLaw(reference=reference, terms=terms):
-            law = PowerLaw(scale * reference, tuple((n, scale * force) for n, force in terms))
-        case law:
-            pass
-    return replace(specimen, gap_m=scale * specimen.gap_m, contact=law)
-
-
-@settings(max_examples=25, deadline=None)
-@given(contact=laws, log_scale=st.floats(-4.0, 4.0))
-def test_motion_scales_with_the_unit_of_length(contact, log_scale):
-    scale, specimen = 10.0**log_scale, paper(contact)
-    long = end_state(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
-    assert np.all(np.abs(long - end_state(specimen)) < LIMITS)
-
-
-def slower(specimen, scale):
-    """Return the specimen with all times multiplied by ``scale``."""
-    match specimen.contact:
-        case Hertz(stiffness=stiffness):
-            law = Hertz(stiffness / scale**2)
-        case LinearGap(stiffness=stiffness):
-            law = LinearGap(stiffness / scale**2)
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            law = HuntCrossley(stiffness / scale**2, loss * scale)
-        case PowerLaw(reference=reference, terms=terms):
-            law = PowerLaw(reference, tuple((n, force / scale**2) for n, force in terms))
+            law = PowerLaw(reference * length, tuple((n, each * force) for n, each in terms))
         case law:
             pass
     return replace(
         specimen,
-        stiffnesses=tuple(k / scale**2 for k in specimen.stiffnesses),
-        dampings=tuple(c / scale for c in specimen.dampings),
+        masses=tuple(m * mass for m in specimen.masses),
+        stiffnesses=tuple(k * stiffness for k in specimen.stiffnesses),
+        dampings=tuple(c * damping for c in specimen.dampings),
+        gap_m=specimen.gap_m * length,
         contact=law,
     )
 
 
-@settings(max_examples=25, deadline=None)
-@given(contact=laws, log_scale=st.floats(-3.0, 3.0))
-def test_motion_scales_with_the_unit_of_time(contact, log_scale):
-    scale, specimen = 10.0**log_scale, paper(contact)
-    slow = end_state(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
-    slow[3:] *= scale
-    assert np.all(np.abs(slow - end_state(specimen)) < LIMITS)
-
-
-def heavier(specimen, scale):
-    """Return the specimen with all masses and forces multiplied by ``scale``."""
-    match specimen.contact:
-        case Hertz(stiffness=stiffness):
-            law = Hertz(stiffness * scale)
-        case LinearGap(stiffness=stiffness):
-            law = LinearGap(stiffness * scale)
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            law = HuntCrossley(stiffness * scale, loss)
-        case PowerLaw(reference=reference, terms=terms):
-            law = PowerLaw(reference, tuple((n, force * scale) for n, force in terms))
-        case law:
-            pass
-    return replace(
-        specimen,
-        masses=tuple(m * scale for m in specimen.masses),
-        stiffnesses=tuple(k * scale for k in specimen.stiffnesses),
-        dampings=tuple(c * scale for c in specimen.dampings),
-        contact=law,
-    )
-
-
-@settings(max_examples=25, deadline=None)
-@given(contact=laws, log_scale=st.floats(-6.0, 6.0))
-def test_motion_scales_with_mass_and_stiffness(contact, log_scale):
+@settings(max_examples=60, deadline=None)
+@given(
+    contact=laws,
+    length=st.floats(-4.0, 4.0).map(lambda power: 10.0**power),
+    time=st.floats(-3.0, 3.0).map(lambda power: 10.0**power),
+    mass=st.floats(-6.0, 6.0).map(lambda power: 10.0**power),
+)
+def test_motion_scales_with_the_units_of_length_time_and_mass(contact, length, time, mass):
     specimen = paper(contact)
-    assert np.all(np.abs(end_state(heavier(specimen, 10.0**log_scale)) - end_state(specimen)) < LIMITS)
+    scaled = scaled_specimen(specimen, length, time, mass)
+    drive = Harmonic(DRIVE.frequency_hz / time, DRIVE.amplitude_m * length)
+    end = end_state(scaled, drive, DURATION_S * time) / length
+    end[3:] *= time
+    assert np.all(np.abs(end - end_state(specimen)) < LIMITS)
 
 
 @settings(max_examples=20, deadline=None)
