@@ -273,64 +273,6 @@ def test_a_stiff_lossy_contact_matches_a_rigid_stop_with_its_restitution(loss):
     assert np.abs(soft_run.final_state[:3] - hard_run.final_state[:3]).max() < 1e-6 * speed
 
 
-def hard_oscillator(omega, restitution):
-    """Return x'' + x = cos(omega t), x <= 0, as m1 in a frame 1e12 times as heavy; drive and start."""
-    specimen = Specimen(
-        (1.0, 1e-12, 1.0), (80.0, 1e-12, 50.0), (0.0,) * 3, 1e-13, RigidStops(restitution), math.inf
-    )
-    s2 = omega**2
-    z_per_base = 80.0 * 50.0 / ((80.0 + 50.0 - s2) * (50.0 - s2) - 50.0**2)
-    # z = Z sin(omega t + phase): -z'' = omega^2 Z sin(...) is cos(omega t) at phase pi/2.
-    z = 1.0 / s2
-    drive = Harmonic(
-        omega / (2.0 * math.pi), abs(z / z_per_base), math.pi / 2 if z_per_base > 0 else -math.pi / 2
-    )
-    x = z * (50.0 - s2) / 50.0
-    return specimen, drive, np.array([x, z - 0.05, z, 0.0, 0.0, 0.0])
-
-
-def hard_impact_times(omega, restitution, duration):
-    """Return the impact times of this oscillator in closed form, bracketed on a grid and bisected."""
-    t, x, v, times = 0.0, -0.05, 0.0, []
-    gain = 1.0 / (1.0 - omega**2)
-    while True:
-        a = x - gain * math.cos(omega * t)
-        b = v + gain * omega * math.sin(omega * t)
-
-        def place(s, a=a, b=b, t=t):
-            return a * np.cos(s - t) + b * np.sin(s - t) + gain * np.cos(omega * s)
-
-        grid = t + 1e-7 + np.arange(0.0, 40.0, 2e-3)
-        crossing = np.flatnonzero((place(grid[:-1]) < 0.0) & (place(grid[1:]) >= 0.0))
-        low, high = grid[crossing[0]], grid[crossing[0] + 1]
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if place(middle) < 0.0 else (low, middle)
-        if low > duration:
-            return np.array(times)
-        times.append(low)
-        speed = -a * math.sin(low - t) + b * math.cos(low - t) - gain * omega * math.sin(omega * low)
-        t, x, v = low, 0.0, -restitution * speed
-
-
-@pytest.mark.parametrize(("omega", "restitution"), [(2.8, 0.8), (5.6, 0.8), (2.8, 0.95), (4.0, 0.95)])
-def test_the_hard_impact_oscillator_matches_its_closed_form(omega, restitution):
-    specimen, drive, start = hard_oscillator(omega, restitution)
-    run = integrate(specimen, drive, 60.0, initial_state=start)
-    expected = hard_impact_times(omega, restitution, 60.0)
-    assert len(expected) > 15
-    assert run.impacts.count == len(expected)
-    np.testing.assert_allclose(run.impacts.times_s, expected, atol=1e-6)
-
-
-def test_the_hard_impact_oscillator_has_the_known_impact_rate_in_chaos():
-    specimen, drive, start = hard_oscillator(2.8, 0.8)
-    run = integrate(specimen, drive, 20_000.0, initial_state=start)
-    assert run.outcome is Outcome.REACHED_END
-    # Reference: 0.4711 per unit of time, by a separate program over 1e6 units.
-    assert run.impacts.count / 20_000.0 == pytest.approx(0.4711, abs=0.002)
-
-
 def test_the_accuracy_level_has_no_effect_without_chatter():
     finals = [integrate(rigid(0.8), BOUNCING, 2.0, level).final_state for level in Accuracy]
     np.testing.assert_array_equal(finals[0], finals[2])
