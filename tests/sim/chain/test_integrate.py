@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.sim.as_written import distance
 from vibench.sim import (
     Accuracy,
     Harmonic,
@@ -15,6 +16,7 @@ from vibench.sim import (
     LinearSweep,
     Outcome,
     PowerLaw,
+    Sampled,
     gong2025,
 )
 from vibench.sim.chain import Chain, chain_of, integrate_chain
@@ -22,17 +24,11 @@ from vibench.sim.chain import Chain, chain_of, integrate_chain
 pytestmark = pytest.mark.timeout(300)
 
 HARD = Harmonic(220.0, 40e-6)
-UNITS = np.repeat([1e-4, 0.1], 3)
-"""Errors are in units of 100 um and 0.1 m/s."""
 
 
 def state_of(cells, seed=1):
     """Return a state in which every cell moves without contact."""
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (cells, 6)) * np.repeat([2e-5, 0.15], 3)
-
-
-def distance(first, second):
-    return np.max(np.abs(first - second) / UNITS)
 
 
 def law_force(cell, p, rate):
@@ -138,6 +134,10 @@ def test_an_overflowing_motion_ends_as_not_finite():
         (
             {"duration_s": 1.0, "drive": LinearSweep(100.0, 1e12, 1.0, 1e-6)},
             r"^1 s of 2 cells are not allowed",
+        ),
+        *(
+            ({"duration_s": 1.0, "drive": drive}, r"shorten the run or extend the drive\.$")
+            for drive in (LinearSweep(80.0, 300.0, 0.1, 1e-6), Sampled(np.ones(400), 2e3))
         ),
         ({"duration_s": 1.0, "initial_state": np.zeros(6)}, r"shape \(6,\) is not allowed: .*\(2, 6\)\.$"),
         ({"duration_s": 1.0, "initial_state": np.full((2, 6), np.nan)}, r"is not allowed: give finite"),

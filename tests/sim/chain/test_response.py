@@ -35,33 +35,20 @@ def test_a_chain_of_one_cell_matches_the_specimen_even_in_chaos(contact):
     np.testing.assert_array_equal(ours.lines_m[0, [0, 3]], (theirs.line_x_m, theirs.line_p_m))
 
 
-@pytest.mark.parametrize("contact", ["hertz", "power:5"])
-def test_spectral_lines_of_the_inner_masses_match_a_densely_sampled_run(contact):
-    chain, drive = chain_of(gong2025(contact=contact), 1), Harmonic(220.0, 40e-6, phase_rad=0.7)
-    start = np.array([[1e-5, -2e-5, 1.5e-5, 0.05, -0.1, 0.08]])
+@pytest.mark.parametrize(("contact", "cells"), [("hertz", 3), ("power:5", 1)])
+def test_peaks_and_spectral_lines_match_a_densely_sampled_run(contact, cells):
+    chain, drive = chain_of(gong2025(contact=contact), cells), Harmonic(220.0, 40e-6, phase_rad=0.7)
+    start = np.random.default_rng(2).uniform(-1.0, 1.0, (cells, 6)) * np.repeat([2e-5, 0.15], 3)
     duration_s = 5.0 / drive.frequency_hz
     response = chain_response(chain, drive, Accuracy.REFERENCE, duration_s, duration_s, start)
     run = integrate_chain(chain, drive, duration_s, Accuracy.REFERENCE, start, sample_rate_hz=1e6)
-    q = run.states[:, 0, [0, 1, 2]]
-    turning = np.exp(-1j * (2.0 * np.pi * drive.frequency_hz * run.time_s + drive.phase_rad))[:, None]
-    lines = 2.0 / run.time_s[-1] * simpson(q * turning, x=run.time_s, axis=0)
-    np.testing.assert_allclose(response.lines_m[0, :3], lines, atol=1e-3 * np.abs(lines).min())
-
-
-def test_peaks_and_spectral_lines_match_a_densely_sampled_run():
-    chain, drive = chain_of(gong2025(), 3), Harmonic(220.0, 40e-6)
-    start = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 6)) * np.repeat([2e-5, 0.15], 3)
-    duration_s = 5.0 / drive.frequency_hz
-    response = chain_response(chain, drive, Accuracy.REFERENCE, duration_s, duration_s, start)
-    run = integrate_chain(chain, drive, duration_s, Accuracy.REFERENCE, start, sample_rate_hz=1e6)
-    assert np.all(response.impacts > 3)
+    assert np.all(response.impacts > 3) or contact == "power:5"
     np.testing.assert_array_equal(response.impacts, run.impacts.per_cell)
     q = run.states[:, :, :3]
     q = np.concatenate([q, q[:, :, 1:2] - q[:, :, 2:3]], axis=2)
-    np.testing.assert_allclose(response.largest_m, np.abs(q).max(axis=0)[:, [0, 3]], rtol=2e-5)
-    turning = np.exp(-2j * np.pi * drive.frequency_hz * run.time_s)[:, None, None]
-    period_s = run.time_s[-1]
-    lines = 2.0 / period_s * simpson(q * turning, x=run.time_s, axis=0)
+    np.testing.assert_allclose(response.largest_m, np.abs(q).max(axis=0)[:, [0, 3]], rtol=1e-4)
+    turn_rad = 2.0 * np.pi * drive.frequency_hz * run.time_s + drive.phase_rad
+    lines = 2.0 / run.time_s[-1] * simpson(q * np.exp(-1j * turn_rad)[:, None, None], x=run.time_s, axis=0)
     np.testing.assert_allclose(response.lines_m, lines, atol=1e-3 * np.abs(lines).min())
 
 
