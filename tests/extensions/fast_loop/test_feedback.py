@@ -6,12 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.sim.shaker.table_and_specimen import SHAKER
 from vibench.sim import gong2025
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker
 from vibench.sim.specimen.contact_laws import PowerLaw
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
 from vibench_fast_loop.law import (
@@ -34,19 +35,9 @@ LINEAR = gong2025(contact="linear")
 NO_LAW = LinearLaw(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros((1, 1)), np.zeros((1, 2)))
 
 
-def shaker(mass_kg=0.127):
-    return Shaker(
-        moving_mass_kg=mass_kg,
-        suspension_stiffness_n_per_m=9932.0,
-        suspension_damping_ns_per_m=21.51,
-        force_constant_n_per_a=6.78,
-        coil_resistance_ohm=2.6,
-        coil_inductance_h=1e-4,
-    )
-
-
 def plant(latency_s=3e-4, specimen=HARDENING, mass_kg=0.127, gain=3.16):
-    return SampledPlant(Amplifier(gain=gain), shaker(mass_kg), specimen, LoopTiming(RATE_HZ, latency_s))
+    shaker = replace(SHAKER, moving_mass_kg=mass_kg)
+    return SampledPlant(Amplifier(gain=gain), shaker, specimen, LoopTiming(RATE_HZ, latency_s))
 
 
 @cache

@@ -8,16 +8,10 @@ from hypothesis import given, strategies as st
 
 from vibench.sim import Specimen, base_transmissibility, gong2025
 from vibench.sim.shaker.linear_motion import linear_motion
-from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker
 
-TABLE = Shaker(
-    moving_mass_kg=0.127,
-    suspension_stiffness_n_per_m=9932.0,
-    suspension_damping_ns_per_m=21.51,
-    force_constant_n_per_a=6.78,
-    coil_resistance_ohm=2.6,
-    coil_inductance_h=1e-4,
-)
+from .table_and_specimen import SHAKER
+
 AMPLIFIER = Amplifier(gain=-3.0, low_cut_hz=3.0, high_cut_hz=20e3)
 RATE_HZ = 51_200.0
 VOLTAGE, CURRENT, BASE, M0, P = range(5)
@@ -34,7 +28,7 @@ def random_specimen(rng):
 
 def simulate(specimen, frequency_hz, volts):
     """Return the fundamentals of base acceleration and m0 velocity, and the number of impacts."""
-    shaken = LoadedShaker(AMPLIFIER, TABLE, specimen, 1 / RATE_HZ)
+    shaken = LoadedShaker(AMPLIFIER, SHAKER, specimen, 1 / RATE_HZ)
     middle_s = (np.arange(round(3.0 * RATE_HZ)) + 0.5) / RATE_HZ
     motion = shaken.move(volts * np.sin(2 * np.pi * frequency_hz * middle_s))
     kept = round(1.5 * RATE_HZ)
@@ -47,7 +41,7 @@ def simulate(specimen, frequency_hz, volts):
 def test_the_closed_form_without_contact_equals_the_integration(seed):
     rng = np.random.default_rng(seed)
     specimen, frequency_hz = random_specimen(rng), rng.uniform(40.0, 600.0)
-    linear = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
+    linear = linear_motion(AMPLIFIER, SHAKER, specimen, frequency_hz)
     volts = 0.02 * specimen.gap_m / abs(linear.per_volt[0, P])
     base, m0, impacts = simulate(specimen, frequency_hz, volts)
     moved = linear.response(volts, specimen.gap_m)[0]
@@ -62,7 +56,7 @@ def test_the_closed_form_predicts_the_base_better_with_the_specimen_than_without
     off_db = []
     for _ in range(12):
         specimen, frequency_hz = random_specimen(rng), rng.uniform(60.0, 550.0)
-        with_it, bare = (linear_motion(AMPLIFIER, TABLE, each, frequency_hz) for each in (specimen, None))
+        with_it, bare = (linear_motion(AMPLIFIER, SHAKER, each, frequency_hz) for each in (specimen, None))
         volts = rng.uniform(2.0, 8.0) * specimen.gap_m / abs(with_it.per_volt[0, P])
         base, _, impacts = simulate(specimen, frequency_hz, volts)
         assert impacts > 0
@@ -76,7 +70,7 @@ def test_the_closed_form_predicts_the_base_better_with_the_specimen_than_without
 @given(st.floats(5.0, 2e3))
 def test_the_response_of_the_specimen_to_its_base_does_not_depend_on_the_shaker(frequency_hz):
     specimen = gong2025()
-    per_volt = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz).per_volt[0]
+    per_volt = linear_motion(AMPLIFIER, SHAKER, specimen, frequency_hz).per_volt[0]
     answer = base_transmissibility(specimen, frequency_hz)[0]
     assert per_volt[M0] / per_volt[BASE] == pytest.approx(answer[0], rel=1e-9)
     assert per_volt[P] / per_volt[BASE] == pytest.approx(answer[3], rel=1e-9)
@@ -88,8 +82,8 @@ def test_the_lever_ratio_predicts_the_response_with_a_changed_middle_spring(stif
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses
     other = Specimen(specimen.masses, (k0, stiffer * k1, k2), specimen.dampings, 45e-6, specimen.contact)
-    motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
-    moved = linear_motion(AMPLIFIER, TABLE, other, frequency_hz).per_volt
+    motion = linear_motion(AMPLIFIER, SHAKER, specimen, frequency_hz)
+    moved = linear_motion(AMPLIFIER, SHAKER, other, frequency_hz).per_volt
     assert motion.stuck_motion + motion.lever * moved[:, [P]] == pytest.approx(moved, rel=1e-8)
     if stiffer > 1e6:
         assert motion.stuck_motion[:, M0] == pytest.approx(moved[:, M0], rel=1e-4)
@@ -98,7 +92,7 @@ def test_the_lever_ratio_predicts_the_response_with_a_changed_middle_spring(stif
 @given(st.floats(20.0, 600.0), st.floats(1e-7, 2e-3))
 def test_the_computed_voltage_gives_the_requested_base_motion(frequency_hz, base_m):
     specimen = gong2025()
-    motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
+    motion = linear_motion(AMPLIFIER, SHAKER, specimen, frequency_hz)
     volts = motion.volts_for(base_m, specimen.gap_m)
     per_base = motion.per_volt[0, P] / motion.per_volt[0, BASE]
     if abs(per_base) * base_m <= specimen.gap_m:
@@ -110,7 +104,7 @@ def test_the_computed_voltage_gives_the_requested_base_motion(frequency_hz, base
 @given(st.floats(20.0, 600.0), st.floats(1e-3, 10.0))
 def test_the_relative_displacement_of_the_closed_form_is_limited_to_the_gap(frequency_hz, volts):
     specimen = gong2025()
-    motion = linear_motion(AMPLIFIER, TABLE, specimen, frequency_hz)
+    motion = linear_motion(AMPLIFIER, SHAKER, specimen, frequency_hz)
     moved = motion.response(volts, specimen.gap_m)[0]
     free = volts * motion.per_volt[0]
     if abs(free[P]) <= specimen.gap_m:

@@ -6,20 +6,14 @@ import numpy as np
 import pytest
 
 from vibench.sim import base_transmissibility, gong2025
-from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, Amplifier, LoadedShaker, MotionFailed, Shaker
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, Amplifier, LoadedShaker, MotionFailed
+
+from .table_and_specimen import SHAKER, base_per_coil_volt
 
 AMPLIFIER = Amplifier(
     gain=10**0.5, low_cut_hz=0.3, high_cut_hz=30e3, clip_v=21.0, current_limit_a=5.0 * np.sqrt(2.0)
 )
-SHAKER = Shaker(
-    moving_mass_kg=0.127,
-    suspension_stiffness_n_per_m=9932.0,
-    suspension_damping_ns_per_m=21.51,
-    force_constant_n_per_a=6.78,
-    coil_resistance_ohm=2.6,
-    coil_inductance_h=1e-4,
-    stroke_m=4e-3,
-)
+STOPPED = replace(SHAKER, stroke_m=4e-3)
 RATE_HZ = 102_400.0
 STEP_S = 1 / RATE_HZ
 SECOND = int(RATE_HZ)
@@ -28,7 +22,7 @@ COLUMN = {name: number for number, name in enumerate(MOTION_COLUMNS)}
 
 
 def loaded_shaker(specimen=None, amplifier=AMPLIFIER, start=(0.0,) * 6):
-    return LoadedShaker(amplifier, SHAKER, specimen or gong2025(), STEP_S, start)
+    return LoadedShaker(amplifier, STOPPED, specimen or gong2025(), STEP_S, start)
 
 
 def tones(amplitude_v, frequencies_hz, seconds=1):
@@ -45,25 +39,6 @@ def settle(table, drive, seconds):
     return table.move(drive, np.zeros(len(drive)), len(drive))
 
 
-def stroke_per_volt(frequency_hz, specimen=None):
-    """Return displacement of table and m0 per input volt [m/V], in closed form with the specimen."""
-    s = 2j * np.pi * frequency_hz
-    dynamic = (
-        SHAKER.suspension_stiffness_n_per_m
-        + s * SHAKER.suspension_damping_ns_per_m
-        + s**2 * SHAKER.moving_mass_kg
-    )
-    moved = 1.0
-    if specimen is not None:
-        moved = base_transmissibility(specimen, frequency_hz)[:, 0]
-        dynamic = dynamic - (specimen.stiffnesses[0] + s * specimen.dampings[0]) * (moved - 1)
-    impedance = SHAKER.coil_resistance_ohm + s * SHAKER.coil_inductance_h
-    force_constant = SHAKER.force_constant_n_per_a
-    volts = amplifier_gain(frequency_hz)
-    base = force_constant * volts / (impedance * dynamic + s * force_constant**2)
-    return base, moved * base
-
-
 def amplifier_gain(frequency_hz):
     s = 2j * np.pi * frequency_hz
     low, high = 2 * np.pi * AMPLIFIER.low_cut_hz, 2 * np.pi * AMPLIFIER.high_cut_hz
@@ -71,10 +46,11 @@ def amplifier_gain(frequency_hz):
 
 
 def per_volt(frequency_hz, specimen=None):
-    """Return base acceleration and m0 velocity per input volt."""
+    """Return base acceleration and m0 velocity per input volt, in closed form with the specimen."""
     s = 2j * np.pi * frequency_hz
-    base, moved = stroke_per_volt(frequency_hz, specimen)
-    return s**2 * base, s * moved
+    base = amplifier_gain(frequency_hz) * base_per_coil_volt(frequency_hz, specimen)
+    moved = 1.0 if specimen is None else base_transmissibility(specimen, frequency_hz)[:, 0]
+    return s**2 * base, s * moved * base
 
 
 def lines(means):
@@ -185,8 +161,8 @@ def test_noise_is_added_at_the_amplifier_output():
 
 def test_the_rubber_stops_limit_the_stroke_and_their_contacts_are_counted():
     table = loaded_shaker()
-    free = abs(stroke_per_volt(8.0)[0]) * 6.0
-    stroke = SHAKER.stroke_m
+    free = 6.0 * abs(per_volt(8.0)[0]) / (2 * np.pi * 8.0) ** 2
+    stroke = STOPPED.stroke_m
     assert free > 1.2 * stroke
     motion = table.move(tones(6.0, [8.0]), np.zeros(SECOND), SECOND)
     reached = np.max(np.abs(motion.ends[:, COLUMN["base_displacement"]]))
@@ -266,9 +242,9 @@ def test_a_displaced_specimen_moves_the_undriven_table():
         (AMPLIFIER, {"high_cut_hz": 0.2}),
         (AMPLIFIER, {"clip_v": np.nan}),
         (AMPLIFIER, {"current_limit_a": 0.0}),
-        (SHAKER, {"moving_mass_kg": 0.0}),
-        (SHAKER, {"coil_inductance_h": np.inf}),
-        (SHAKER, {"stroke_m": np.nan}),
+        (STOPPED, {"moving_mass_kg": 0.0}),
+        (STOPPED, {"coil_inductance_h": np.inf}),
+        (STOPPED, {"stroke_m": np.nan}),
     ],
 )
 def test_impossible_amplifier_and_shaker_values_are_refused(part, wrong):
@@ -279,4 +255,4 @@ def test_impossible_amplifier_and_shaker_values_are_refused(part, wrong):
 @pytest.mark.parametrize("step_s", [0.0, -1.0, np.inf, np.nan])
 def test_an_invalid_time_step_is_refused(step_s):
     with pytest.raises(ValueError, match="Interval"):
-        LoadedShaker(AMPLIFIER, SHAKER, gong2025(), step_s)
+        LoadedShaker(AMPLIFIER, STOPPED, gong2025(), step_s)

@@ -6,33 +6,13 @@ import numpy as np
 import pytest
 
 from vibench.sim import base_transmissibility, gong2025
-from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier
 from vibench.sim.shaker.sampled_voltage import DrivenTable, follow_voltage
 
-SHAKER = Shaker(
-    moving_mass_kg=0.127,
-    suspension_stiffness_n_per_m=9932.0,
-    suspension_damping_ns_per_m=21.51,
-    force_constant_n_per_a=6.78,
-    coil_resistance_ohm=2.6,
-    coil_inductance_h=1e-4,
-)
+from .table_and_specimen import SHAKER, base_per_coil_volt
+
 SPECIMEN = gong2025()
 TABLE = DrivenTable(Amplifier(), SHAKER, SPECIMEN)
-
-
-def base_per_volt(frequency_hz):
-    """Return base acceleration per volt with the specimen on the table (Beranek's equations)."""
-    s = 2j * np.pi * frequency_hz
-    moved = base_transmissibility(SPECIMEN, frequency_hz)[:, :3] @ np.array(SPECIMEN.masses)
-    dynamic = (
-        SHAKER.suspension_stiffness_n_per_m
-        + SHAKER.suspension_damping_ns_per_m * s
-        + (SHAKER.moving_mass_kg + moved) * s**2
-    )
-    impedance = SHAKER.coil_resistance_ohm + SHAKER.coil_inductance_h * s
-    force_constant = SHAKER.force_constant_n_per_a
-    return s**2 * force_constant / (impedance * dynamic + s * force_constant**2)
 
 
 def complex_tones(samples, rate_hz, frequencies_hz):
@@ -52,7 +32,7 @@ def test_the_response_to_weak_tones_matches_the_closed_form_in_amplitude_and_pha
     motion = follow_voltage(TABLE, volts, rate_hz)
     base = complex_tones(motion.base_acceleration[: -round(rate_hz)], rate_hz, tones_hz)
     m0 = complex_tones(motion.m0_velocity[: -round(rate_hz)], rate_hz, tones_hz)
-    expected = 1e-3 * base_per_volt(tones_hz)
+    expected = 1e-3 * (2j * np.pi * tones_hz) ** 2 * base_per_coil_volt(tones_hz, SPECIMEN)
     np.testing.assert_allclose(base, expected, rtol=4e-5)
     through = base_transmissibility(SPECIMEN, tones_hz)[:, 0] / (2j * np.pi * tones_hz)
     np.testing.assert_allclose(m0, expected * through, rtol=4e-5)
