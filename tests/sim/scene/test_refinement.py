@@ -22,8 +22,9 @@ from vibench.sim import (
 )
 from vibench.sim.scene.mean_of_starts import mean_error
 
+from .predictions import errors, responses
+
 LAWS = ("hertz", "linear_gap", "power:3", "power:47", "rigid:0.8", "hunt_crossley:0.5")
-NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
 
 def target_scene(contact="hertz", frequency_hz=130.0, amplitude_m=20e-6, damping_s=2e-5, **target):
@@ -34,12 +35,8 @@ def target_scene(contact="hertz", frequency_hz=130.0, amplitude_m=20e-6, damping
 
 def errors_off(found, truth):
     """Return the deviation of each response from the truth, in units of its stated error."""
-    answers, errors, true = (
-        np.array([getattr(each, f"{name}{end}") for name in NAMES])
-        for each, end in ((found, ""), (found, "_error"), (truth, ""))
-    )
-    own = np.array([getattr(truth, f"{name}_error") for name in NAMES])
-    return np.abs(answers / true - 1.0) / (errors + own)
+    off = np.abs(responses(found) / responses(truth) - 1.0)
+    return off / (errors(found) + errors(truth))
 
 
 @pytest.mark.parametrize("contact", LAWS)

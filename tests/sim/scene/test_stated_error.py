@@ -9,20 +9,9 @@ from vibench.sim.scene.prediction import MotionKind
 from vibench.sim.scene.scatter import draws_apart
 from vibench.sim.scene.scene import FixedDuration, Given
 
-RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
+from .predictions import errors, responses, scene_of
+
 FROM_REST = FixedDuration(0.1, 0.05)
-
-
-def responses(found):
-    return np.array([getattr(found, name) for name in RESPONSES])
-
-
-def errors(found):
-    return np.array([getattr(found, f"{name}_error") for name in RESPONSES])
-
-
-def scene_of(contact, frequency_hz, amplitude_m, damping_time_s=2e-5, **options):
-    return Scene(gong2025(damping_time_s, contact=contact), Harmonic(frequency_hz, amplitude_m), **options)
 
 
 @pytest.mark.parametrize("accuracy", [Accuracy.QUICK, Accuracy.STANDARD])
