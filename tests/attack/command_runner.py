@@ -14,9 +14,11 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Self
 
 from .limits import MOST_BYTES, Case, Ending
@@ -31,8 +33,10 @@ ADDRESS_ROOM_BYTES = 4 * MOST_BYTES
 class CommandRunner:
     """Runs cases; use it in a ``with``."""
 
-    def __init__(self) -> None:
+    def __init__(self, variables: Mapping[str, str] = MappingProxyType({})) -> None:
+        """Start the process that imports everything, with additional environment variables."""
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
+        environment |= variables
         self._server = subprocess.Popen(
             [sys.executable, "-m", f"{__package__}.{Path(__file__).stem}"],
             stdin=subprocess.PIPE,

@@ -7,16 +7,13 @@ then run to its end. One process imports everything and forks itself for each ru
 
 import ctypes
 import errno
-import json
 import os
 import random
 import signal
 import sqlite3
 import subprocess
-import sys
 import tempfile
 import threading
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,9 +26,10 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.campaign import JournalPointState, read_journal, verify_recordings
 from vibench.acquisition.recording import RecordingState
 
+from .command_runner import ROOT, CommandRunner
+from .limits import Case, Ending
 from .tally import Finding, Shard, Tally
 
-ROOT = Path(__file__).resolve().parents[2]
 KILLS = 10
 """Largest number of kills of one campaign."""
 KINDS = ("moment", "write", "torn write", "sync", "rename", "commit")
@@ -74,36 +72,19 @@ settle_s = 0.3, duration_s = 0.5, seed = 2 }
 POINTS = {"virtual_rig": 4, "virtual_rig_streaming": 2}
 
 
-class KilledCampaigns:
+class KilledCampaigns(CommandRunner):
     """Runs campaigns in forks of one process; use it in a ``with``."""
 
     def __init__(self, library: Path | None = None) -> None:
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-        if library is not None:
-            environment |= {"LD_PRELOAD": str(library), LIBRARY: str(library)}
-        self._server = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__}.{Path(__file__).stem}"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-            env=environment,
-        )
+        super().__init__({} if library is None else {"LD_PRELOAD": str(library), LIBRARY: str(library)})
 
-    def run(self, folder: Path, *options: str, kind: str = "", number: int = 0, moment_s: float = 0.0) -> Any:
+    def measure(
+        self, folder: Path, *options: str, kind: str = "", number: int = 0, moment_s: float = 0.0
+    ) -> Ending:
         """Measure the campaign of a folder, or be killed at the n-th operation of a kind or at a moment."""
-        order = {"folder": str(folder), "options": options, "kind": kind, "number": number, "s": moment_s}
-        self._server.stdin.write(json.dumps(order) + "\n")
-        self._server.stdin.flush()
-        return json.loads(self._server.stdout.readline())
-
-    def __enter__(self) -> "KilledCampaigns":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._server.stdin.close()
-        self._server.wait()
-        self._server.stdout.close()
+        paths = ("campaign.toml", "--bench", "bench.toml", "--out", "out", "--check", "waived")
+        prepare = (__name__, kind, str(number), str(moment_s))
+        return self.run_in(folder, Case(("measure", *paths, *options), prepare=prepare, hangs_s=LONGEST_S))
 
 
 @dataclass(frozen=True)
@@ -208,7 +189,7 @@ def attack_one(
             kept = state_of(out) if out.exists() else SafeContent({}, {})
             kind = chance.choice(kinds)
             most = CALLS[kind.split()[0]] if kind in CALL_KINDS else MOST_OPERATIONS[kind]
-            ended = runs.run(
+            ended = runs.measure(
                 folder,
                 *(("--resume",) if out.exists() else ()),
                 kind=kind,
@@ -216,18 +197,20 @@ def attack_one(
                 moment_s=chance.uniform(0.0, LATEST_S),
             )
             said += [f"kill {attempt} ({kind}): {each}" for each in loss(kept, out)] if out.exists() else []
-            if kind in CALL_KINDS and ended["code"] == 1 and "Traceback" not in ended["err"]:
-                tally.count(kind, ended["took_s"])
+            if ended.clock_s > LONGEST_S:
+                return [*said, f"run {attempt} ({kind}) hangs"]
+            if kind in CALL_KINDS and ended.code == 1 and "Traceback" not in ended.err:
+                tally.count(kind, ended.clock_s)
                 continue
-            if ended["code"] != -signal.SIGKILL:
-                tally.count(f"not reached, exit {ended['code']}")
-                said += [f"run {attempt} ended with {ended['code']}: {ended['err']}"] if ended["code"] else []
+            if ended.code != -signal.SIGKILL:
+                tally.count(f"not reached, exit {ended.code}")
+                said += [f"run {attempt} ended with {ended.code}: {ended.err[-600:]}"] if ended.code else []
                 break
-            tally.count(kind, ended["took_s"])
+            tally.count(kind, ended.clock_s)
         kept = state_of(out) if out.exists() else SafeContent({}, {})
-        ended = runs.run(folder, *(("--resume",) if out.exists() else ()))
-        if ended["code"] != 0:
-            return [*said, f"the last run ended with {ended['code']}: {ended['err']}"]
+        ended = runs.measure(folder, *(("--resume",) if out.exists() else ()))
+        if ended.code != 0:
+            return [*said, f"the last run ended with {ended.code}: {ended.err[-600:]}"]
         return [*said, *loss(kept, out), *at_the_end(out, POINTS[bench])]
 
 
@@ -268,58 +251,13 @@ LATEST_S = 4.0
 """Approximate duration of such a run [s]."""
 
 
-def serve() -> None:
-    """Fork for each line of standard input, and print how the run ended."""
-    import vibench.cli.environment  # noqa: I001 - numpy reads its setting, so it comes first
-    import vibench.cli.__main__
-    import vibench.cli.measure  # noqa: F401
-
-    for line in sys.stdin:
-        order = json.loads(line)
-        with tempfile.TemporaryFile() as err:
-            began_s = time.monotonic()
-            number = os.fork()
-            if number == 0:
-                _become_run(order, err.fileno())
-            timer = threading.Timer(LONGEST_S, os.kill, (number, signal.SIGABRT))
-            timer.start()
-            _, status = os.waitpid(number, 0)
-            timer.cancel()
-            err.seek(0)
-            answer = {
-                "code": os.waitstatus_to_exitcode(status),
-                "took_s": time.monotonic() - began_s,
-                "err": err.read().decode(errors="replace")[-600:],
-            }
-        print(json.dumps(answer), flush=True)
-
-
-def _become_run(order: dict[str, Any], err: int) -> None:
-    """Run a campaign in this forked process; never returns."""
-    silent = os.open(os.devnull, os.O_RDWR)
-    os.dup2(silent, 0)
-    os.dup2(silent, 1)
-    os.dup2(err, 2)
-    os.chdir(order["folder"])
-    if order["kind"]:
-        _prepare_to_die(order["kind"], order["number"], order["s"])
-    if order["kind"] in CALL_KINDS:
-        call, when, fault = order["kind"].split()
-        arguments = (list(CALLS).index(call), order["number"], WHEN.index(when), FAULTS[fault])
+def prepare(kind: str, number: str, moment_s: str) -> None:
+    """Arrange in the process of a campaign how it ends."""
+    _prepare_to_die(kind, int(number), float(moment_s))
+    if kind in CALL_KINDS:
+        call, when, fault = kind.split()
+        arguments = (list(CALLS).index(call), int(number), WHEN.index(when), FAULTS[fault])
         ctypes.CDLL(os.environ[LIBRARY]).arm(*arguments, os.path.realpath("out").encode())
-    paths = ["campaign.toml", "--bench", "bench.toml", "--out", "out", "--check", "waived"]
-    sys.argv = ["vibench", "measure", *paths, *order["options"]]
-    code = 1
-    try:
-        from vibench.cli.__main__ import main
-
-        main()
-        code = 0
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else int(end.code is not None)
-    finally:
-        sys.stderr.flush()
-        os._exit(code)
 
 
 def _prepare_to_die(kind: str, number: int, moment_s: float) -> None:
@@ -386,7 +324,3 @@ def _deadly_connect(connect: Callable[..., Any], number: int) -> Callable[..., A
             return answer
 
     return lambda *given, **named: connect(*given, **{**named, "factory": Connection})
-
-
-if __name__ == "__main__":
-    serve()

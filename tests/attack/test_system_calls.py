@@ -250,8 +250,8 @@ def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
 def test_a_rename_that_succeeds_but_reports_an_error_does_not_end_the_campaign(library, tmp_path, number):
     recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     with KilledCampaigns(library) as runs:
-        run = runs.run(tmp_path, kind="rename after ENOSPC", number=number)
-    assert (run["code"], run["err"]) == (0, "")
+        run = runs.measure(tmp_path, kind="rename after ENOSPC", number=number)
+    assert (run.code, run.err) == (0, "")
     assert at_the_end(tmp_path / "out", 2) == []
 
 
@@ -261,13 +261,13 @@ def test_a_point_recovered_after_a_journal_failure_is_not_repeated(library, tmp_
     recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     out = tmp_path / "out"
     with KilledCampaigns(library) as runs:
-        refused = runs.run(tmp_path, kind="ftruncate before ENOSPC", number=4)
-        assert "All committed samples are safe in out/weak.h5.part" in refused["err"]
+        refused = runs.measure(tmp_path, kind="ftruncate before ENOSPC", number=4)
+        assert "All committed samples are safe in out/weak.h5.part" in refused.err
         # The seventh sync of a resume is the commit that would count the recovered recording.
-        refused = runs.run(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
-        assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused["err"]
+        refused = runs.measure(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
+        assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused.err
         assert [path.name for path in out.glob("*.h5*")] == ["weak.h5"]
         assert read_journal(out / "killed.campaign.sqlite")[0].state is JournalPointState.FAILED
-        resumed = runs.run(tmp_path, "--resume")
-    assert (resumed["code"], resumed["err"]) == (0, "")
+        resumed = runs.measure(tmp_path, "--resume")
+    assert (resumed.code, resumed.err) == (0, "")
     assert at_the_end(out, 2) == []
