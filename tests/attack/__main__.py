@@ -38,8 +38,6 @@ TARGETS: dict[str, Attack] = {
     "kills": recordings_kills.attack,
     "calls": recordings_kills.attack_calls,
     "dropouts": doubtful_recordings.attack_dropouts,
-    "drifts": doubtful_recordings.attack_drifts,
-    "steps": doubtful_recordings.attack_steps,
 }
 """All targets; each is attacked by one module."""
 
