@@ -4,20 +4,9 @@ import random
 import struct
 
 EDGES = (
-    0,
-    1,
-    2,
-    0x7F,
-    0x80,
-    0xFF,
-    0x7FFF,
-    0x8000,
-    0xFFFF,
-    0x7FFF_FFFF,
-    0x8000_0000,
-    0xFFFF_FFFF,
-    2**63,
-    2**64 - 1,
+    *(0, 1, 2),
+    *(edge for bits in (8, 16, 32) for edge in (2 ** (bits - 1) - 1, 2 ** (bits - 1), 2**bits - 1)),
+    *(2**63, 2**64 - 1),
 )
 """Values at which counts and lengths often fail."""
 FLOATS = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, -0.0, 0.0)
@@ -32,13 +21,6 @@ def mutate_bytes(content: bytes, chance: random.Random, others: tuple[bytes, ...
         changes.append(lambda held, by: _graft(held, by, by.choice(others)))
     for _ in range(chance.randint(1, MOST_AT_ONCE)):
         chance.choice(changes)(data, chance)
-    return bytes(data)
-
-
-def flip_bit(content: bytes, chance: random.Random) -> bytes:
-    """Flip one bit at a random position."""
-    data = bytearray(content)
-    _flip(data, chance)
     return bytes(data)
 
 

@@ -16,7 +16,7 @@ from vibench.acquisition.rig import load_rig
 from .byte_mutants import EDGES, mutate_bytes
 from .command_runner import ROOT
 from .json_mutants import mutate_json
-from .limits import LONGEST_S, MOST_BYTES
+from .limits import LONGEST_S
 from .served_process import ServedProcess
 from .tally import Finding, Shard, Tally
 
@@ -97,20 +97,10 @@ class Trial:
 
     def status_faults(self) -> tuple[str, ...]:
         """Request a status; return faults of the process: a traceback, too much memory or descriptors."""
-        process = self._process
         with EngineClient.attach(self._address) as client:
             client.stop("off")
             client.status()
-        more = process.descriptors - self.descriptors
-        return tuple(
-            said
-            for said, is_so in (
-                ("a traceback", "Traceback (most recent call last)" in process.err),
-                (f"took {process.peak_bytes / 1e6:.0f} MB", process.peak_bytes > MOST_BYTES),
-                (f"holds {more} descriptors more", more > DESCRIPTORS_MORE),
-            )
-            if is_so
-        )
+        return self._process.faults(self.descriptors + DESCRIPTORS_MORE)
 
     def _send_without_token(self, chance: random.Random) -> str:
         with closing(self._connect()) as stranger:

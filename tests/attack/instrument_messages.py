@@ -17,7 +17,7 @@ from google.protobuf.descriptor import FieldDescriptor
 from nidaqmx._stubs import nidaqmx_pb2
 
 from .byte_mutants import EDGES, mutate_bytes
-from .limits import LONGEST_S, MOST_BYTES
+from .limits import LONGEST_S
 from .served_process import ServedProcess
 from .tally import Finding, Shard, Tally
 from .text_mutants import NUMBERS, TEXTS
@@ -264,17 +264,6 @@ class Trial:
         return "answered"
 
 
-def faults(process: ServedProcess, before: int) -> tuple[str, ...]:
-    """Return faults of the process: a traceback, too much memory or too many descriptors."""
-    more = process.descriptors - before
-    found = (
-        ("a traceback", "Traceback (most recent call last)" in process.err),
-        (f"took {process.peak_bytes / 1e6:.0f} MB", process.peak_bytes > MOST_BYTES),
-        (f"holds {more} descriptors more", more > DESCRIPTORS_MORE),
-    )
-    return tuple(said for said, is_so in found if is_so)
-
-
 LOOK_EVERY = 50
 """Messages between two checks that all servers answer."""
 
@@ -303,6 +292,6 @@ def attack(shard: Shard) -> Tally:
             told, known = process.err.removeprefix(known), process.err
             tally.count(taken, time.monotonic() - began_s, process.peak_bytes)
             if found or told:
-                found = (*found, *faults(process, before))
+                found = (*found, *process.faults(before + DESCRIPTORS_MORE))
                 tally.findings.append(Finding(NAME, shard.seed, number, found, told[-900:]))
     return tally

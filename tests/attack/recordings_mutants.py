@@ -73,7 +73,7 @@ JSON_TEXTS = (
 )
 
 
-NOT_MADE = (OSError, RuntimeError, ValueError, TypeError, LookupError, OverflowError, MemoryError)
+NOT_MADE = (OSError, RuntimeError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError)
 """Exceptions if HDF5 refuses to write a mutant, or its declared size is too large to be read."""
 
 
@@ -115,16 +115,8 @@ def restructure(name: str, content: bytes, chance: random.Random) -> bytes:
             for _ in range(chance.randint(1, 3)):
                 try:
                     chance.choice(CHANGES)(file, chance)
-                except (
-                    OSError,
-                    RuntimeError,
-                    ValueError,
-                    TypeError,
-                    LookupError,
-                    ArithmeticError,
-                    MemoryError,
-                ):
-                    continue  # HDF5 refuses to write this file, or the file claims more data than it has
+                except NOT_MADE:
+                    continue
             if not name.endswith(".part"):
                 _change_seal(file, chance)
         return path.read_bytes()
@@ -242,9 +234,14 @@ def _replace_dataset(file: h5py.File, chance: random.Random) -> None:
     if chance.random() < 0.1:
         return
     made = file.create_dataset(name, data=value)
-    for key, each in attributes.items():
-        if key not in {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}:
-            made.attrs[key] = each
+    _restore_attributes(made, attributes)
+
+
+def _restore_attributes(made: h5py.Dataset, attributes: dict[str, Any]) -> None:
+    """Give a new dataset the attributes of the old one, except those that refer to other datasets."""
+    for name, value in attributes.items():
+        if name not in {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}:
+            made.attrs[name] = value
 
 
 def _declare(file: h5py.File, chance: random.Random) -> None:
@@ -255,9 +252,7 @@ def _declare(file: h5py.File, chance: random.Random) -> None:
     made = file.create_dataset(role, shape=(count,), dtype="i4", chunks=(51_200,), compression="gzip")
     if chance.random() < 0.5:
         made[:51_200] = 7
-    for key, each in attributes.items():
-        if key not in {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}:
-            made.attrs[key] = each
+    _restore_attributes(made, attributes)
     file.attrs["samples"] = count
 
 
@@ -279,9 +274,7 @@ def _add_external_link(file: h5py.File, chance: random.Random) -> None:
         case _:
             file[role] = h5py.SoftLink("/" + role)
             return
-    for key, each in kept.items():
-        if key not in {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}:
-            made.attrs[key] = each
+    _restore_attributes(made, kept)
 
 
 def _add_circular_link(file: h5py.File, _: random.Random) -> None:
@@ -338,9 +331,7 @@ def _change_result(file: h5py.File, chance: random.Random) -> None:
     made = group.create_dataset(
         name, data=chance.choice((np.zeros(3), np.array(b"{}"), np.zeros((2, 2), "i8"), 3.0))
     )
-    for key, each in attributes.items():
-        if key not in {"DIMENSION_LIST", "REFERENCE_LIST"}:
-            made.attrs[key] = each
+    _restore_attributes(made, attributes)
     if chance.random() < 0.7:
         for mark in [key for key in group.attrs if key.startswith("seal_")]:
             del group.attrs[mark]

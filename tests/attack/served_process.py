@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Self
 
 from .command_runner import ROOT
+from .limits import MOST_BYTES
 
 STARTING_S = 300.0
 """Time limit of a start [s]; the first start after a change of the simulation compiles its kernels."""
@@ -74,6 +75,15 @@ class ServedProcess:
     def descriptors(self) -> int:
         """Its number of open files and sockets."""
         return sum(1 for _ in Path(f"/proc/{self._process.pid}/fd").iterdir())
+
+    def faults(self, most_descriptors: int) -> tuple[str, ...]:
+        """Return its faults: a traceback, too much memory or too many open files and sockets."""
+        found = (
+            ("a traceback", "Traceback (most recent call last)" in self.err),
+            (f"took {self.peak_bytes / 1e6:.0f} MB", self.peak_bytes > MOST_BYTES),
+            (f"holds {self.descriptors} descriptors", self.descriptors > most_descriptors),
+        )
+        return tuple(said for said, is_so in found if is_so)
 
     def close(self) -> None:
         """End the process."""

@@ -2,7 +2,6 @@
 
 import json
 import re
-from unicodedata import category
 
 import h5py
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 from vibench.acquisition.recording import _seal
 from vibench.cli.__main__ import COMMANDS
 
+from ..attack.instrument_replies import harmful
 from ..attack.recordings_corpus import good_recordings
 
 HOSTILE = "a\x1b[2J\x1b]0;title\x07\x1b]52;c;Zm9v\x07\x9b31m\u202eb\u2066\x08\r\nerror: all is well\x7f$^$"
@@ -85,25 +85,18 @@ def cases(folder):
     }
 
 
-def harmful_characters(text):
-    """Return the characters that a terminal or a browser acts upon."""
-    return sorted(
-        {each for each in text if not (each.isprintable() or category(each) == "Zs" or each == "\n")}
-    )
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("command", COMMANDS)
 def test_no_command_prints_control_characters_of_a_name(vibench_here, folder, command):
     for arguments in cases(folder)[command]:
         ended = vibench_here(command, *arguments, cwd=folder)
         for said in (ended.stdout, ended.stderr):
-            assert harmful_characters(said) == [], (arguments, said)
+            assert harmful(said) == [], (arguments, said)
             assert FORGED.search(said) is None, (arguments, said)
             assert "Traceback" not in said
         if "--json" in arguments:
             json.loads(ended.stdout)
-    assert not harmful_characters("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
+    assert not harmful("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
 
 
 def test_the_report_shows_hostile_names_and_notes_as_text(vibench_here, folder, tmp_path):
@@ -111,6 +104,6 @@ def test_the_report_shows_hostile_names_and_notes_as_text(vibench_here, folder, 
     ended = vibench_here("analyse", path, "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert harmful_characters(text) == []
+    assert harmful(text) == []
     assert r"a\x1b[2J" in text
     assert r"\u202eb" in text
