@@ -105,12 +105,7 @@ def test_settings_are_edited_in_one_form_and_kept(window, qapp, tmp_path):
     dialog = SettingsDialog(window.context, window)
     points = qapp.font().pointSize()
     dialog.form.form.show_content(
-        {
-            "theme": "dark",
-            "font_pt": 12,
-            "patience_s": 4.0,
-            "recordings_folder": str(tmp_path / "elsewhere"),
-        }
+        {"theme": "dark", "font_pt": 12, "patience_s": 4.0, "recordings_folder": str(tmp_path / "elsewhere")}
     )
     try:
         dialog.accept()

@@ -5,8 +5,9 @@ from PySide6.QtCore import Qt
 
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.page.page import PageParts
+from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.notice import FILES, RIG, TEST
-from vibench.gui.widgets.theme import DARK
+from vibench.gui.widgets.theme import DARK, LIGHT
 from vibench.gui.window.window import PAGES, Window
 
 
@@ -54,6 +55,16 @@ def test_banner_and_stop_are_visible_on_every_page(lasting_window, qapp):
         lasting_window.show_page(name)
         qapp.processEvents()
         assert lasting_window.banner.isVisible(), name
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda theme: theme.name)
+def test_every_plot_follows_the_theme(lasting_window, qtbot, theme):
+    lasting_window.context.choose_theme(theme)
+    qtbot.waitUntil(lambda: lasting_window.is_themed, timeout=60_000)
+    for name, page in lasting_window.pages.items():
+        for plot in page.findChildren(Plot):
+            assert plot.backgroundBrush().color().name() == theme.base, (name, plot.accessibleName())
+    assert len(lasting_window.findChildren(Plot)) > 10
 
 
 @pytest.mark.thorough

@@ -123,11 +123,6 @@ def test_invalid_options_are_refused_with_an_explanation(page):
     assert page.panel.options().request.noise_ratio == 2.0
 
 
-def test_comparison_plots_follow_the_colour_theme(overlaid):
-    overlaid.retheme(DARK)
-    assert overlaid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
-
-
 @pytest.mark.thorough
 def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
     working, record_noise, tmp_path, wait_for

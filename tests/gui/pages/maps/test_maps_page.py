@@ -9,7 +9,6 @@ from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
 from vibench.analysis.prediction.progress import MapRequest
 from vibench.gui.pages.maps.maps_page import MapsPage
 from vibench.gui.widgets.notice import SIMULATE
-from vibench.gui.widgets.theme import DARK
 
 SMALL = {
     "start_hz": 100.0,
@@ -99,11 +98,6 @@ def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
     page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
     assert not page._begin.isEnabled()
     assert "810000 points are too many for the window" in page.form.complaint
-
-
-def test_the_page_follows_the_dark_theme(page):
-    page.retheme(DARK)
-    assert page.map.plot.backgroundBrush().color().name() == DARK.base
 
 
 def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):

@@ -18,7 +18,6 @@ from vibench.analysis.dynamics import (
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.plots.line_style import Dash
 from vibench.gui.widgets.notice import COMPARE
-from vibench.gui.widgets.theme import DARK
 from vibench.sim import Parameter
 
 
@@ -164,11 +163,6 @@ def test_invalid_inputs_disable_the_find_button(page):
     assert "one harmonic cannot describe hertz" in view.form.complaint
     view.form.form.show_content({})
     assert view._begin.isEnabled()
-
-
-def test_tabs_follow_the_dark_theme(page):
-    page.retheme(DARK)
-    page.refresh()
 
 
 @pytest.mark.parametrize("name", ["branches", "spectrum", "chain"])
