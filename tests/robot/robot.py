@@ -42,58 +42,18 @@ from vibench.gui.widgets.notice import TEST
 from vibench.gui.window.open_window import application
 from vibench.gui.window.window import PAGES, Window
 
+from ..gui.forms.bad_values import BAD
+
 NASTY = (
-    *(
-        "",
-        " ",
-        "-1",
-        "0",
-        "1",
-        "2",
-        "1e99",
-        "-1e99",
-        "1e-99",
-        "1e999",
-        "nan",
-        "inf",
-        "abc",
-        "½",
-        "5 µm",
-        "12 apples",
-    ),
-    *(
-        "9" * 300,
-        "../..",
-        "/",
-        "/proc/self/mem",
-        "a\x00b",
-        "%s%n",
-        "<b>x</b>",
-        "power:3",
-        "rigid:2",
-        "260",
-        "0.5",
-    ),
+    *BAD,
+    *("2", "0.5", "260", "power:3", "rigid:2", "../..", "/", "/proc/self/mem", "a\x00b", "%s%n", "<b>x</b>"),
 )
+"""Values to type: numbers that no field takes, and texts that harm files, markup or formats."""
 KEYS = tuple(
     getattr(Qt.Key, f"Key_{name}")
     for name in (
-        *(
-            "Tab",
-            "Backtab",
-            "Return",
-            "Space",
-            "Escape",
-            "F1",
-            "F5",
-            "F6",
-            "Up",
-            "Down",
-            "Left",
-            "Right",
-            "Home",
-        ),
-        *("End", "PageUp", "PageDown", "Delete", "Backspace", "Plus", "Minus", *"ADGLM", "Menu"),
+        *("Tab", "Backtab", "Return", "Space", "Escape", "F1", "F5", "F6", "Up", "Down", "Left", "Right"),
+        *("Home", "End", "PageUp", "PageDown", "Delete", "Backspace", "Plus", "Minus", *"ADGLM", "Menu"),
     )
 )
 CHORDS = tuple(getattr(Qt.Key, f"Key_{name}") for name in (*"1234567ZTCAV", "Return"))

@@ -1,4 +1,4 @@
-"""Every field of every form refuses 34 bad values in a sentence with its name and unit."""
+"""Every field of every form refuses bad values in a sentence with its name and unit."""
 
 from pathlib import Path
 
@@ -15,27 +15,7 @@ from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN, SPECTRUM
 from vibench.gui.pages.test.test_page import TestForm as FormOfATest
 from vibench.gui.window.menus import Preferences
 
-BAD = (
-    *("", " ", "abc", "-1", "0", "--5", "1e99", "-1e99", "1e-99", "1e999", "nan", "inf", "-inf", "½", "0x10"),
-    *("1,2,3", "1_000", "12 apples", "5 kg", "9" * 400),
-    *(
-        "1e",
-        "−5",
-        "3 3",
-        "5 µm µm",
-        "7 mm/s/V",
-        "100 %",
-        "∞",
-        "true",
-        "{",
-        '"',
-        "\\",
-        "1e-400",
-        "5 \n6",
-        "\u200b5",
-    ),
-)
-
+from .bad_values import BAD
 
 SWEEP = SineSweep(amplitude_vpp=0.5, start_hz=150.0, stop_hz=300.0, duration_s=5.0)
 
