@@ -15,19 +15,13 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from independent_solution import (
     STATE_UNITS,
-    Place,
     independent_state,
-    law_of,
-    numbers_of,
-    rates_at,
     state_error,
 )
-from scipy.integrate import solve_ivp
 from stroboscopic_section import stroboscopic_section
 
 from vibench.sim.exponents.lyapunov import lyapunov_exponent
@@ -217,25 +211,12 @@ class LevelFigures:
 
 
 @dataclass(frozen=True)
-class SolverFigures:
-    """Figures of a general solver on one motion."""
-
-    name: str
-    cost: float
-    """Processor time over simulated time."""
-    state_error: float | None
-    """Error against the independent solution, over the shorter span for general solvers."""
-
-
-@dataclass(frozen=True)
 class MotionBenchmark:
-    """Cost and error of all levels and solvers on one motion."""
+    """Cost and error of all levels on one motion."""
 
     motion: Motion
     span_s: float
-    solver_span_s: float
     levels: tuple[LevelFigures, ...]
-    solvers: tuple[SolverFigures, ...]
 
     @property
     def advice(self) -> str:
@@ -319,9 +300,6 @@ class AccuracyBenchmark:
 
 
 LEVELS = tuple(Accuracy)
-Solver = Literal["DOP853", "LSODA", "Radau"]
-SOLVERS: tuple[Solver, ...] = ("DOP853", "LSODA", "Radau")
-SOLVER_RTOL, SOLVER_ATOL = 1e-6, 1e-12
 SETTLE_S = 8.0
 """Settling time [s]: thirty times the slowest decay time of the specimen without contact."""
 PERIODS_SEEN = 100
@@ -346,8 +324,6 @@ class Thoroughness:
 
     span_s: float = 0.5
     """Time span of the comparison with the independent solution [s]."""
-    solver_span_s: float = 0.05
-    """Time span for general solvers, which are slow [s]."""
     starts: int = 200
     """Number of initial states for comparison, of a scene with sensitive dependence on them."""
 
@@ -382,19 +358,14 @@ def measure_accuracy(
 
 
 def measure_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
-    """Measure cost and error of all levels and solvers on one motion, from its settled state."""
+    """Measure cost and error of all levels on one motion, from its settled state."""
     start = settled_state(motion)
     span_s = _whole(thoroughness.span_s, motion)
-    solver_span_s = _whole(thoroughness.solver_span_s, motion)
-    is_chaotic = motion.regime is Regime.CHAOTIC
-    truths = [None if is_chaotic else _truth(motion, span, start) for span in (span_s, solver_span_s)]
+    truth = None if motion.regime is Regime.CHAOTIC else _truth(motion, span_s, start)
     costs = _costs(motion, start)
     responses = {level: _responses(motion, level, start) for level in LEVELS}
-    levels = tuple(
-        _level(motion, level, costs[level], responses, start, span_s, truths[0]) for level in LEVELS
-    )
-    solvers = tuple(_solver(name, motion, start, solver_span_s, truths[1]) for name in SOLVERS)
-    return MotionBenchmark(motion, span_s, solver_span_s, levels, solvers)
+    levels = tuple(_level(motion, level, costs[level], responses, start, span_s, truth) for level in LEVELS)
+    return MotionBenchmark(motion, span_s, levels)
 
 
 def measure_transient(motion: Motion) -> tuple[TransientFigures, ...]:
@@ -509,23 +480,6 @@ def _level(
         exponent_per_s=exponent.exponent_per_s,
         exponent_error_per_s=exponent.standard_error_per_s,
     )
-
-
-def _solver(
-    name: Solver, motion: Motion, start: Floats, span_s: float, truth: Floats | None
-) -> SolverFigures:
-    rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
-    rates(0.0, start)
-    ends: list[Floats] = []
-
-    def run() -> None:
-        found = solve_ivp(
-            rates, (0.0, span_s), start, method=name, rtol=SOLVER_RTOL, atol=SOLVER_ATOL, t_eval=[span_s]
-        )
-        ends.append(found.y[:, -1])
-
-    cost = _run_time_s(run) / span_s
-    return SolverFigures(name, cost, None if truth is None else state_error(ends[0], truth))
 
 
 def _machine() -> str:

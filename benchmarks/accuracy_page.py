@@ -15,7 +15,6 @@ from accuracy_motions import (
     LevelFigures,
     LotteryFigures,
     MotionBenchmark,
-    SolverFigures,
     StatedShare,
     Thoroughness,
     TransientFigures,
@@ -62,11 +61,9 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "- state error: the largest error of the six components of the state, in the units above. The true",
         "  state is an independent solution: scipy's DOP853 at 1e-12, restarted at every contact;",
         "- Response I and II errors: relative differences from the Responses at level `reference`;",
-        "- the largest Lyapunov exponent, with its standard error;",
-        "- speed and state error of scipy's solvers at relative tolerance 1e-6.",
+        "- the largest Lyapunov exponent, with its standard error.",
         "",
-        f"States are compared after {first.span_s:.3g} s, those of scipy's solvers",
-        f"after about {first.solver_span_s:.1g} s.",
+        f"States are compared after {first.span_s:.3g} s.",
     )
     for each in benchmark.motions:
         yield from _motion(each)
@@ -158,8 +155,6 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
     )
     for level in found.levels:
         yield _level(level)
-    solvers = "; ".join(map(_solver, found.solvers))
-    yield from ("", f"scipy's speed [s/s] (state error): {solvers}.")
 
 
 def _level(level: LevelFigures) -> str:
@@ -169,11 +164,6 @@ def _level(level: LevelFigures) -> str:
     exponent = f"{level.exponent_per_s:.4g} ± {level.exponent_error_per_s:.1g}"
     cells = (_number(level.state_error), first, _number(level.response_ii_error), exponent)
     return f"| **{level.accuracy.value}** | {1 / level.cost:.0f} | {' | '.join(cells)} |"
-
-
-def _solver(solver: SolverFigures) -> str:
-    error = "" if solver.state_error is None else f" ({_number(solver.state_error)})"
-    return f"{solver.name} {1 / solver.cost:.2g}{error}"
 
 
 def _number(value: float | None) -> str:

@@ -11,7 +11,7 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
         LevelFigures(accuracy, cost, error, 0.0, 0.0, 1.0, 0.032, -2.0, 0.0)
         for accuracy, cost, error in zip(Accuracy, (1e-3, 1.1e-3, 2e-3), state_errors, strict=True)
     )
-    return MotionBenchmark(Motion(regime, "power:3", 150.0, 10e-6), 2.0, 0.05, levels, ())
+    return MotionBenchmark(Motion(regime, "power:3", 150.0, 10e-6), 2.0, levels)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks.accuracy_motions import (
     MOTIONS,
-    SOLVERS,
     Motion,
     Regime,
     Thoroughness,
@@ -15,7 +14,7 @@ from benchmarks.accuracy_motions import (
 from benchmarks.independent_solution import independent_state, state_error
 from vibench.sim import Accuracy, integrate
 
-SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
+SHORT = Thoroughness(span_s=0.05)
 
 
 @pytest.mark.parametrize(
@@ -35,8 +34,6 @@ def test_higher_accuracy_levels_improve_periodic_motion_and_not_chaos():
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error
     assert quick.response_i_error > reference.response_i_error == 0.0
-    assert [each.name for each in periodic.solvers] == list(SOLVERS)
-    assert all(each.cost > 20 * reference.cost for each in periodic.solvers)
     assert Accuracy.REFERENCE not in [level.accuracy for level, _ in periodic.without_gain]
 
 
