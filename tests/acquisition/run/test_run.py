@@ -405,7 +405,7 @@ class TestStopLevels:
         assert took_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
         assert_ended_without_a_jump(bench)
 
-    def test_an_immediate_stop_acts_before_the_next_read(self, bench, tmp_path):
+    def test_an_immediate_stop_acts_before_the_next_read(self, bench, tmp_path, monkeypatch):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         was_on = []
         waiting = property(lambda _: was_on.append(bench.world.is_on) or 0)
