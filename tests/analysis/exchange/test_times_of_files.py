@@ -369,11 +369,13 @@ def test_times_that_do_not_increase_are_refused(tmp_path, order, heading):
         import_recording(tmp_path / "a.csv", mapping("csv", RATE_HZ), tmp_path / "made.h5")
 
 
-@pytest.mark.parametrize("heading", ["t", "T", "Temps"])
-def test_a_column_named_t_with_another_quantity_is_not_read_as_time(tmp_path, heading):
+@pytest.mark.parametrize("heading", ["t", "T", "Temps", "position"])
+def test_a_column_of_another_quantity_is_not_read_as_time(tmp_path, heading):
     rng = np.random.default_rng(4)
     torque, warmth = rng.standard_normal(SAMPLES), np.round(np.linspace(20.0, 21.0, SAMPLES), 2)
     other = torque if heading == "t" else warmth + 0.01 * rng.integers(-1, 2, SAMPLES)
+    if heading == "position":
+        other = np.linspace(0.0, 6.0, SAMPLES) + 2e-4 * rng.standard_normal(SAMPLES)
     signal = motion(np.arange(SAMPLES) / RATE_HZ)
     rows = (f"{t:.7g};{x:.9g};{2 * x:.9g}\n" for t, x in zip(other, signal, strict=True))
     (tmp_path / "a.csv").write_text(f"{heading};a;b\n" + "".join(rows))

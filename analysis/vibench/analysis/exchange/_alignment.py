@@ -309,7 +309,8 @@ def _begin(block: Reals) -> "_Scan | None":
     digit = float(np.max(_resolution(block[np.newaxis], typical)))
     if np.count_nonzero(is_off) > many:
         is_repeated = np.count_nonzero(intervals == 0) > many
-        return _Scan(mean, float(np.quantile(rising, 0.01)) if is_repeated else digit)
+        rounding = float(np.quantile(rising, 0.01)) if is_repeated else digit
+        return _Scan(mean, rounding, is_inferred=True)
     are_many_lost = bool(np.count_nonzero(~is_near) > many)
     # Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
     # later times away from a line; rounding moves each time by half a digit at most.

@@ -57,23 +57,6 @@ def id_line(text: str) -> str:
     return f"{text.strip() or 'NONE':<{ID_WIDTH}.{ID_WIDTH}}"
 
 
-def rate_line(sample_rate_hz: float, first_sample: int, origin: Origin) -> str:
-    """Return an ID line with the exact sample rate and the origin."""
-    return f"sample_rate_hz={sample_rate_hz!r} first_sample={first_sample} origin={origin.value}"
-
-
-def exact_rate_hz(line: str) -> float | None:
-    """Return the sample rate from a line of :func:`rate_line`; None for other lines."""
-    found = RATE.search(line)
-    return None if found is None else float(found[1])
-
-
-def read_origin(line: str) -> Origin | None:
-    """Return the origin from a line of :func:`rate_line`; None for other lines."""
-    found = ORIGIN.search(line)
-    return None if found is None else Origin(found[1])
-
-
 SI_UNITS = (
     f"{DELIMITER}\n   164\n{1:10d}{'SI: metre (newton)':<20.20}{2:10d}\n"
     + "".join(f"{factor:25.16E}" for factor in (1.0, 1.0, 1.0))
@@ -109,7 +92,7 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
     yield id_line(f"{excerpt.name} {recording.recording_id}")
     yield id_line(date_line(recording.started_utc))
     yield id_line(str(recording.plan.get("name", "")))
-    yield id_line(rate_line(rate, excerpt.start, recording.origin))
+    yield id_line(f"sample_rate_hz={rate!r} first_sample={excerpt.start} origin={recording.origin.value}")
     point = f" {'NONE':<10}{number:10d}{SCALAR:4d} {'NONE':<10}{0:10d}{0:4d}"
     yield f"{TIME_RESPONSE:5d}{number:10d}{0:5d}{0:10d}{point}"
     times = f"{excerpt.start / rate:13.5E}{1 / rate:13.5E}{0:13.5E}"
@@ -258,7 +241,8 @@ def _skip_text(file: BinaryIO) -> None:
 
 
 def _channel(number: int, header: list[str], length: str) -> SourceChannel:
-    rates = [rate for line in header[:5] if (rate := exact_rate_hz(line)) is not None]
+    rates = [float(found[1]) for line in header[:5] if (found := RATE.search(line))]
+    origins = [Origin(found[1]) for line in header[:5] if (found := ORIGIN.search(line))]
     label = header[0].strip()
     unit, start, increment = header[7][46:66].strip(), _real(header[6][30:43]), _real(header[6][43:56])
     second = SECONDS.get(unit.casefold())
@@ -278,7 +262,7 @@ def _channel(number: int, header: list[str], length: str) -> SourceChannel:
         samples=int(header[6][10:20]),
         label="" if label == "NONE" else label,
         sample_rate_hz=rates[0] if rates else None,
-        origin=next(filter(None, map(read_origin, header[:5])), None),
+        origin=origins[0] if origins else None,
         unit=own,
         quantity="" if own else quantities.get(kind, ""),
         stated_scale=f"direction = {direction}" if direction.startswith("-") else "",
