@@ -123,6 +123,8 @@ def test_units_after_other_separators_in_names_set_the_scales(tmp_path, head):
         ("t,u,a [g],v\ns,V,m/s2,m/s", "is in 'g or m/s2'"),
         ("t,u,a,v\ns,V,m/s2,m/s\ns,V,g,mm/s", "is in 'm/s2 or g'"),
         ("t,u,sensor g,v", r"is in 'g\?'"),
+        ("t,u,a,v at 40 mm", r"is in 'mm\?'"),
+        ("t,u,a (100 mV/g),v", "is in '100 mV/g'"),
         ("Scale,1,9.80665,0.001\nt,u,a,v", "states Scale = 9.80665 for 3, but not whether"),
         ("# gain of v: 1\n# v gain: 0.001\nt,u,a,v", "states gain = 0.001 for 4, but not whether"),
     ],

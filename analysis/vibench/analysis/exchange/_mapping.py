@@ -44,8 +44,11 @@ def unit_in_name(name: str) -> str:
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
         # DIN 461 writes "a / Gal". More than four letters after " / " may belong to the name of the channel.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
-        if unit == "g" and found[0].isspace():
-            return "g?"  # a unit, or the name of a channel
+        before = re.split(r"[\s(\[]", name[: found.start()])[-1]
+        if found[0] == "/" and is_known and size_of_unit(before, "V") is not None:
+            return f"{before}/{unit}"  # the sensitivity of a sensor
+        if is_known and found[0].isspace() and (unit == "g" or before[-1:].isdigit()):
+            return f"{unit}?"  # a unit, or part of a name such as "sensor g" or "at 40 mm"
         if sign == "[" or is_unknown or (is_known and (not is_letter or (unit == "g" and sign))):
             return unit
     return ""
