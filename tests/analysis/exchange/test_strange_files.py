@@ -453,6 +453,25 @@ def test_a_unit_or_scale_that_changes_within_a_tdms_file_is_refused(tmp_path, fa
         read_import(tmp_path / "a.tdms")
 
 
+@pytest.mark.parametrize("mark", [-999.0, -9999.0, 32767.0])
+@pytest.mark.parametrize("suffix", [".csv", ".mat", ".h5"])
+def test_numbers_that_mark_lost_samples_are_refused(tmp_path, suffix, mark):
+    columns = dict(zip("uav", signal(TIMES), strict=True))
+    columns["v"][700:710] = mark
+    path, names = tmp_path / f"a{suffix}", "uav"
+    if suffix == ".csv":
+        text(path, "u,a,v", columns.values())
+    elif suffix == ".mat":
+        savemat(path, columns)
+    else:
+        hdf5(path, columns)
+        names = ("/u", "/a", "/v")
+    with pytest.raises(
+        UnusableData, match=rf"has 10 samples of exactly {abs(mark):g} or .* marked lost samples"
+    ):
+        read_import(path, names)
+
+
 @pytest.mark.parametrize("peak", [0.9, 1.5])
 def test_floating_point_sound_within_full_scale_needs_a_scale(tmp_path, peak):
     """Floats in sound files are usually fractions of full scale; larger values cannot be."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from itertools import groupby, pairwise
-from math import frexp
+from math import frexp, inf
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +118,8 @@ FARTHEST = 2.0**62
 """Sample number beyond the end of any file."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e30
 """Allowed range of a channel's largest value; values outside it suggest a wrongly stated byte order."""
+_LEAST_MARK = 99.0
+"""Smallest number that may mark lost samples, such as 99 or -9999."""
 NEAR_FULL_SCALE = 0.95
 """Share of full scale at and above which a sample counts as overloaded, as during acquisition."""
 
@@ -249,7 +251,7 @@ def _header(name: str, source: Source, each: _ChannelImport) -> ChannelHeader:
         unit=unit,
         physical_per_volt=factor,
         physical_offset=mapped.offset,
-        range_v=_power_of_two_above(_peak(source, found), name) if full_scale is None else full_scale,
+        range_v=_power_of_two_above(_peak(source, found, name), name) if full_scale is None else full_scale,
         volts_per_count=found.step,
         coupling=mapped.coupling,
         sensitivity=mapped.sensitivity,
@@ -261,11 +263,21 @@ def _header(name: str, source: Source, each: _ChannelImport) -> ChannelHeader:
     )
 
 
-def _peak(source: Source, channel: SourceChannel) -> float:
-    peak = 0.0
-    for block in source.blocks(channel):
-        values = np.abs(block)
-        peak = max(peak, float(values[np.isfinite(values)].max(initial=0.0)))
+def _peak(source: Source, channel: SourceChannel, name: str) -> float:
+    """Return the largest magnitude; raises UnusableData if it seems to mark lost samples, such as -9999."""
+
+    def largest(below: float) -> float:
+        blocks = map(np.abs, source.blocks(channel))
+        return max((float(each[each < below].max(initial=0.0)) for each in blocks), default=0.0)
+
+    peak = largest(inf)
+    if peak >= _LEAST_MARK and peak == round(peak) and 0 < 100 * largest(peak) < peak:
+        count = sum(int(np.count_nonzero(np.abs(each) == peak)) for each in source.blocks(channel))
+        if count > 1:
+            raise UnusableData(
+                f"{name} has {count} samples of exactly {peak:g} or -{peak:g} in {channel.name}, over 100 times "
+                "its other values, as if they marked lost samples; replace them by nan"
+            )
     return peak
 
 
