@@ -275,8 +275,8 @@ def _peak(source: Source, channel: SourceChannel, name: str) -> float:
         count = sum(int(np.count_nonzero(np.abs(each) == peak)) for each in source.blocks(channel))
         if count > 1:
             raise UnusableData(
-                f"{name} has {count} samples of exactly {peak:g} or -{peak:g} in {channel.name}, over 100 times "
-                "its other values, as if they marked lost samples; replace them by nan"
+                f"{name} has {count} samples of exactly {peak:g} or -{peak:g} in {channel.name}, over 100 "
+                "times its other values, as if they marked lost samples; replace them by nan"
             )
     return peak
 

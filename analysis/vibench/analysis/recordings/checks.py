@@ -222,12 +222,10 @@ def _scales(facts: RecordingFacts) -> Iterator[Check]:
 def _is_acceleration(role: str, bench: Mapping[str, Any]) -> bool:
     """Return False if a channel was imported from the drive, or from a file that states another quantity."""
     imported = bench.get("imported", {})
-    mapped = {each["role"]: each for each in imported.get("mapping", {}).get("channels", ())}
-    units = dict(zip(mapped, (each["unit"] for each in imported.get("channels", ())), strict=False))
-    if role not in mapped:
-        return True
-    unit = mapped[role]["file_unit"] or units[role]
-    is_drive = DRIVE in mapped and mapped[DRIVE]["source"] == mapped[role]["source"]
+    both = zip(imported.get("mapping", {}).get("channels", ()), imported.get("channels", ()), strict=False)
+    known = {one["role"]: (one["source"], one["file_unit"] or other["unit"]) for one, other in both}
+    source, unit = known.get(role, ("", ""))
+    is_drive = source != "" and source == known.get(DRIVE, ("",))[0]
     return not is_drive and (not unit or size_of_unit(unit, "m s-2") is not None)
 
 
