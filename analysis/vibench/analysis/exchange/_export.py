@@ -125,23 +125,13 @@ def _tables(recording: Recording) -> Iterator[Table]:
 def _table(name: str, arrays: Mapping[str, ResultArray], axes: tuple[str, ...]) -> Table:
     """Return one table of all values over the same axes, with one row per grid point."""
     grid = np.meshgrid(*(arrays[axis].values for axis in axes), indexing="ij")
-    columns = {_heading(axis, arrays[axis].unit): values for axis, values in zip(axes, grid, strict=True)}
+    columns = {f"{axis} [{arrays[axis].unit}]": values for axis, values in zip(axes, grid, strict=True)}
     for key, array in arrays.items():
         if array.axes == axes:
-            columns.update(_columns(key, array))
+            values = array.values
+            parts = {"_real": values.real, "_imag": values.imag} if np.iscomplexobj(values) else {"": values}
+            columns.update({f"{key}{part} [{array.unit}]": each for part, each in parts.items()})
     return table(name, **columns)
-
-
-def _columns(key: str, array: ResultArray) -> Iterator[tuple[str, Any]]:
-    if np.iscomplexobj(array.values):
-        yield _heading(f"{key}_real", array.unit), array.values.real
-        yield _heading(f"{key}_imag", array.unit), array.values.imag
-    else:
-        yield _heading(key, array.unit), array.values
-
-
-def _heading(name: str, unit: str) -> str:
-    return f"{name} [{unit}]"
 
 
 class Format(StrEnum):

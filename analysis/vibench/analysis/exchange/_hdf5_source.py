@@ -64,15 +64,11 @@ def _readers(file: h5py.File) -> Iterator[tuple[SourceChannel, Read]]:
         own = own_facts((*beside, *named), dataset.name.rsplit("/", 1)[-1])
         facts = (*dataset.attrs.items(), *own, *beside, *_facts_above(dataset.parent, known))
         times = stated_times(facts, elsewhere)
-        if dataset.ndim == 1:
-            channel = _channel(dataset, dataset.name, dataset.shape[0], 0, own, beside)
-            yield replace(channel, **times), partial(_read, file, dataset.name, 0, 0)
-            continue
-        axis = int(dataset.shape[0] < dataset.shape[1])
-        samples, rows = dataset.shape[axis], dataset.shape[1 - axis]
+        axis = int(dataset.ndim == 2 and dataset.shape[0] < dataset.shape[1])
+        rows = dataset.size // dataset.shape[axis]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            channel = _channel(dataset, name, samples, row, own, beside)
+            channel = _channel(dataset, name, dataset.shape[axis], row, own, beside)
             yield replace(channel, **times), partial(_read, file, dataset.name, axis, row)
 
 
