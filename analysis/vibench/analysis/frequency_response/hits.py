@@ -161,8 +161,7 @@ def hit_spectra(
     """
     rate, size = settings.sample_rate_hz, hits.segment_samples
     # A free body keeps its velocity after a hit, so only the level before the hit is known to be zero.
-    rest = max(round(rate / high_hz), 1)
-    data = data - np.mean(data[..., :rest], axis=2, keepdims=True)
+    data = data - np.mean(data[..., : max(round(rate / high_hz), 1)], axis=2, keepdims=True)
     levels = np.sqrt([np.mean(part**2) for part in np.array_split(data[:, 2], _PARTS, axis=1)])
     lasting = np.log(max(levels[-1] / max(np.max(levels), _NOTHING) / _REMAINDER, 1.0)) if fades else 0.0
     decay_per_s = float(lasting) * rate / size

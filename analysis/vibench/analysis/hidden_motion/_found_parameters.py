@@ -46,12 +46,8 @@ _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
 """Relative standard error of a squared frequency due to the unknown clock error of up to 50 ppm."""
 _COARSE_HZ = 12_800.0
 _COARSE_SD = {
-    Hidden.LOWER_GAP: 2e-4,
-    Hidden.UPPER_GAP: 2e-4,
-    Hidden.MEAN_GAP: 2e-4,
-    Hidden.C0: 5e-4,
-    Hidden.C1: 1.5e-2,
-    Hidden.C2: 1e-3,
+    **dict.fromkeys((Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.MEAN_GAP), 2e-4),
+    **{Hidden.C0: 5e-4, Hidden.C1: 1.5e-2, Hidden.C2: 1e-3},
 }
 """Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; it is proportional to the
 squared sample interval."""

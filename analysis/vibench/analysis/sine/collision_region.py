@@ -116,7 +116,9 @@ def collisions(sweep: SweptMotion) -> Collisions:
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
     fundamental = np.abs(sweep.velocity.order(1.0))
-    noise = _noise(sweep, residual, fundamental)
+    smallest = float(np.quantile(residual, _QUIET_QUANTILE))
+    can_be_smooth = _SMOOTH_AT_MOST * float(np.median(fundamental))
+    noise = max(sweep.noise_rms, min(smallest, can_be_smooth / _NOISE_FACTOR))
     votes = max(1, round(_VOTE_S / sweep.interval_s))
     if votes >= residual.size:
         raise InvalidRequest(
@@ -178,12 +180,6 @@ def _seen_impacts(sweep: SweptMotion) -> Flags:
     return seen
 
 
-def _noise(sweep: SweptMotion, residual: Reals, fundamental: Reals) -> float:
-    quiet = float(np.quantile(residual, _QUIET_QUANTILE))
-    smooth = _SMOOTH_AT_MOST * float(np.median(fundamental))
-    return max(sweep.noise_rms, min(quiet, smooth / _NOISE_FACTOR))
-
-
 def _majority(above: Flags, votes: int) -> Flags:
     """Return whether most neighbours of each interval are flagged; one-sided at the ends of the sweep."""
     total = np.concatenate(([0], np.cumsum(above)))
@@ -196,35 +192,24 @@ def _merged_runs(flags: Flags, gap: int) -> list[tuple[int, int]]:
     """Return first and last index of each run of flags; runs at most ``gap`` apart are joined."""
     merged: list[tuple[int, int]] = []
     for first, stop in runs_of(flags).tolist():
-        if merged and first - merged[-1][1] <= gap:
-            merged[-1] = (merged[-1][0], stop - 1)
-        else:
-            merged.append((first, stop - 1))
+        is_near = bool(merged) and first - merged[-1][1] <= gap
+        merged.append((merged.pop()[0] if is_near else first, stop - 1))
     return merged
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
     """Move the ends of a colliding run, blurred by the majority vote, to the split with fewest errors."""
     half = votes // 2 + 1
-    begin = _best_split(above, max(0, first - half), min(first + half, last))
-    end = (
-        above.size
-        - 1
-        - _best_split(
-            above[::-1],
-            above.size - 1 - min(above.size - 1, last + half),
-            above.size - 1 - max(last - half, begin),
-        )
-    )
-    return begin, max(begin, end)
+    low = max(0, first - half)
+    begin = low + _best_split(above[low : min(first + half, last) + 1])
+    low, high = max(last - half, begin), min(last + half, above.size - 1)
+    return begin, high - _best_split(above[low : high + 1][::-1])
 
 
-def _best_split(above: Flags, low: int, high: int) -> int:
+def _best_split(part: Flags) -> int:
     """Return the first interval of a region: fewest flags before and fewest gaps after it."""
-    part = above[low : high + 1]
-    before = np.concatenate(([0], np.cumsum(part)[:-1]))
-    after = np.cumsum(~part[::-1])[::-1]
-    return low + int(np.argmin(before + after))
+    before, after = np.cumsum(part) - part, np.cumsum(~part[::-1])[::-1]
+    return int(np.argmin(before + after))
 
 
 def _region(
