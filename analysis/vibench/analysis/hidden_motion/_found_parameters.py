@@ -45,10 +45,8 @@ _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
 """Relative standard error of a squared frequency due to the unknown clock error of up to 50 ppm."""
 _COARSE_HZ = 12_800.0
-_COARSE_SD = {
-    **dict.fromkeys((Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.MEAN_GAP), 2e-4),
-    **{Hidden.C0: 5e-4, Hidden.C1: 1.5e-2, Hidden.C2: 1e-3},
-}
+_GAPS = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.MEAN_GAP)
+_COARSE_SD = {Hidden.C0: 5e-4, Hidden.C1: 1.5e-2, Hidden.C2: 1e-3, **dict.fromkeys(_GAPS, 2e-4)}
 """Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; it is proportional to the
 squared sample interval."""
 _ONE_SIDED_SD = {

@@ -208,7 +208,8 @@ def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int
 
 def _best_split(part: Flags) -> int:
     """Return the first interval of a region: fewest flags before and fewest gaps after it."""
-    before, after = np.cumsum(part) - part, np.cumsum(~part[::-1])[::-1]
+    before = np.concatenate(([0], np.cumsum(part)[:-1]))
+    after = np.cumsum(~part[::-1])[::-1]
     return int(np.argmin(before + after))
 
 
