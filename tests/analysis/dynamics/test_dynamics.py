@@ -138,6 +138,35 @@ def test_a_file_without_branches_is_refused(tmp_path):
         read_diagram(tmp_path)
 
 
+def replace_column(group, values):
+    del group["response_i"]
+    group["response_i"] = values
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda group: replace_column(group, group["response_i"][:-1]),
+        lambda group: replace_column(group, group["response_i"][:, 0]),
+        lambda group: replace_column(group, "text"),
+        lambda group: replace_column(group, h5py.ExternalLink("other.h5", "x")),
+        lambda group: group.attrs.__setitem__("periods", "text"),
+        lambda group: group["events"].pop("index"),
+        lambda group: group.file.attrs.__setitem__("format_version", 99),
+    ],
+)
+def test_a_changed_branch_file_is_refused(tmp_path, change):
+    found = BranchDiagram(BranchRequest(), (line([90.0, 91.0], [1.0, 2.0], [0.5, 0.5]),), 1.0)
+    path = write_diagram(found, tmp_path / "b.h5")
+    assert read_diagram(path).lines[0].points == 2
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = found.lines[0].response_i
+    with h5py.File(path, "r+") as file:
+        change(file["branch_000"])
+    with pytest.raises(InvalidRequest, match="cannot be read as branches"):
+        read_diagram(path)
+
+
 def test_the_json_document_contains_every_branch_point(paper_diagram):
     found = json.loads(json.dumps(paper_diagram.to_dict(), allow_nan=False))
     assert sum(len(each["points"]) for each in found["branches"]) == paper_diagram.points

@@ -1,14 +1,14 @@
 """HDF5 files of branches, spectra and chains, with units and the request."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 
 import h5py
 import numpy as np
-from pydantic import ValidationError
 
+from vibench.sim.hdf5_files.door import UNREADABLE, open_hdf5
 from vibench.sim.hdf5_files.writing import open_hdf5_to_write
 from vibench.sim.study import software
 
@@ -31,11 +31,18 @@ _OWN_UNITS = {
     "attenuation_db": "dB",
 }
 """Units of datasets whose names have no unit suffix."""
-_COLUMNS = (
-    "frequency_hz amplitude_m response_i response_ii states multiplier_real multiplier_imaginary impacts "
-    "error_estimate"
-)
-"""Columns of a branch; each column is an HDF5 dataset."""
+_COLUMNS: Mapping[str, tuple[int, ...]] = {
+    "frequency_hz": (),
+    "amplitude_m": (),
+    "response_i": (4,),
+    "response_ii": (4,),
+    "states": (6,),
+    "multiplier_real": (6,),
+    "multiplier_imaginary": (6,),
+    "impacts": (),
+    "error_estimate": (),
+}
+"""Columns of a branch, with the shape of each row; each column is an HDF5 dataset."""
 _WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
 """Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
@@ -62,7 +69,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
-            _write(group, line, _WORDS, _COLUMNS)
+            _write(group, line, _WORDS, " ".join(_COLUMNS))
             group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
             events = group.create_group("events")
             for name in _EVENT_COLUMNS:
@@ -82,15 +89,16 @@ def read_diagram(path: Path) -> BranchDiagram:
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
         raise InvalidRequest(f"{path} {what}; give a file that vibench branches wrote")
     try:
-        with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != BRANCHES_FORMAT:
-                raise InvalidRequest(f"{path} contains no branches; give a file that vibench branches wrote")
+        with open_hdf5(path) as file:
+            if (file.attrs["format"], file.attrs["format_version"]) != (BRANCHES_FORMAT, FORMAT_VERSION):
+                raise ValueError("it contains no branches, or those of another vibench version")
             request = BranchRequest.model_validate_json(str(file.attrs["request"]))
             lines = tuple(_read_line(file[name]) for name in sorted(file) if name.startswith("branch_"))
             return BranchDiagram(request, lines, float(file.attrs["elapsed_s"]))
-    except (OSError, KeyError, ValidationError) as error:
+    except (OSError, IndexError, *UNREADABLE) as error:
+        why = str(error).splitlines()[0]
         raise InvalidRequest(
-            f"{path} cannot be read as branches: {error}; give a file that vibench branches wrote"
+            f"{path} cannot be read as branches: {why}; give a file that vibench branches wrote"
         ) from error
 
 
@@ -108,10 +116,18 @@ def branch_curves(path: Path) -> tuple[Curve, ...]:
 
 
 def _read_line(group: h5py.Group) -> BranchLine:
-    kept: dict[str, object] = {name: group[name][()] for name in _COLUMNS.split()}
+    kept: dict[str, object] = {}
+    count = len(group["frequency_hz"])
+    for name, row in _COLUMNS.items():
+        values = np.asarray(group[name][()])
+        if values.dtype.kind not in "fi" or values.shape != (count, *row) or count == 0:
+            raise ValueError(f"{group.name}/{name} has another shape or type than vibench wrote")
+        kept[name] = values
     for name in _WORDS.split():
         value = group.attrs[name]
         kept[name] = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(kept["periods"], int):
+        raise TypeError(f"{group.name} has no whole number of periods")
     events = group["events"]
     rows = zip(events["kind"].asstr()[()], *(events[name][()] for name in _EVENT_COLUMNS), strict=True)
     kept["events"] = tuple(
