@@ -20,7 +20,7 @@ from vibench.sim import (
     refine_scene,
     solve_scene,
 )
-from vibench.sim.scene.mean_of_starts import mean_error
+from vibench.sim.scene.mean_of_starts import Start, mean_error, next_size
 
 from .predictions import errors, responses
 
@@ -195,3 +195,15 @@ def test_the_stated_error_of_a_mean_over_two_motions_holds_and_is_not_too_large(
         held.append(abs(values.mean() - true) <= errors[-1] * values.mean())
     assert np.mean(held) > 0.92
     assert np.median(errors) * true < 1.35 * 1.96 * scatter
+
+
+@pytest.mark.parametrize(("between", "within", "adds_windows"), [(0.0, 0.1, True), (0.1, 1e-3, False)])
+def test_windows_are_added_while_responses_scatter_within_a_start(between, within, adds_windows):
+    random = np.random.default_rng(6)
+    starts = [
+        Start(None, [np.full(4, middle + within * random.standard_normal()) for _ in range(2)], None, 0)
+        for middle in 1.0 + between * random.standard_normal(16)
+    ]
+    count, windows = next_size(starts, 1e-3, lead=5.0)
+    assert (windows > 2) is adds_windows
+    assert adds_windows or count > 16
