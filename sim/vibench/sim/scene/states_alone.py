@@ -145,7 +145,7 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
         each.follow()
 
 
-WORTH_A_FIT_S = 200.0
+WORTH_A_FIT_S = 3000.0
 """Total simulated time of one specimen above which batches save more than their collision fit costs [s]."""
 AUTOMATIC_S = 10.0
 """Assumed length of a run with an automatic duration, to compare batches with single runs [s]."""
