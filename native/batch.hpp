@@ -23,8 +23,9 @@ constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch f
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
 constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
 constexpr double LONGEST_PART = 0.25;     // longest collision over the drive period, so that LONG terms suffice
-// Bound of the largest depth of a collision, in its units, from the acceleration at its middle (2 % above).
-constexpr double DEEPEST = 1.02, DEEPER_BY_PRESS = 0.8;
+// Bound of the largest depth of a collision, in its units: a quadratic function of the acceleration at its
+// middle, plus a part proportional to the derivative of this acceleration. It is at most 0.7 % too large.
+constexpr double DEEPEST[3] = {1.005, 0.796, 0.16}, DEEPER_BY_CHANGE = -0.728;
 constexpr double SPARE = 2.0;             // factor on a bound of x for the force of a stop, which bends x little
 constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
@@ -239,8 +240,8 @@ class BatchRun {
     record.peak_p = vibench::larger(record.peak_p, magnitude(at[Y] - at[Z]));
   }
 
-  // Observes the peaks of a flight that begins with the terms `now`. A motion ends `to_go` after its last
-  // but one due state.
+  // Observes the peaks of a flight that begins with the terms `now`. After the time `to_go` the next state
+  // is due, and the motion may end.
   void see_flight(int lane, const LanePhasor (&now)[FLYING], double length, double to_go) {
     const LinearTables &flight = motion[lane]->tables->flight;
     Phasor phasors[PHASORS];
@@ -535,7 +536,7 @@ class BatchRun {
   }
 
   // Advances the time. The drive's term is recomputed, so that its rounding errors do not accumulate.
-  // Returns exp(i omega t).
+  // Returns exp(i omega t) at the new time.
   LanePhasor pass(Mask of, Lanes time) {
     left = left - select(of, time, 0.0);
     // The series needs a small angle: (phase + half a turn) / 4. Its result is raised to the fourth power.
@@ -578,7 +579,8 @@ class BatchRun {
     }
     Lanes unit = fit.unit * root, variables[VARIABLES], values[POLYNOMIALS];
     fill_variables(variables, side / speed, unit);
-    Lanes deepest = speed * unit * fused(variables[0], DEEPER_BY_PRESS, DEEPEST);
+    Lanes by_press = fused(fused(variables[0], DEEPEST[2], DEEPEST[1]), variables[0], DEEPEST[0]);
+    Lanes deepest = speed * unit * fused(variables[1], DEEPER_BY_CHANGE, by_press);
     Mask inside = Mask::of(lanes) & (Lanes(0.0) < speed);
     for (int k = 0; k < VARIABLES; k++) {
       variables[k] = (variables[k] - fit.middle[k]) * (1.0 / fit.half[k]);
