@@ -291,7 +291,7 @@ REFUSED = [
     (lambda: Sampled(1e3, np.zeros(10)), r"shape \(\) is not allowed"),
     (lambda: Sampled(np.array([0.0, math.inf, 0.0, 0.0]), 1e3), "Sample 1 of the drive is inf"),
     (lambda: Harmonic(math.nan, 1e-6), "Drive frequency nan Hz is not allowed"),
-    (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A drive of amplitude 0 m has no response"),
+    (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A response over a drive amplitude of 0 m"),
     (lambda: steady_response(gong2025(), DRIVE, duration_s=math.inf), "Duration inf s is not allowed"),
     (lambda: steady_response(gong2025(), Harmonic(0.01, 1e-6)), "it must contain one drive period, 100.0 s"),
     (lambda: steady_response(gong2025(), DRIVE, window_s=31.0), r"Window 31\.0 s is not allowed"),

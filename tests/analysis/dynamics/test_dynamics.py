@@ -87,7 +87,7 @@ def paper_diagram():
         ({"recorded_level": ((200.0, 1e-6), (100.0, 1e-6))}, "two or more ascending"),
         (
             {"recorded_level": ((100.0, 1e-6), (200.0, 1e-6)), "along": "amplitude"},
-            "is for branches along frequency",
+            "needs branches along frequency",
         ),
         ({"resonance_band_hz": (97.0, 92.0), "along": "amplitude"}, "does not ascend"),
         ({"resonance_band_hz": (92.0, 97.0)}, "is followed along amplitude"),

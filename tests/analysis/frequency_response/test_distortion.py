@@ -160,8 +160,8 @@ def test_noise_larger_than_the_transmission_is_reported_in_whole_percent(analyse
     share = 100 * distortion(noisy).noise_share
     assert share > 1000
     caption = distortion_caption(noisy)
-    assert f"relative to the transmission (median): {share:.0f} % by noise" in caption
-    assert "noise of the channels or chaos of the specimen" in caption, "chaos is not called noise"
+    assert f"relative to the transmission (median): {share:.0f} % due to channel noise" in caption
+    assert "channel noise or chaos of the specimen" in caption, "chaos is not called noise"
 
 
 def test_a_shifting_narrow_mode_is_reported_as_drift(analyse_with):

@@ -103,7 +103,7 @@ def test_a_chain_run_of_too_many_windows_is_refused(drive, duration_s):
 @pytest.mark.parametrize(
     ("drive", "window_s", "sentence"),
     [
-        (Harmonic(100.0, 0.0), 1.0, r"^A drive of amplitude 0 m .*\.$"),
+        (Harmonic(100.0, 0.0), 1.0, r"^A response over a drive amplitude of 0 m .*\.$"),
         (PERIODIC, 3.0, r"^Window 3\.0 s is not allowed: .*\.$"),
         (PERIODIC, 1e-3, r"^Window 0\.001 s is not allowed at 130\.0 Hz: .*\.$"),
     ],

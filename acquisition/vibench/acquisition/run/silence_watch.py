@@ -216,7 +216,7 @@ class SilenceWatch:
             seen = f"{took_s:.3f} s after the stop was seen (now {self._residue_v:.2g} V)"
             return f"not silent after switching off: its amplitude had to be lowered, {seen}"
         if self.is_silent:
-            return f"silent {took_s:.3f} s after the stop was seen (measured: {self._residue_v:.2g} V)"
+            return f"{took_s:.3f} s after the stop was seen, silence was measured ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
     def note_signal(self) -> None:
