@@ -59,7 +59,6 @@ LONG = (
     "tests/sim/exponents/test_tangent.py",
     "tests/cli/test_killed_campaign.py",
     "tests/sim/branches/test_shooting_branches.py",
-    "tests/sim/branches/test_balanced_branches.py",
     "tests/sim/branches/test_known_folds.py",
     "tests/analysis/dynamics/test_dynamics.py",
     "tests/analysis/hidden_motion/test_hidden_motion.py",

@@ -96,11 +96,7 @@ def test_the_exponents_option_uses_ode45_only_for_colliding_points():
 
 def test_the_options_for_sum_and_logarithm_and_gap_are_applied():
     case = case_for("sum=3@0.1+7@0.9", "log=m", "gap=30e-6")
-    assert (case.sum_model, case.logarithm_of, case.gap_m) == (
-        "power:3@0.1+7@0.9",
-        "m",
-        30e-6,
-    )
+    assert (case.sum_model, case.logarithm_of, case.gap_m) == ("power:3@0.1+7@0.9", "m", 30e-6)
 
 
 def test_every_option_accepts_its_own_example():

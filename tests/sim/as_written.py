@@ -1,11 +1,12 @@
-"""Reference solution: the equations of motion integrated by scipy; and a distance between states."""
+"""Reference solution: the equations of motion integrated by scipy; and what several tests need of it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from vibench.sim import Harmonic, gong2025, spring_of
+from vibench.sim import Harmonic, PowerLaw, gong2025, spring_of
 
 UNITS = np.repeat([1e-4, 0.1], 3)
 """Of an error: 100 um and 0.1 m/s."""
@@ -13,6 +14,19 @@ UNITS = np.repeat([1e-4, 0.1], 3)
 
 def paper(contact="hertz", **options):
     return gong2025(**{"damping_time_s": 3e-5, "contact": contact, **options})
+
+
+def hardening():
+    """Return the paper's specimen with a force k3 p^3 instead of stops, 10 % of k1 p at 100 um."""
+    specimen = gong2025()
+    return replace(specimen, contact=PowerLaw(100e-6, ((3, 0.1 * specimen.stiffnesses[1] * 100e-6),)))
+
+
+def free_state_matrix(specimen):
+    """Return the state matrix without contact, for states (displacements, velocities)."""
+    inverse = np.linalg.inv(specimen.mass_matrix)
+    rows = [-inverse @ specimen.stiffness_matrix, -inverse @ specimen.damping_matrix]
+    return np.block([[np.zeros((3, 3)), np.eye(3)], rows])
 
 
 def distance(first, second):

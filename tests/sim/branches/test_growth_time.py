@@ -1,22 +1,20 @@
 """The growth time of an unstable periodic motion matches the simulated departure from it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from tests.sim.as_written import hardening
 from vibench.sim import FrequencyPath, integrate, periodic_orbit
 from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shoot_branches
-from vibench.sim.specimen.contact_laws import PowerLaw
 from vibench.sim.specimen.drive import Harmonic
-from vibench.sim.specimen.specimen import gong2025, state_scales
+from vibench.sim.specimen.specimen import state_scales
 
 PERIODS = 12
 
 
 @pytest.mark.thorough
 def test_the_distance_from_an_unstable_motion_grows_by_a_factor_of_e_in_one_growth_time():
-    specimen = replace(gong2025(), contact=PowerLaw(100e-6, ((3, 0.1 * gong2025().stiffnesses[1] * 100e-6),)))
+    specimen = hardening()
     found = next(shoot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
     branch = found.branch
     at = int(np.argmax(np.abs(branch.multipliers[:, 0])))

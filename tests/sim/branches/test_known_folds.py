@@ -1,20 +1,12 @@
 """Fold points match other programs: independent harmonic balance and Runge-Kutta shooting."""
 
-from dataclasses import replace
-
 import pytest
 
-from vibench.sim import AmplitudePath, BifurcationKind, FrequencyPath, PowerLaw, gong2025
+from tests.sim.as_written import hardening
+from vibench.sim import AmplitudePath, BifurcationKind, FrequencyPath, gong2025
 from vibench.sim.branches import MotionSearch, shoot_branches
 
 FEW = MotionSearch(places=2, starts=1)
-
-
-def hardening():
-    """Return the paper's specimen with a force k3 p^3 instead of stops, 10 % of k1 p at 100 um."""
-    specimen = gong2025()
-    force = 0.1 * specimen.stiffnesses[1] * 100e-6
-    return replace(specimen, contact=PowerLaw(100e-6, ((3, force),)))
 
 
 def folds(specimen, path, low, high):

@@ -86,8 +86,7 @@ def test_no_end_of_chaos_is_found_in_noise_around_zero():
 
 
 @pytest.mark.parametrize(
-    ("drive", "source"),
-    [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)],
+    ("drive", "source"), [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)]
 )
 def test_transient_chaos_is_reported_with_its_duration_and_exponent(drive, source):
     # The chaotic lifetime depends on the initial state; the final motion does not.

@@ -31,10 +31,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m sets the start"),
         ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is not a power of 2"),
-        (
-            {"frequency_hz": FREQUENCIES, "gap_m": GAPS, "model": "linear"},
-            "gap_m varies, but has no effect",
-        ),
+        ({"frequency_hz": FREQUENCIES, "gap_m": GAPS, "model": "linear"}, "gap_m varies, but has no effect"),
         (
             {"frequency_hz": FREQUENCIES, "hertz_stiffness": STIFFNESSES, "model": "rigid:0.8"},
             "hertz_stiffness varies, but has no effect",

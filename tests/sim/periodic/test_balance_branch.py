@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 
 from vibench.sim import PowerSpring, first_order_states, gong2025, spring_of, structure_of
 from vibench.sim.periodic.balance_branch import BalanceOptions, balance, balance_branch_within
@@ -62,6 +63,22 @@ def test_a_branch_of_first_order_balance_folds_at_the_closed_form_frequencies():
     assert [state.is_stable_to_amplitude for state in inside] == [True, False, True]
     assert len(first_order_states(structure, spring, folds[0] * 0.999, force)) == 1
     assert len(first_order_states(structure, spring, folds[1] * 1.001, force)) == 1
+
+
+@pytest.mark.thorough
+def test_the_phase_resonance_of_a_duffing_oscillator_runs_along_the_exact_backbone():
+    # Free motion of x'' + x + alpha x^3: omega = pi sqrt(1 + alpha a^2) / (2 K(m)).
+    alpha, options = 0.5, BalanceOptions(fewest=15, tolerance=1e-8)
+    structure, spring = oscillator(2e-3), PowerSpring(1.0, ((3, alpha),))
+    for forced in (1e-3, 4e-3):
+        start = balance(structure, spring, 0.9 / (2 * math.pi), forced, options)
+        branch = along_frequency(structure, spring, start, 3.0 / (2 * math.pi), options)
+        k = int(np.argmax(branch.frequencies_hz * branch.response_ii[:, 0]))
+        size = branch.response_i[k, 0] * forced
+        modulus = alpha * size**2 / (2.0 * (1.0 + alpha * size**2))
+        backbone = math.pi * math.sqrt(1.0 + alpha * size**2) / (2.0 * ellipk(modulus))
+        assert size > 0.4
+        assert 2 * math.pi * branch.frequencies_hz[k] == pytest.approx(backbone, rel=1e-4)
 
 
 def test_a_duffing_branch_is_unstable_between_its_folds():

@@ -1,19 +1,12 @@
 """Phase resonance branches over the drive level match integrated motions and linear quadrature."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from vibench.sim import PhaseReference, PowerLaw, gong2025, integrate, phase_resonance_branch
+from tests.sim.as_written import hardening
+from vibench.sim import PhaseReference, gong2025, integrate, phase_resonance_branch
 from vibench.sim.specimen.drive import Harmonic
 from vibench.sim.specimen.modes import base_transmissibility
-
-
-def hardening():
-    """Return the paper's specimen with a force k3 p^3 instead of stops, 10 % of k1 p at 100 um."""
-    specimen = gong2025()
-    return replace(specimen, contact=PowerLaw(100e-6, ((3, 0.1 * specimen.stiffnesses[1] * 100e-6),)))
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,7 @@ class Oracle:
 
 
 @pytest.mark.parametrize(
-    ("restitution", "drive"),
-    [(1.0, BOUNCING), (0.8, BOUNCING), (0.5, STICKING), (0.0, STICKING)],
+    ("restitution", "drive"), [(1.0, BOUNCING), (0.8, BOUNCING), (0.5, STICKING), (0.0, STICKING)]
 )
 def test_rigid_stop_motion_agrees_with_an_event_driven_integrator(restitution, drive):
     specimen = rigid(restitution)

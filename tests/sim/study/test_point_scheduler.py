@@ -1,6 +1,7 @@
 import random
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim.study._grid import Grid
@@ -67,8 +68,7 @@ def test_a_study_point_that_failed_in_a_group_is_repeated_alone():
 
 @settings(deadline=None)
 @given(
-    st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=20),
-    st.integers(0, 2**32),
+    st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=20), st.integers(0, 2**32)
 )
 def test_every_study_point_is_scheduled_until_finished_and_never_after(points, seed):
     """Chains of any length, replies in any order, some points put back, some costs learnt."""
@@ -97,3 +97,33 @@ def test_every_study_point_is_scheduled_until_finished_and_never_after(points, s
                 if luck.randrange(2):
                     scheduler.learn(number, luck.uniform(1e-4, 10.0))
     assert done == set(range(len(points)))
+
+
+def line_of(planned_s):
+    return Costs(Grid((len(planned_s),), (True,)), np.array(planned_s))
+
+
+def test_the_cost_of_a_point_is_estimated_from_its_neighbours():
+    costs = line_of([1.0] * 5)
+    assert list(costs.learn(0, 3.0)) == [1]
+    assert costs.estimate_s(1) == 3.0
+    assert set(costs.learn(2, 5.0)) == {1, 3}
+    assert costs.estimate_s(1) == 4.0
+    assert costs.estimate_s(3) == 5.0
+    assert costs.estimate_s(4) == 1.0
+
+
+def test_the_cost_of_a_measured_point_is_not_estimated_again():
+    costs = line_of([1.0] * 3)
+    list(costs.learn(0, 3.0))
+    list(costs.learn(1, 7.0))
+    assert 0 not in list(costs.learn(1, 7.0))
+
+
+def test_cost_estimates_of_new_points_are_scaled_by_the_error_at_measured_points():
+    costs = line_of([1.0, 1.0, 1.0, 2.0])
+    is_missing = np.array([False, True, True, True])
+    assert costs.remaining_s(is_missing) == pytest.approx(4.0)
+    list(costs.learn(0, 10.0))
+    # Point 1 as its measured neighbour (10 s); points 2 and 3 as planned, times ten.
+    assert costs.remaining_s(is_missing) == pytest.approx(10.0 + 10.0 + 20.0)
