@@ -13,14 +13,6 @@ import pytest
 from vibench.gui.background.background import Background, LatestRequest
 
 
-def test_results_are_computed_in_another_process(context, qtbot):
-    answers, errors = [], []
-    context.background.ask(os.getpid, answers.append, errors.append)
-    qtbot.waitUntil(lambda: bool(answers or errors), timeout=100_000)
-    assert errors == []
-    assert answers[0] != os.getpid()
-
-
 def test_background_errors_keep_their_type_and_dropped_results_are_discarded(context, qtbot):
     answers, errors = [], []
     context.background.ask(factorial, answers.append, errors.append, 5).drop()
