@@ -46,8 +46,7 @@ def test_an_undetected_bit_flip_would_be_reported():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(
-    "count",
-    [20, pytest.param(60, marks=pytest.mark.attack), pytest.param(10_000, marks=pytest.mark.slow)],
+    "count", [20, pytest.param(60, marks=pytest.mark.attack), pytest.param(10_000, marks=pytest.mark.slow)]
 )
 @pytest.mark.timeout(7200)
 def test_a_bit_flip_is_detected_or_changes_no_result(count):
