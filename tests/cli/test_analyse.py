@@ -12,6 +12,8 @@ from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import Dwell, StreamedNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.analysis import Simulation, analyse_files
+from vibench.analysis.results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
+from vibench.cli.analyse import complain_about
 
 SECONDS = 8.0
 PATIENCE_S = 60.0
@@ -189,3 +191,9 @@ def test_warnings_about_a_result_are_printed(vibench_here, tmp_path):
     synthetic.write_recording(tmp_path, plan, base, velocity, [part], name="other")
     done = vibench_here("analyse", "other.h5", "--no-simulate", cwd=tmp_path)
     assert "warning: other: drive frequency: " in " ".join(done.stdout.split()), done.stdout
+
+
+def test_a_missing_simulation_is_noted_without_a_failure(capsys):
+    failure = AnalysisFailure("a.h5", FailedStep.SIMULATION, "the reason")
+    complain_about(CampaignResults("night", (), (failure,)))
+    assert capsys.readouterr().err == "note: a.h5: the reason\n"

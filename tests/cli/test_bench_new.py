@@ -133,10 +133,7 @@ def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
     """The signal handler of a check would only request a stop, while the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
-    with (
-        stop_on_signal(switch),
-        pytest.raises(CheckStopped, match=r'before any output.*--bench "my own'),
-    ):
+    with stop_on_signal(switch), pytest.raises(CheckStopped, match=r'before any output.*--bench "my own'):
         _confirm_wire(Path("my own.toml"), "the T-piece")
     assert switch.request is None
 

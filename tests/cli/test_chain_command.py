@@ -1,30 +1,19 @@
 """`vibench chain` on the command line."""
 
-import json
 import re
 
 import h5py
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from vibench.cli.__main__ import app
 from vibench.sim import Harmonic, gong2025, steady_response
 from vibench.sim.chain import chain_of, chain_response, chain_transmissibility
 
-
-def run(*arguments):
-    return CliRunner().invoke(app, ["chain", *(str(each) for each in arguments)])
-
-
-def answer(*arguments):
-    result = run(*arguments, "--json")
-    assert result.exit_code == 0, result.exception
-    return json.loads(result.stdout)
+from .in_this_process import invoke, json_of, refusal_of
 
 
 def test_a_chain_without_drive_reports_bands_gaps_and_transmission():
-    found = answer("--cells", 3)
+    found = json_of("chain", "--cells", 3)
     assert found["runs"] == []
     assert [round(low, 1) for low, _ in found["gaps_hz"]] == [96.1, 373.4, 701.3]
     assert found["gaps_hz"][-1][1] is None
@@ -34,7 +23,7 @@ def test_a_chain_without_drive_reports_bands_gaps_and_transmission():
 
 def test_a_steady_chain_gives_results_per_cell_and_a_file(tmp_path):
     options = ("--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.2, "--settle", 0.1)
-    found = answer(*options, "--out", tmp_path / "out")
+    found = json_of("chain", *options, "--out", tmp_path / "out")
     (point,) = found["runs"]
     expected = chain_response(chain_of(gong2025(), 2), Harmonic(220.0, 20e-6), "standard", 0.1 + 0.2, 0.2)
     np.testing.assert_allclose(point["transmission"][0], expected.response_ii[:, 0])
@@ -46,13 +35,13 @@ def test_a_steady_chain_gives_results_per_cell_and_a_file(tmp_path):
         assert file.attrs["format"] == "vibench chain"
         np.testing.assert_array_equal(file["run_00000/impacts"], point["impacts"])
         assert file["run_00000/motion_m"].shape[1] == 2
-    assert "ever overwritten" in str(run(*options, "--out", tmp_path / "out").exception)
+    assert "ever overwritten" in str(invoke("chain", *options, "--out", tmp_path / "out").exception)
 
 
 def test_a_swept_chain_shows_its_band_gap_and_matches_the_linear_transmission():
     swept = ("--amplitude", 1e-7, "--duration", 4)
     for ends in ("300:600", "600:300"):
-        (point,) = answer("--cells", 4, *swept, "--frequency", ends)["runs"]
+        (point,) = json_of("chain", "--cells", 4, *swept, "--frequency", ends)["runs"]
         over_hz, last = np.array(point["over_hz"]), np.array(point["transmission"])[:, -1]
         assert np.all(np.diff(over_hz) > 0.0)
         linear = np.abs(chain_transmissibility(chain_of(gong2025(), 4), over_hz)[:, -1, 0])
@@ -63,7 +52,7 @@ def test_a_swept_chain_shows_its_band_gap_and_matches_the_linear_transmission():
 
 def test_several_chain_lengths_and_alternating_cells_can_be_computed():
     options = ("--amplitude", 20e-6, "--frequency", 220, "--duration", 0.1, "--settle", 0, "--gap", 20e-6)
-    found = answer("--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
+    found = json_of("chain", "--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
     assert [each["cells"] for each in found["runs"]] == [1, 2, 3]
     assert len(found["bands_hz"]) == 6
     alone = steady_response(gong2025(gap_m=20e-6), Harmonic(220.0, 20e-6), "standard", 0.1, 0.1)
@@ -78,23 +67,23 @@ def test_a_diverged_chain_run_reports_only_how_it_ended(frequency, tmp_path, mon
     monkeypatch.setattr("vibench.sim.specimen.drive.LARGEST_AMPLITUDE_M", 1e100)
     drive = ("--amplitude", 1e100, "--frequency", frequency)
     options = ("--cells", 2, *drive, "--duration", 0.2, "--settle", 0.1)
-    found = answer(*options, "--out", tmp_path / "out")
+    found = json_of("chain", *options, "--out", tmp_path / "out")
     (point,) = found["runs"]
     assert point["outcome"] != "reached the end time"
     assert point["energy_j"] == point["transmission"][0] == [None, None]
     assert (tmp_path / "out" / "chain.png").is_file()
-    assert "1 run ended early" in run(*options).output
+    assert "1 run ended early" in invoke("chain", *options).output
 
 
 def test_a_chain_run_that_is_too_short_for_an_error_states_that_the_error_is_not_known():
-    found = run("--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
+    found = invoke("chain", "--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
     assert "error not known" in found.output
     assert not re.search(r"\binf\b", found.output)
 
 
 def test_the_exponent_of_a_chain_is_reported():
-    result = run(
-        "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,
+    result = invoke(
+        "chain", "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,
         "--exponent", 0.4,
     )  # fmt: skip
     assert result.exit_code == 0, result.output
@@ -125,6 +114,4 @@ def test_the_exponent_of_a_chain_is_reported():
     ],
 )
 def test_invalid_options_are_refused_in_one_sentence(arguments, said):
-    result = run(*arguments)
-    assert result.exit_code != 0
-    assert said in str(result.exception)
+    assert said in refusal_of("chain", *arguments)

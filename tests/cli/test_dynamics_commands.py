@@ -1,37 +1,19 @@
 """`vibench branches` and `vibench spectrum` on the command line."""
 
-import json
 import re
 
 import h5py
 import pytest
-from typer.testing import CliRunner
 
 from vibench.acquisition import shipped
-from vibench.cli.__main__ import app
 from vibench.sim import ArcEnd
 
-
-def run(*arguments):
-    return CliRunner().invoke(app, [str(each) for each in arguments])
-
-
-def answer(*arguments):
-    result = run(*arguments, "--json")
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout)
-
-
-def refusal_of(*arguments):
-    """Return the sentence with which a command refuses."""
-    result = run(*arguments)
-    assert result.exit_code != 0
-    return str(result.exception)
+from .in_this_process import invoke, json_of, refusal_of
 
 
 def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_path):
     options = ("--frequency", "60:64", "--amplitude", "5e-6", "--places", 2, "--starts", 1)
-    (branch,) = answer("branches", *options, "--out", tmp_path / "out")["branches"]
+    (branch,) = json_of("branches", *options, "--out", tmp_path / "out")["branches"]
     assert branch["points"][0]["frequency_hz"] == 60.0
     assert all(point["is_stable"] for point in branch["points"])
     names = {each.name for each in (tmp_path / "out").iterdir()}
@@ -40,13 +22,13 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
 
 
 def test_the_branch_search_ends_at_the_requested_time():
-    found = answer("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms")
+    found = json_of("branches", "--frequency", "50:600", "--amplitude", "5e-6", "--time", "300 ms")
     assert not found["is_complete"]
     assert sum(each["end"] == ArcEnd.OUT_OF_TIME for each in found["branches"]) <= 1
 
 
 def test_branches_over_amplitude_are_reported_in_sentences():
-    result = run("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
+    result = invoke("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
     assert result.exit_code == 0, result.output
     assert "1: period 1, mirrored: 1 to 2 µm" in result.output
     assert "1 branch (0 isolated)" in result.output
@@ -58,7 +40,7 @@ SHORT_LINE = (
 
 
 def test_branches_report_which_motions_a_bench_can_hold():
-    found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
+    found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
     # Ten control steps of ten periods or of a fifth of a second.
     assert found["least_growth_time_s"] == pytest.approx(2.0, rel=0.05)
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
@@ -66,7 +48,7 @@ def test_branches_report_which_motions_a_bench_can_hold():
 
 def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
-    found = answer(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
+    found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
     # Ten times the latency of 0.3 ms plus one and a half sample periods of 10,240 samples per second.
     assert found["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
 
@@ -74,7 +56,7 @@ def test_a_real_time_controller_extends_the_holdable_motions():
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
 def test_an_undamped_branch_gets_no_instability_or_bifurcation_from_rounding(options):
     line = ("--amplitude", 5e-6, "--frequency", "200:201", "--places", 2, "--starts", 1)
-    found = answer("branches", "--damping-time", 0, *line, *options)
+    found = json_of("branches", "--damping-time", 0, *line, *options)
     smooth = max(found["branches"], key=lambda each: len(each["points"]))
     assert all(point["is_stable"] for point in smooth["points"])
     assert smooth["events"] == []
@@ -82,7 +64,7 @@ def test_an_undamped_branch_gets_no_instability_or_bifurcation_from_rounding(opt
 
 def test_exponents_are_printed_as_json_and_written(tmp_path):
     times = ("--duration", 1.5, "--settle", 0.5)
-    found = answer("spectrum", "--amplitude", 5e-6, "--frequency", 260, *times, "--out", tmp_path / "s")
+    found = json_of("spectrum", "--amplitude", 5e-6, "--frequency", 260, *times, "--out", tmp_path / "s")
     (point,) = found["points"]
     assert len(point["exponents_per_s"]) == 6
     assert found["largest_sum_difference"] < 1e-6
@@ -107,7 +89,7 @@ DRIVEN = (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
 )
 @pytest.mark.parametrize("value", ["-1", "nan"])
 def test_an_invalid_number_is_quoted_as_typed(command, value):
-    result = run(*command, value)
+    result = invoke(*command, value)
     said = f"{result.exception} {result.output}"
     assert result.exit_code != 0
     assert command[-1] in said

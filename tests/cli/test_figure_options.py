@@ -1,23 +1,14 @@
-"""`vibench figure` refuses impossible options before any computation."""
+"""`vibench figure` and `vibench reproduce` refuse impossible options before any computation."""
 
 import pytest
-from typer.testing import CliRunner
 
-from vibench.analysis import InvalidRequest
-from vibench.cli.__main__ import app
-
-
-def refusal_of(*arguments):
-    """Return the sentence with which `vibench figure` refuses."""
-    result = CliRunner().invoke(app, ["figure", *(str(each) for each in arguments)])
-    assert isinstance(result.exception, InvalidRequest), result.output
-    return str(result.exception)
+from .in_this_process import refusal_of
 
 
 @pytest.mark.parametrize("number", ["5", "all"])
 @pytest.mark.parametrize("none", ["0", "-0.0"])
 def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
-    said = refusal_of(number, "--out", tmp_path / "f", "--damping-time", none)
+    said = refusal_of("figure", number, "--out", tmp_path / "f", "--damping-time", none)
     assert said == "figure 5 compares with an undamped specimen; give a damping time above 0 s"
     assert not (tmp_path / "f").exists()
 
@@ -32,5 +23,19 @@ def test_figure_5_needs_a_damping_time_above_zero(tmp_path, number, none):
     ],
 )
 def test_impossible_specimen_sizes_are_refused(tmp_path, option, value, told):
-    assert refusal_of("1", "--out", tmp_path / "f", option, value) == told
+    assert refusal_of("figure", "1", "--out", tmp_path / "f", option, value) == told
     assert not (tmp_path / "f").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--damping-time", "-1e-5", "a damping time of -1e-05 s is not allowed; give 0 to 0.01"),
+        ("--with", "fit=0", "an indentation of 0 m is not allowed; give a positive one"),
+    ],
+)
+def test_an_impossible_option_of_reproduce_is_refused_before_computation(
+    refusal, tmp_path, option, value, said
+):
+    assert said in refusal("reproduce", "--out", "kept", option, value)
+    assert not (tmp_path / "kept").exists()
