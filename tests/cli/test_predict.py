@@ -6,18 +6,16 @@ import pytest
 
 from vibench.sim import Harmonic, gong2025, steady_response
 
-COMPILING_S = 300
-"""Time limit [s] of the first test after a change of the simulation, which compiles its kernels."""
+pytestmark = pytest.mark.timeout(300)  # the first test after a change of the engine compiles it
 SHORT = ("--duration", 1, "--window", 0.5)
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_prediction_equals_the_engine_result_at_every_frequency(vibench, tmp_path):
     ran = vibench(
         "predict",
         *("--amplitude", 20e-6, "--frequency", "129:131:1", "--json", *SHORT),
         cwd=tmp_path,
-        timeout_s=COMPILING_S,
+        timeout_s=300,
     )
     assert ran.returncode == 0, ran.stderr
     assert "warning:" not in ran.stderr
@@ -34,7 +32,6 @@ def test_a_prediction_equals_the_engine_result_at_every_frequency(vibench, tmp_p
     assert said["options"]["damping_times_s"] == [2e-5]
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_prediction_run_until_settled_has_kind_and_error(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "94:260:166", "--duration", "auto")
     periodic, chaotic = output_of("predict", *asked, "--json")["points"]
@@ -45,7 +42,6 @@ def test_a_prediction_run_until_settled_has_kind_and_error(output_of):
     assert chaotic["integration_error"] < 1e-5 < chaotic["scatter"] < chaotic["error_estimate"]
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_requested_lyapunov_exponent_is_given_with_its_error(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov")
     (point,) = output_of("predict", *asked, "--duration", 6, "--window", 1, "--json")["points"]
@@ -53,14 +49,12 @@ def test_a_requested_lyapunov_exponent_is_given_with_its_error(output_of):
     assert 0 < point["lyapunov_error_per_s"] < 30
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_prediction_prints_a_table_and_reasons(output_of):
     printed = output_of("predict", "--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT)
     assert "Responses I and II" in printed
     assert "\n300 Hz: event driven. No stop is touched, but the transient has not decayed" in printed
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_points_with_equal_explanations_share_one_line(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "200:244:2", "--duration", 8, "--window", 1)
     told = [line for line in output_of("predict", *asked, "--explain").splitlines() if " points, " in line]
@@ -68,7 +62,6 @@ def test_points_with_equal_explanations_share_one_line(output_of):
     assert "At 220 Hz: No stop is touched: abs(p) stays below 43.8 um" in told[0]
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_metres_typed_instead_of_micrometres_give_a_warning_beside_the_answer(vibench_here, tmp_path):
     asked = ("--amplitude", 5, "--frequency", 30, "--duration", 0.05, "--window", 0.04, "--model", "linear")
     ran = vibench_here("predict", *asked, "--json", cwd=tmp_path)
@@ -79,7 +72,6 @@ def test_metres_typed_instead_of_micrometres_give_a_warning_beside_the_answer(vi
     assert warning.endswith("give 5e-06")
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_failed_point_does_not_hide_the_results_of_other_points(vibench_here, tmp_path):
     chatter = ("--model", "rigid:1", "--gap", 1e-9, "--amplitude", 1e-3, "--duration", 0.3, "--window", 0.01)
     ran = vibench_here("predict", *chatter, "--frequency", "100:60100:60000", "--json", cwd=tmp_path)
@@ -97,8 +89,6 @@ def test_a_failed_point_does_not_hide_the_results_of_other_points(vibench_here, 
         (("--amplitude", 1e-300, "--frequency", 100), "Drive amplitude 1e-300 m is not allowed"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0: it must be above 0"),
         (("--amplitude", 1e-6, "--frequency", "x"), "START:STOP:STEP"),
-        (("--amplitude", 1e-6, "--frequency", "1:2"), "START:STOP:STEP"),
-        (("--amplitude", 1e-6, "--frequency", "300:200:1"), "300 is not below 200"),
         (("--amplitude", 1e-6, "--frequency", 100, "--model", "jelly"), "jelly"),
         (("--amplitude", 1e-6, "--frequency", 100, "--observe", "cats"), "cats"),
         (("--amplitude", 1e-6, "--frequency", 100, "--window", 40), "Window 40"),
@@ -116,7 +106,6 @@ def test_invalid_predictions_are_refused_in_one_sentence(refusal, tmp_path, argu
 FORGETFUL = ("--amplitude", 5e-6, "--frequency", 242, "--damping-time", 3e-5, "--duration", 36, "--window", 2)
 
 
-@pytest.mark.timeout(COMPILING_S)
 def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_here, tmp_path):
     """Chaos dies out within tens of seconds: after 36 s half of the initial conditions have settled."""
     asked = ("predict", *FORGETFUL, "--budget", "0.2s", "--explain")
@@ -136,8 +125,7 @@ def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_he
     assert "┃" not in told.stdout, "one table with a frame, one without"
 
 
-@pytest.mark.timeout(COMPILING_S)
-def test_a_non_numeric_budget_is_refused_with_a_readable_message(refusal):
+def test_a_non_numeric_budget_is_refused_in_a_sentence(refusal):
     for given, said in (("soon", "--budget was given as 'soon'"), ("-1", "--budget was given as -1")):
         assert said in refusal("predict", *FORGETFUL, f"--budget={given}")
 

@@ -1,12 +1,10 @@
 """`vibench study` as a user runs it: a file of results, one-sentence errors, Ctrl-C and resume."""
 
 import contextlib
-import os
 import signal
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +13,8 @@ import typer
 from vibench.cli.study import KeptStudies
 from vibench.sim.study import PointState, Study, open_study
 
-ROOT = Path(__file__).resolve().parents[2]
+from .conftest import ENVIRONMENT, ROOT
+
 SMALL = """
 amplitudes_m = [1e-6, 20e-6]
 frequencies_hz = { start = 200, stop = 260, step = 30 }
@@ -31,8 +30,7 @@ window_s = 0.2
 """
 LONG_POINTS = 201
 LOOK_S = 0.05
-COMPILING_S = 300
-"""Time limit [s] of the first test after a change of the simulation, which compiles its kernels."""
+pytestmark = pytest.mark.timeout(300)  # the first test after a change of the engine compiles it
 
 
 def plan(folder, text=SMALL):
@@ -53,7 +51,6 @@ def test_an_estimate_counts_points_and_work_without_a_file(output_of, tmp_path):
 
 
 @pytest.mark.thorough
-@pytest.mark.timeout(COMPILING_S)
 def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(output_of, refusal, tmp_path):
     asked = plan(tmp_path)
     said = output_of("study", asked, "--out", "a.h5", "--json")
@@ -71,14 +68,13 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(ou
 
 
 @pytest.mark.thorough
-@pytest.mark.timeout(COMPILING_S)
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
 def test_ctrl_c_keeps_the_computed_points_and_a_resume_continues(vibench, tmp_path):
     asked = plan(tmp_path, LONG)
     running = subprocess.Popen(
         [sys.executable, "-m", "vibench.cli", "study", str(asked), "--out", "a.h5"],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=ENVIRONMENT,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )

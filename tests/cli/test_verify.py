@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import shutil
 import sys
 from zipfile import ZipFile
@@ -194,26 +195,22 @@ def test_external_links_are_followed_on_request(vibench_here, folder):
     assert (folder / "two.csv").exists()
 
 
-def test_the_command_recover_follows_external_links_on_request(vibench_here, folder):
+def test_the_command_recover_follows_external_links_on_request(vibench_here, refusal, folder):
     with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
     with h5py.File(folder / "five.h5.part", "r+") as file:
         file["elsewhere"] = h5py.ExternalLink("one.h5", "/")
-    refused = vibench_here("recover", "five.h5.part", cwd=folder)
-    assert refused.returncode == 1
-    assert "refers to another file" in refused.stderr
-    assert "--allow-external" in refused.stderr
+    assert re.search("refers to another file.*--allow-external", refusal("recover", "five.h5.part"))
     found = vibench_here("recover", "five.h5.part", "--allow-external", cwd=folder)
     assert found.returncode == 0, found.stderr
     assert vibench_here("verify", "five.h5", cwd=folder).returncode == 0
 
 
-def test_a_finished_recording_named_as_a_part_file_is_not_recovered(vibench_here, folder):
+def test_a_finished_recording_named_as_a_part_file_is_not_recovered(refusal, folder):
     (folder / "two.h5").rename(folder / "four.h5.part")
     before = (folder / "four.h5.part").read_bytes()
-    found = vibench_here("recover", "four.h5.part", cwd=folder)
-    assert found.returncode == 1
-    assert found.stderr == "error: four.h5.part is a finished recording; rename it to four.h5\n"
+    said = refusal("recover", "four.h5.part")
+    assert said == "error: four.h5.part is a finished recording; rename it to four.h5"
     assert (folder / "four.h5.part").read_bytes() == before
 
 
@@ -241,11 +238,9 @@ def test_bad_recordings_do_not_affect_other_recordings_of_a_folder(vibench_here,
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
-def test_a_file_name_that_cannot_be_stored_as_text_is_refused(folder, vibench_here):
+def test_a_file_name_that_cannot_be_stored_as_text_is_refused(folder, refusal):
     name = os.fsdecode(b"\xff.h5")
     (folder / "one.h5").rename(folder / name)
-    told = vibench_here("export", name, "--to", "csv", "--out", "x", cwd=folder)
-    assert told.returncode == 1
-    assert r"\udcff" in told.stderr
-    assert "contains bytes that are not text; rename the file or folder" in told.stderr
-    assert "Traceback" not in told.stderr
+    said = refusal("export", name, "--to", "csv", "--out", "x")
+    assert r"\udcff" in said
+    assert "contains bytes that are not text; rename the file or folder" in said
