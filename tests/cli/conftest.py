@@ -15,8 +15,15 @@ from vibench.cli import main
 from vibench.cli.output import console
 
 ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+OWN = {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+ENVIRONMENT = {**os.environ, **OWN}
 Vibench = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def own_state(tmp_path_factory, monkeypatch):
+    """Use a temporary state folder, so that only programs of the test are found."""
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
 
 
 @pytest.fixture(scope="session")
@@ -27,7 +34,7 @@ def vibench() -> Vibench:
         return subprocess.run(
             [sys.executable, "-m", "vibench.cli", *map(str, arguments)],
             cwd=cwd,
-            env={**ENVIRONMENT, **(environment or {})},
+            env={**os.environ, **OWN, **(environment or {})},
             capture_output=True,
             text=True,
             check=False,

@@ -10,9 +10,12 @@ import pytest
 
 from vibench.acquisition.stopping.program import Program, announced_programs
 
-from .test_stop_all import driving_program, own_state  # noqa: F401 - a fixture
+from .test_stop_all import driving_program
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the complete command stops")
+pytestmark = [
+    pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the complete command stops"),
+    pytest.mark.usefixtures("own_state"),
+]
 COMMAND = (
     "import sys; sys.argv = ['vibench', 'stop', *sys.argv[1:]]; from vibench.command import main; main()"
 )

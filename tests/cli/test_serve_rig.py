@@ -1,6 +1,5 @@
 """The virtual rig served to programs that do not use vibench."""
 
-import os
 import re
 import signal
 import socket
@@ -8,7 +7,6 @@ import subprocess
 import sys
 import time
 from contextlib import closing
-from pathlib import Path
 
 import grpc
 import nidaqmx
@@ -19,7 +17,8 @@ from nidaqmx.constants import AcquisitionType
 from vibench.acquisition.drivers import AFG1022X
 from vibench.acquisition.rig import load_rig
 
-ROOT = Path(__file__).resolve().parents[2]
+from .conftest import ENVIRONMENT
+
 PROGRAM = """
 import sys, warnings
 warnings.simplefilter("ignore")
@@ -46,10 +45,9 @@ def free_port():
 @pytest.fixture(scope="module")
 def serve_rig_output():
     """Yield the output of `vibench serve-rig`; each test sets the rig's state first."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     options = ("--address", "127.0.0.1:0", "--scpi-port", str(free_port()))
     arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", *options]
-    with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as server:
+    with subprocess.Popen(arguments, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as server:
         said = ""
         while "write_termination" not in said:
             line = server.stdout.readline()
@@ -64,9 +62,8 @@ def serve_rig_output():
 
 def test_other_programs_can_use_generator_and_converter_of_the_served_rig(serve_rig_output):
     address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     stranger = subprocess.run(
-        [sys.executable, "-c", PROGRAM, address], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", PROGRAM, address], env=ENVIRONMENT, capture_output=True, text=True, check=False
     )
     assert stranger.stdout.strip() == "1", stranger.stderr
     with (
@@ -95,12 +92,11 @@ def test_the_printed_example_commands_work(serve_rig_output):
         task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0", min_val=-5, max_val=5)
         task.timing.cfg_samp_clk_timing(51200, samps_per_chan=512)
         assert len(task.read(512)) == 512
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for hint in (usb, stream):
         # pyvisa keeps its list of devices for a whole process, so each example has a process.
         program = f'{hint}\nprint(generator.query("*IDN?"))\ngenerator.close()'
         words = [sys.executable, "-W", "ignore", "-c", program]
-        said = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+        said = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
         assert said.stdout.startswith("TEKTRONIX,AFG1022"), said.stderr
 
 

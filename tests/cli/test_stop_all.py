@@ -32,12 +32,7 @@ print(switch.request.level, switch.request.reason)
 CONTAINER = ("unshare", "--user", "--map-root-user", "--pid", "--fork", "--mount-proc")
 """A process number space as in a container, with a shared state folder."""
 
-pytestmark = sees_locks
-
-
-@pytest.fixture(autouse=True)
-def own_state(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+pytestmark = [sees_locks, pytest.mark.usefixtures("own_state")]
 
 
 @contextmanager

@@ -43,12 +43,7 @@ PATIENCE_S = 60.0
 SOON_S = 20.0
 """Much shorter than the time to the next event, and much longer than the start of a command."""
 
-pytestmark = sees_locks
-
-
-@pytest.fixture(autouse=True)
-def own_state(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+pytestmark = [sees_locks, pytest.mark.usefixtures("own_state")]
 
 
 @contextmanager

@@ -20,15 +20,12 @@ from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.program import Program, announced_programs
 
-ROOT = Path(__file__).resolve().parents[2]
+from .conftest import OWN, ROOT
+
+pytestmark = pytest.mark.usefixtures("own_state")
 PAUSE, LOOK_S = Event(), 0.01
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 900}
 LONG = Campaign.model_validate({"name": "night", "measurements": [{"name": "dwell", "excitation": DWELL}]})
-
-
-@pytest.fixture(autouse=True)
-def own_state(tmp_path_factory, monkeypatch):
-    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
 
 
 @pytest.fixture
@@ -54,28 +51,19 @@ def wait(engine, state):
         PAUSE.wait(LOOK_S)
 
 
-def vibench(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "vibench.cli", *arguments],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
-
-
 @pytest.mark.thorough
 @sees_locks
-def test_a_run_can_be_held_released_and_stopped_from_another_terminal(running, vibench_here, tmp_path):
-    seen = json.loads(vibench("watch", "--json").stdout)["engines"]
+def test_a_run_can_be_held_released_and_stopped_from_another_terminal(
+    running, vibench, vibench_here, tmp_path
+):
+    seen = json.loads(vibench("watch", "--json", cwd=tmp_path).stdout)["engines"]
     assert [each["pid"] for each in seen] == [running.pid]
     assert seen[0]["status"]["run"]["name"] == "dwell"
     assert "vibench release" in vibench_here("stop", "--level", "hold", cwd=tmp_path).stdout
     wait(running, EngineState.HELD)
     assert "has received the release" in vibench_here("release", cwd=tmp_path).stdout
     wait(running, EngineState.RUNNING)
-    told = vibench("stop", "--level", "abort", "--reason", "smoke in the laboratory")
+    told = vibench("stop", "--level", "abort", "--reason", "smoke in the laboratory", cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     wait(running, EngineState.READY)
     with open_recording(tmp_path / "dwell.h5") as recording:
@@ -84,12 +72,12 @@ def test_a_run_can_be_held_released_and_stopped_from_another_terminal(running, v
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, tmp_path):
+def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, vibench, tmp_path):
     with frozen(running.pid):
-        told = vibench("stop", "--level", "abort", "--reason", "while it stood still")
+        told = vibench("stop", "--level", "abort", "--reason", "while it stood still", cwd=tmp_path)
         assert told.returncode == 1
         assert "runs but does not answer" in told.stderr
-        seen = json.loads(vibench("watch", "--json").stdout)["engines"]
+        seen = json.loads(vibench("watch", "--json", cwd=tmp_path).stdout)["engines"]
         assert [each["pid"] for each in seen] == [running.pid]
         assert "does not answer within" in seen[0]["silence"]
     wait(running, EngineState.READY)
@@ -100,8 +88,9 @@ def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, tmp_path):
 @pytest.mark.thorough
 def test_watch_shows_the_run_and_its_end(running):
     arguments = [sys.executable, "-m", "vibench.cli", "watch"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-    with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as observer:
+    with subprocess.Popen(
+        arguments, env={**os.environ, **OWN}, stdout=subprocess.PIPE, text=True
+    ) as observer:
         assert f"process {running.pid}" in observer.stdout.readline()
         running.client.stop("ramp", "enough")
         said = observer.stdout.read()
@@ -109,8 +98,8 @@ def test_watch_shows_the_run_and_its_end(running):
     assert "dwell" in said
 
 
-def test_watch_reports_that_no_engine_runs():
-    told = vibench("stop")
+def test_watch_reports_that_no_engine_runs(vibench, tmp_path):
+    told = vibench("stop", cwd=tmp_path)
     assert told.returncode == 1
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
     assert f"Only {os.environ['VIBENCH_STATE_DIR']} was searched" in told.stderr
