@@ -55,11 +55,6 @@ class Background:
     """Source of the noise estimate, or the reason why there is none."""
 
     @property
-    def is_rest(self) -> bool:
-        """Return whether all of the non-repeating part is noise, so that the motion is the repeating part."""
-        return self.source == BETWEEN
-
-    @property
     def is_known(self) -> bool:
         """Return whether the noise of the displacement is known."""
         return bool(np.isfinite(self.rms_m))
@@ -138,6 +133,8 @@ _SLOW = 0.5
 """Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
 _ONCE = 0.5
 """Share of the variance at one cycle per record above which the change may continue after the record."""
+_TREND = 2.0
+"""Square of a trend over its variance below which it counts as random; chance exceeds this in 14 %."""
 _BEYOND = 3.0
 """Ratio of the remaining decay to the observed scatter if the record covers a tenth of the decay."""
 
@@ -145,8 +142,9 @@ _BEYOND = 3.0
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    0 if the parts scatter at random, because their standard error then suffices. NaN if a change of more than
-    0.2 % is incomplete at the end of the record, because its final value is unknown.
+    0 if the parts scatter at random, because their standard error then suffices; otherwise at least half the
+    change of a line through the parts. NaN if a change of more than 0.2 % is incomplete at the end of the
+    record, because its final value is unknown.
 
     Parameters
     ----------
@@ -161,7 +159,9 @@ def slow_change(parts: Complexes | Reals) -> float:
     # With few parts, neighbouring parts of a linear trend are less correlated.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
     if float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) <= min(limit, _SLOW) * power:
-        return 0.0
+        place = np.linspace(-1, 1, count)
+        trend = abs(complex(place @ off)) ** 2 / float(place @ place)
+        return float(np.sqrt(max(0.0, trend - _TREND * (power - trend) / (count - 2)) / (place @ place)))
     sd = float(np.sqrt(power / (count - 1)))
     lines = np.abs(np.fft.fft(off)) ** 2
     if lines[1] + lines[-1] <= _ONCE * np.sum(lines):
@@ -368,7 +368,9 @@ def dwell_response(
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
     repeated = sizes_with_maxima(repeated)
     rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
-    lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
+    # If all of the non-repeating part is noise, the motion is the repeating part.
+    moved = repeated if noise.source == BETWEEN else motion
+    lift = noise_lift(moved, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
     spectrum = spectrum.convert(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     return DwellResponse(
@@ -425,8 +427,7 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
     if np.mean(clear) < LEAST_CLEAR:
         raise UnusableData(
-            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the "
-            "window is without "
+            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the window is without "
             f"drop-outs, but {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear

@@ -177,8 +177,7 @@ def _correct(found: M, channels: Channels, first_s: float) -> M:
     """Count time from the first sample of the sweep, and correct for the sensors' gains."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(
-            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of "
-            "the sweep's "
+            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
             f"intervals are without drop-outs, but {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
             "and measure again"
         )
