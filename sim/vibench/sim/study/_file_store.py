@@ -22,7 +22,7 @@ from ..hdf5_files.writing import open_hdf5_to_write
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _grid as layout
 from ._errors import StudyError
-from ._results import places_of, read_arrays, read_plan
+from ._results import offsets_of, read_arrays, read_plan, read_sessions
 from ._software import software
 from ._store import Arrays, PointAnswer, write_cells
 
@@ -207,11 +207,11 @@ class FileStore:
             _require_same(path, read_plan(path, type(plan)), plan)
             self.arrays = read_arrays(path, plan)
             """All results that the file contains."""
-            self._places = places_of(path, plan)
+            self._offsets = offsets_of(path, plan)
+            self._session = min(len(read_sessions(path, type(plan))), layout.MOST_SESSIONS - 1)
         except BaseException:
             self._disk.close()
             raise
-        self._session = 0
 
     @classmethod
     def create(cls, path: Path, plan: layout.GridPlan) -> Self:
@@ -221,14 +221,13 @@ class FileStore:
 
     def begin(self, executor: str) -> None:
         """Record a new session in the file: time, software and executor."""
-        self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):
             raw = text.encode()[:width].ljust(width, b"\0")
-            self._write(self._places.session_columns[name] + self._session * width, raw)
+            self._write(self._offsets[f"{layout.SESSIONS}/{name}"] + self._session * width, raw)
         self._sync()
         counter = np.asarray(self._session + 1, dtype=layout.COUNTER_DTYPE)
-        self._write(self._places.n_sessions, counter.tobytes())
+        self._write(self._offsets[f"{layout.SESSIONS}/{layout.N_SESSIONS}"], counter.tobytes())
         self._sync()
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
@@ -240,10 +239,10 @@ class FileStore:
             cells = {**answer.cells, layout.SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
             for column, raw in write_cells(self.arrays, self._columns, kept):
-                self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
+                self._write(self._offsets[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
-            self._write(self._places.columns[layout.STATE] + answer.number, bytes([answer.state]))
+            self._write(self._offsets[layout.STATE] + answer.number, bytes([answer.state]))
             self.arrays[layout.STATE][answer.number] = answer.state
         self._sync()
 
@@ -251,10 +250,10 @@ class FileStore:
         """Write the filled-in points of a map as whole columns: first numbers, then point states."""
         for name, values in cells.items():
             self.arrays[name][numbers] = values
-            self._write(self._places.columns[name], self.arrays[name].tobytes())
+            self._write(self._offsets[name], self.arrays[name].tobytes())
         self._sync()
         self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
-        self._write(self._places.columns[layout.STATE], self.arrays[layout.STATE].tobytes())
+        self._write(self._offsets[layout.STATE], self.arrays[layout.STATE].tobytes())
         self._sync()
 
     def close(self) -> None:

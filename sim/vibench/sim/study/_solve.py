@@ -18,16 +18,7 @@ from ..specimen.outcome import Outcome
 from ..specimen.stops import member
 from ._errors import ClusterLost
 from ._executor import Executor, Solver, ThreadExecutor
-from ._grid import (
-    CONTINUES,
-    FINAL_STATE,
-    IDENTITY,
-    PHASE,
-    TAKEN,
-    Cell,
-    GridPlan,
-    PointState,
-)
+from ._grid import CONTINUES, FINAL_STATE, IDENTITY, PHASE, TAKEN, Cell, GridPlan, PointState
 from ._queue import NOBODY, Points, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
