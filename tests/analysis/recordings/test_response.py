@@ -10,7 +10,12 @@ from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channel_levels import channel_levels
 from vibench.analysis.recordings.channels import RecordedChannels
-from vibench.analysis.recordings.response import ResponseChannel, derivative_kernel, integral_kernel
+from vibench.analysis.recordings.response import (
+    ResponseChannel,
+    derivative_kernel,
+    integral_kernel,
+    noise_as_read,
+)
 
 RATE = synthetic.RATE
 ACCELERATION = ("m0_acceleration", "acceleration", "m s-2", 100.0)
@@ -154,3 +159,14 @@ def test_the_level_of_a_channel_is_computed_only_from_samples_that_were_not_lost
         levels = channel_levels(recording)
         rows = [recording.read(each.header.role) for each in levels]
     assert [each.rms for each in levels] == pytest.approx([np.sqrt(np.nanmean(row**2)) for row in rows])
+
+
+def test_simulated_noise_of_an_accelerometer_doubles_in_power_at_the_ends():
+    """Beyond an end, the integral continues with mirrored samples, which repeat the last samples' noise."""
+    rng = np.random.default_rng(5)
+    read = np.stack(
+        [np.concatenate(list(noise_as_read("m0_acceleration", 100.0, 500, 70, rng))) for _ in range(3000)]
+    )
+    power = np.mean(read**2, axis=0)
+    assert read.shape[1] == 500
+    assert power[[0, -1]] == pytest.approx(2 * power[150:350].mean(), rel=0.1)

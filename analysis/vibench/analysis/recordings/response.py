@@ -181,12 +181,16 @@ def noise_as_read(
 ) -> Iterator[Samples]:
     """Yield white sensor noise of unit variance, converted as in an analysis; for a mass, to a velocity."""
     conversion = None if role.startswith("base_") else _CONVERSIONS.get(_quantity(role))
-    kernel = np.ones(1) if conversion is None else conversion[0](rate_hz)
-    before: Samples = rng.standard_normal(kernel.size - 1, np.float32)
+    if conversion is None:
+        for first in range(0, count, block):
+            yield rng.standard_normal(min(block, count - first), np.float32)
+        return
+    kernel, about = conversion[0](rate_hz), conversion[1]
+    reach, white = kernel.size // 2, rng.standard_normal(count)
+    # Mirrored samples double the variance of an integral at both ends of a recording.
+    white = np.concatenate((_mirror(white, reach, about)[::-1], white, _mirror(white[::-1], reach, about)))
     for first in range(0, count, block):
-        white = np.concatenate((before, rng.standard_normal(min(block, count - first), np.float32)))
-        yield white if kernel.size == 1 else _convolve(white, kernel)
-        before = white[white.size - kernel.size + 1 :]
+        yield _convolve(white[first : first + block + 2 * reach], kernel)
 
 
 def _mirror(samples: Reals, count: int, about: float) -> Reals:
