@@ -188,7 +188,8 @@ class MapResults(GridResults[Map]):
     def _labels(self) -> NDArray[np.int64]:
         has_result = np.isin(self.state.reshape(-1), (PointState.DONE, PointState.FILLED))
         # Points filled in from a failed point have no motion.
-        return np.where(has_result & (self.arrays["motion"] >= 0), labels_of(self.arrays), UNKNOWN)
+        labels = labels_of(self.arrays)
+        return np.where(has_result & (labels >= 0), labels, UNKNOWN)
 
     @cached_property
     def _sizes(self) -> Floats:

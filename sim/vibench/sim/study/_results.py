@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,13 +103,14 @@ def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session,
     state = states(arrays)
     done = np.flatnonzero(state == PointState.DONE)
     for column in plan.columns:
-        values = arrays[column.name][done]
+        values: NDArray[Any] = arrays[column.name][done]
         lowest = 0 if column.meanings and column.components == 1 else MISSING_WHOLE
         if column.meanings and not np.all((values >= lowest) & (values < len(column.meanings))):
             raise ValueError(f"its column {column.name} has a value without a meaning")
         if column.name in ("response_i", DURATION, PHASE) and not np.all(np.isfinite(values)):
             raise ValueError(f"its column {column.name} lacks a number")
-    if np.any(state >= len(PointState)) or np.any(arrays[CONTINUES] >= plan.grid.size):
+    before = arrays[CONTINUES].astype(np.int64)
+    if np.any(state >= len(PointState)) or np.any(before >= plan.grid.size):
         raise ValueError("it refers to states or points that do not exist")
     own = [row for row, each in enumerate(sessions) if each.software_json == software()]
     known = done[np.isin(arrays[SESSION][done], own)]
