@@ -1,9 +1,10 @@
 """HDF5 files of branches, spectra and chains, with units and the request."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -31,18 +32,13 @@ _OWN_UNITS = {
     "attenuation_db": "dB",
 }
 """Units of datasets whose names have no unit suffix."""
-_COLUMNS: Mapping[str, tuple[int, ...]] = {
-    "frequency_hz": (),
-    "amplitude_m": (),
-    "response_i": (4,),
-    "response_ii": (4,),
-    "states": (6,),
-    "multiplier_real": (6,),
-    "multiplier_imaginary": (6,),
-    "impacts": (),
-    "error_estimate": (),
-}
-"""Columns of a branch, with the shape of each row; each column is an HDF5 dataset."""
+_COLUMNS = (
+    "frequency_hz amplitude_m response_i response_ii states multiplier_real multiplier_imaginary impacts "
+    "error_estimate"
+)
+"""Columns of a branch; each column is an HDF5 dataset."""
+_WIDTHS = {"response_i": 4, "response_ii": 4, "states": 6, "multiplier_real": 6, "multiplier_imaginary": 6}
+"""Numbers per row of the columns that have several."""
 _WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
 """Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
@@ -69,7 +65,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
     with _new_file(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
-            _write(group, line, _WORDS, " ".join(_COLUMNS))
+            _write(group, line, _WORDS, _COLUMNS)
             group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
             events = group.create_group("events")
             for name in _EVENT_COLUMNS:
@@ -116,13 +112,12 @@ def branch_curves(path: Path) -> tuple[Curve, ...]:
 
 
 def _read_line(group: h5py.Group) -> BranchLine:
-    kept: dict[str, object] = {}
+    kept: dict[str, Any] = {name: np.asarray(group[name][()]) for name in _COLUMNS.split()}
     count = len(group["frequency_hz"])
-    for name, row in _COLUMNS.items():
-        values = np.asarray(group[name][()])
-        if values.dtype.kind not in "fi" or values.shape != (count, *row) or count == 0:
+    for name, values in kept.items():
+        shape = (count, _WIDTHS[name]) if name in _WIDTHS else (count,)
+        if values.dtype.kind not in "fi" or values.shape != shape or count == 0:
             raise ValueError(f"{group.name}/{name} has another shape or type than vibench wrote")
-        kept[name] = values
     for name in _WORDS.split():
         value = group.attrs[name]
         kept[name] = value.item() if isinstance(value, np.generic) else value
@@ -133,7 +128,7 @@ def _read_line(group: h5py.Group) -> BranchLine:
     kept["events"] = tuple(
         LineEvent(kind, float(f), float(a), int(index), float(size)) for kind, f, a, index, size in rows
     )
-    return BranchLine(**{each.name: kept[each.name] for each in fields(BranchLine)})  # type: ignore[arg-type]
+    return BranchLine(**{each.name: kept[each.name] for each in fields(BranchLine)})
 
 
 def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
