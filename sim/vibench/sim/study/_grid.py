@@ -286,10 +286,6 @@ class GridPlan(FrozenModel, ABC):
     def frequency_at(self, place: tuple[int, ...]) -> float:
         """Return the drive frequency at a position of the grid [Hz]."""
 
-    def is_own(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bool:  # noqa: ARG002
-        """Return whether the stored result of a point belongs to its scene, as far as the file shows."""
-        return True
-
     def phase_after(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> float:
         """Return the drive phase [rad] at the end of a point's run, where the next point's run begins."""
         frequency_hz = self.frequency_at(self.grid.place(number))
