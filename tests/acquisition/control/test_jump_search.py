@@ -3,13 +3,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control.settling_controller import (
-    LocatedJump,
-    SettledPoint,
-    is_on_branch,
-    locate_jump,
-    side,
-)
+from vibench.acquisition.control.jump_controller import JumpBracket
+from vibench.acquisition.control.settling_controller import LocatedJump, SettledPoint, is_on_branch, side
 from vibench.acquisition.recording import JumpSide
 
 
@@ -20,19 +15,13 @@ def search_jump(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=
         is_before = (frequency_hz < jump_hz) == (before_hz < after_hz)
         return (1.0 if is_before else height) * (1 + 0.01 * abs(frequency_hz - before_hz))
 
+    before, after = (SettledPoint(each_hz, response(each_hz)) for each_hz in (before_hz, after_hz))
     asked = []
-    search = locate_jump(
-        SettledPoint(before_hz, response(before_hz)),
-        SettledPoint(after_hz, response(after_hz)),
-        resolution_hz,
-    )
-    try:
-        frequency_hz = next(search)
-        while True:
-            asked.append(frequency_hz)
-            frequency_hz = search.send(SettledPoint(frequency_hz, response(frequency_hz)))
-    except StopIteration as end:
-        return end.value, asked
+    search = JumpBracket([before], after)
+    while not search.jump.is_narrow(resolution_hz):
+        asked.append(search.jump.frequency_hz)
+        search.narrow(SettledPoint(asked[-1], response(asked[-1])))
+    return search.jump, asked
 
 
 @given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))

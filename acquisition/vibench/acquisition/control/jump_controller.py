@@ -18,7 +18,6 @@ from .settling_controller import (
     SettledState,
     SettlingController,
     is_on_branch,
-    locate_jump,
     ratio,
     record_settled,
     side,
@@ -63,27 +62,27 @@ class _Pace(Enum):
 
 
 @dataclass
-class _JumpSearch:
+class JumpBracket:
+    """Bracket around a jump; each new point replaces one of its ends, as `side` decides."""
+
     branch: list[SettledPoint]
     """Points on the branch before the jump, in the order of the pass."""
     after: SettledPoint
-    here: JumpSide
+    here: JumpSide = JumpSide.AFTER
+    """Side of the jump on which the motion is now."""
 
     @property
-    def bracket(self) -> LocatedJump:
+    def jump(self) -> LocatedJump:
+        """The jump between the two ends of the bracket."""
         return LocatedJump(self.branch[-1], self.after)
 
     def narrow(self, point: SettledPoint) -> None:
+        """Replace one end of the bracket by ``point``, which was measured between both ends."""
         self.here = side(point, self.branch[-1], self.after)
         if self.here is JumpSide.BEFORE:
             self.branch.append(point)
         else:
             self.after = point
-
-    def shorten(self, place: int, point: SettledPoint) -> None:
-        """Shorten the branch, which the motion left at index ``place``, where ``point`` was measured."""
-        del self.branch[place:]
-        self.after = point
 
 
 class JumpLocator:
@@ -110,7 +109,7 @@ class JumpLocator:
         A steep slope is no jump: across it, the change of the response shrinks with the bracket. If both
         branches exist at the frequency of ``after``, the motion may end on either; the note states on which.
         """
-        search = _JumpSearch(list(points), after, JumpSide.AFTER)
+        search = JumpBracket(list(points), after)
         found, why = yield from self._bisect(search)
         is_jump = found.is_jump(self._rule.factor)
         end = yield from self._move_to(after.frequency_hz)
@@ -120,41 +119,34 @@ class JumpLocator:
         self._say(found, why, branch)
         return point, is_jump and has_arrived
 
-    def _bisect(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
+    def _bisect(self, search: JumpBracket) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
         for _ in range(_MOST_BRACKETS):
             found = yield from self._halve(search)
             if found is not None:
                 return found
-        return search.bracket, JumpSearchEnd.ELSEWHERE
+        return search.jump, JumpSearchEnd.ELSEWHERE
 
-    def _halve(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
+    def _halve(self, search: JumpBracket) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
         """Halve the bracket until it is narrow enough; return None if the motion left its branch early."""
-        seek = locate_jump(search.branch[-1], search.after, self._rule.resolution_hz)
-        try:
-            frequency_hz = next(seek)
-            while True:
-                if search.here is JumpSide.AFTER:
-                    match (yield from self._return_to_branch(search)):
-                        case _Return.NOT_FOUND if not self._is_late():
-                            return search.bracket, JumpSearchEnd.BRANCH_LOST
-                        case _Return.LEFT:
-                            return None
-                if self._is_late():
-                    return search.bracket, JumpSearchEnd.OUT_OF_TIME
-                point = yield from self._search_at(frequency_hz)
-                search.narrow(point)
-                if not search.bracket.is_jump(self._rule.factor):
-                    return search.bracket, JumpSearchEnd.STEEP
-                frequency_hz = seek.send(point)
-        except StopIteration:
-            return search.bracket, JumpSearchEnd.LOCALISED
+        while not search.jump.is_narrow(self._rule.resolution_hz):
+            if search.here is JumpSide.AFTER:
+                match (yield from self._return_to_branch(search)):
+                    case _Return.NOT_FOUND if not self._is_late():
+                        return search.jump, JumpSearchEnd.BRANCH_LOST
+                    case _Return.LEFT:
+                        return None
+            if self._is_late():
+                return search.jump, JumpSearchEnd.OUT_OF_TIME
+            search.narrow((yield from self._search_at(search.jump.frequency_hz)))
+            if not search.jump.is_jump(self._rule.factor):
+                return search.jump, JumpSearchEnd.STEEP
+        return search.jump, JumpSearchEnd.LOCALISED
 
-    def _return_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
+    def _return_to_branch(self, search: JumpBracket) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
         Move forward in a fast glide first. If the motion leaves the branch, find out in steps where.
         """
-        left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
             place = yield from self._rejoin(search.branch)
             if place is None:
@@ -166,8 +158,9 @@ class JumpLocator:
                 return _Return.BACK
             if self._is_late():
                 return _Return.NOT_FOUND
-        assert left is not None, "both attempts left the branch"
-        search.shorten(*left)
+            if pace is _Pace.STEP:
+                place, search.after = left
+                del search.branch[place:]
         return _Return.LEFT
 
     def _find_departure(

@@ -1,6 +1,5 @@
 """Wait until a motion has settled, while feedback brings the base to its level and holds it there."""
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from math import ceil, inf, isfinite, log
 
@@ -49,27 +48,13 @@ class LocatedJump:
         """Middle of the frequency interval that contains the jump [Hz]."""
         return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
 
+    def is_narrow(self, resolution_hz: float) -> bool:
+        """Whether the interval is no wider than ``resolution_hz``."""
+        return abs(self.after.frequency_hz - self.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
+
     def is_jump(self, factor: float) -> bool:
         """Whether the response changes by more than ``factor`` across the bracket."""
         return ratio(self.before, self.after) > factor
-
-
-Seek = Generator[float, SettledPoint, LocatedJump]
-"""Generator that yields the next frequency on the branch before the jump and receives its settled point."""
-
-
-def locate_jump(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
-    """Halve the bracket until it is no wider than ``resolution_hz``.
-
-    The caller approaches each frequency from ``before``; `side` decides which end the new point replaces.
-    """
-    while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
-        middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
-        if side(middle, before, after) is JumpSide.BEFORE:
-            before = middle
-        else:
-            after = middle
-    return LocatedJump(before, after)
 
 
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
