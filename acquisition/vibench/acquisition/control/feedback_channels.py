@@ -11,7 +11,7 @@ from ..plan import needed_vpp
 from ..recording import bridge, coupling_cut_hz, find_dropouts, first_undecided
 from ..rig import RESPONSE_ROLES, Channel, OnTable, Rig, Role
 from .control_action import PhaseSamples
-from .steadiness import Phasors, Stroboscope
+from .steadiness import Phasors
 
 _DERIVATIVES = {Role.M0_ACCELERATION: -1, Role.M0_DISPLACEMENT: 1}
 
@@ -58,10 +58,6 @@ class FeedbackChannels:
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
-
-    def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
-        """Return a `Stroboscope` for a motion whose period is ``drives`` drive periods."""
-        return Stroboscope(near_hz, self.sample_rate_hz, drives)
 
     def transmissibility(
         self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0

@@ -156,7 +156,7 @@ class SineLoop:
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
         """Change frequency and setting of the drive from the next phase on."""
         if frequency_hz != self.setting.frequency_hz:
-            self._scope = self.channels.stroboscope(frequency_hz, self.drives)
+            self._scope = Stroboscope(frequency_hz, self.channels.sample_rate_hz, self.drives)
             self._rows.skip()
         self.setting = DriveSetting(frequency_hz, setting_vpp)
         self.forget()
@@ -244,7 +244,7 @@ def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
-        setting_vpp /= _model_vpp(loop, level)
+        setting_vpp /= _bare_vpp(loop, level, loop.setting.frequency_hz)
     _change(loop, frequency_hz, setting_vpp, level)
 
 
@@ -269,16 +269,12 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
         acceleration = abs(complex(np.mean(loop.periods.base)))
         require_answer(loop.rig, now.frequency_hz, now.setting_vpp, acceleration)
     target = level.acceleration_at(now.frequency_hz)
-    modelled = target * now.setting_vpp / _model_vpp(loop, level)
+    modelled = target * now.setting_vpp / _bare_vpp(loop, level, now.frequency_hz)
     estimator.add(loop.elapsed_s, loop.periods.base, modelled, target)
 
 
-def _model_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Return the setting for the level at the present frequency, assuming a bare table [Vpp]."""
-    return _bare_vpp(loop, level, loop.setting.frequency_hz)
-
-
 def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
+    """Return the setting for the level at a frequency, assuming a bare table [Vpp]."""
     return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz, OnTable.NOTHING)
 
 
