@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
 from ..host.toml_file import FrozenModel
-from .feedback import BaseLevel
-from .multisine import Lines
 from .periodic_noise import PeriodicNoise
 from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Samples
@@ -73,11 +71,6 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
         return self
 
     @property
-    def lines(self) -> Lines:
-        """All harmonics of ``repetition_hz`` in the band."""
-        return self.candidates
-
-    @property
     def density(self) -> Samples:
         """Requested power spectral density at each spectral line [(m/s2)2/Hz]."""
         return density_at(self.spectrum, self.lines * self.repetition_hz)
@@ -86,11 +79,6 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     def rms_m_per_s2(self) -> float:
         """Rms base acceleration of all spectral lines of the band [m/s2]."""
         return float(np.sqrt(np.sum(self.density) * self.repetition_hz))
-
-    @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Empty: feedback holds a spectrum, not the level of a sine."""
-        return ()
 
     @property
     def level_text(self) -> str:

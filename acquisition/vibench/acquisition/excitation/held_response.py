@@ -6,7 +6,7 @@ from pydantic import Field, PositiveFloat
 
 from vibench.sim import PhaseReference
 
-from .feedback import BaseLevel, HeldMetres, Share
+from .feedback import HeldMetres, Share
 from .plan import AbstractFeedback
 from .settled_sine import GLIDE_TONE_S
 from .stepped_sine import FrequencySteps
@@ -36,11 +36,6 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     """Longest wait for ``response_m`` at a frequency [s]; the step's note states if the tolerance was met."""
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
-
-    @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Empty: feedback holds the response, not a level of the base."""
-        return ()
 
     @property
     def level_text(self) -> str:

@@ -1,6 +1,5 @@
 """Periodic noise from the generator's memory: equal spectral lines in a band, new phases per realisation."""
 
-from abc import abstractmethod
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Self
 
@@ -74,9 +73,9 @@ class PeriodicNoise(BandNoise):
     """Seed of the random phases; the same seed gives the same waveforms on any machine."""
 
     @property
-    @abstractmethod
     def lines(self) -> Lines:
-        """The excited harmonics of ``repetition_hz``."""
+        """The excited harmonics of ``repetition_hz``: all harmonics in the band, or those that are chosen."""
+        return self.candidates
 
     @property
     def candidates(self) -> Lines:

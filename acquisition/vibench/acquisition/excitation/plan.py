@@ -291,9 +291,9 @@ class AbstractFeedback(AbstractExcitation):
     """
 
     @property
-    @abstractmethod
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; if empty, the setting is constant."""
+        """Levels of the base to be held, in the order played; if empty, no level of a sine is held."""
+        return ()
 
     @property
     def level_text(self) -> str:

@@ -4,7 +4,6 @@ from typing import Literal
 
 from pydantic import field_validator
 
-from .multisine import Lines
 from .periodic_noise import PeriodicNoise
 
 
@@ -23,8 +22,3 @@ class WhiteNoise(PeriodicNoise):
     @classmethod
     def _present_name(cls, _: str) -> Literal["white_noise"]:
         return "white_noise"
-
-    @property
-    def lines(self) -> Lines:
-        """All harmonics of ``repetition_hz`` in the band."""
-        return self.candidates
