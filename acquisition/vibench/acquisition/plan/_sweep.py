@@ -88,7 +88,7 @@ LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """Axes of a sweep, by the names used in ``order``."""
+    """Axes of a sweep in the usual order, by the names used in ``order``."""
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
@@ -97,13 +97,6 @@ class SweepAxis(StrEnum):
     FREQUENCY = "frequency_hz"
 
 
-USUAL_ORDER = (
-    SweepAxis.REPETITION,
-    SweepAxis.EXCITATION,
-    SweepAxis.LEVEL,
-    SweepAxis.DIRECTION,
-    SweepAxis.FREQUENCY,
-)
 _UNITS = {SweepAxis.LEVEL: "vpp", SweepAxis.FREQUENCY: "hz"}
 _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 
@@ -118,10 +111,6 @@ class _Place:
 
     def name(self, sweep: str) -> str:
         return "-".join([sweep, *self.words.values()])
-
-    def with_words(self, **words: str) -> "_Place":
-        """Return the same position, with some parts of the name replaced."""
-        return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
 class Sweep(FrozenModel):
@@ -141,7 +130,7 @@ class Sweep(FrozenModel):
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
     frequency_hz: Values | None = None
-    order: tuple[SweepAxis, ...] = Field(default=USUAL_ORDER, min_length=1)
+    order: tuple[SweepAxis, ...] = Field(default=tuple(SweepAxis), min_length=1)
     """Axes of the sweep, from the outermost (slowest) to the innermost."""
     continue_from_previous: SweepAxis | None = None
     """Axis along which the specimen stays on its branch: ``frequency_hz`` or ``amplitude_vpp``. It must be
@@ -250,8 +239,8 @@ class Sweep(FrozenModel):
             turn: Direction | None = chain.values.get(SweepAxis.DIRECTION)
             passes = [("", rising)] if turn is None else turn.passes(rising)
             for word, value in ((word, value) for word, values in passes for value in values):
-                there = chain.with_words(DIRECTION=word) if word else chain
-                name = f"{there.name(self.name)}-{self._word(along, value)}"
+                words = {**chain.words, SweepAxis.DIRECTION: word} if word else chain.words
+                name = "-".join([self.name, *words.values(), self._word(along, value)])
                 measurement = _measurement(self._content(name, {**chain.values, along: value}), name)
                 passed = way if self.lead_points is None else way[-self.lead_points :]
                 led, tone = _with_lead_in(measurement.excitation, tuple(passed), self.lead_s, name)
