@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from vibench.sim.operating_system.this import Buffer
 from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
-from ._disk import Disk
+from ._disk import PositionedFile
 from ._layout import cell, json_text
 from ._preallocate import TablePlaces
 
@@ -47,7 +47,9 @@ class Batch:
 class Committer:
     """Writer of batches in a thread; it reports the first failure at the next call."""
 
-    def __init__(self, disk: Disk, queue_samples: int, interval_s: float = COMMIT_INTERVAL_S) -> None:
+    def __init__(
+        self, disk: PositionedFile, queue_samples: int, interval_s: float = COMMIT_INTERVAL_S
+    ) -> None:
         self._disk = disk
         self._queue_samples = queue_samples
         self._interval_s = interval_s
@@ -314,10 +316,6 @@ class Journal:
                 max(last.last_sample, overload.last_sample),
             )
             self._last_overload[overload.channel] = (row, grown)
-            return self._overloads.replace(row, _overload_cells(grown))
+            return self._overloads.replace(row, astuple(grown))
         self._last_overload[overload.channel] = (self._overloads.rows, overload)
-        return self._overloads.append(_overload_cells(overload))
-
-
-def _overload_cells(overload: Overload) -> tuple[Cell, ...]:
-    return (overload.channel, overload.first_sample, overload.last_sample)
+        return self._overloads.append(astuple(overload))

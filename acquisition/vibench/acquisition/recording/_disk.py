@@ -7,27 +7,10 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from math import inf
 from pathlib import Path
-from typing import Protocol
 
 from vibench.sim.operating_system.this import Buffer, OpenFile, is_locked_alone
 
 from ..errors import RecordingError
-
-
-class Disk(Protocol):
-    """File operations with which the committer writes a recording."""
-
-    def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``, at least into the cache of the operating system."""
-
-    def sync(self) -> None:
-        """Wait until everything written so far would survive a power cut."""
-
-    def reserve(self, offset: int, size: int) -> None:
-        """Reserve space in the file, so that later writes to this range do not fail on a full disk."""
-
-    def close(self) -> None:
-        """Close the file and release its lock."""
 
 
 class PositionedFile(OpenFile):
@@ -153,7 +136,7 @@ def trouble_disks(trouble: DiskTrouble) -> Iterator[None]:
         _installed.remove(trouble)
 
 
-def open_disk(path: Path) -> Disk:
+def open_disk(path: Path) -> PositionedFile:
     """Open an existing file for recording, with the active simulated faults."""
     return TroubledDisk(path) if _installed else PositionedFile(path)
 

@@ -10,7 +10,7 @@ import tempfile
 import threading
 import uuid
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -186,14 +186,11 @@ def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.D
 
 def _claim(part: Path, places: Places) -> None:
     """Reserve disk space for the file's header and for ``places.reserved`` samples of each channel."""
-    disk = PositionedFile(part)
-    try:
+    with closing(PositionedFile(part)) as disk:
         disk.reserve(0, min(places.channels))
         for offset in places.channels:
             disk.reserve(offset, places.reserved * ITEM_BYTES)
         disk.sync()
-    finally:
-        disk.close()
 
 
 Answer = TypeVar("Answer")

@@ -24,7 +24,7 @@ from ..host.log import LOG
 from ..instruments import Block, Counts, Samples
 from . import _layout as layout
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer, Journal, Number
-from ._disk import Disk, open_disk
+from ._disk import PositionedFile, open_disk
 from ._finalise import discard, finalise, location
 from ._header import ChannelHeader, RecordingHeader
 from ._layout import COUNT_DTYPE, LARGEST_COUNT, RecordingState, encode
@@ -145,7 +145,7 @@ class RecordingWriter:
         path: Path,
         header: RecordingHeader,
         places: Places,
-        disk: Disk,
+        disk: PositionedFile,
         commit_interval_s: float = COMMIT_INTERVAL_S,
         reserve: DescriptorReserve | None = None,
         key: SealKey | None = None,
