@@ -2,9 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum, auto
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from vibench.sim.hdf5_files import door
 
 from ..errors import RecordingError
+from ..host.beside import ClosedOnLeaving
 from ..instruments import Counts, Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
 from ._contents import channel_header, configuration_facts, file_facts
@@ -152,13 +152,6 @@ class RecordedBlock:
     """Shape (channels, samples), in each channel's physical unit."""
 
 
-class Growth(Enum):
-    """Whether more samples may follow, because the recording still grows."""
-
-    FINISHED = auto()
-    GROWING = auto()
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordingDescription:
     """Description of a recording, its bench and its end."""
@@ -183,7 +176,7 @@ class RecordingDescription:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Recording(RecordingDescription):
+class Recording(RecordingDescription, ClosedOnLeaving):
     """One recording as it was when opened. Close it, or use it in a ``with`` block."""
 
     samples: int
@@ -384,12 +377,6 @@ class Recording(RecordingDescription):
         """Close the file. May be called at any time."""
         self._open.file.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _range(self, start: int, stop: int | None) -> tuple[int, int]:
         end = self.samples if stop is None else stop
         if not 0 <= start <= end <= self.samples:
@@ -436,7 +423,7 @@ def _read(handle: OpenRecording) -> Recording:
     facts = file_facts(read_attributes(file), **growing)
     roles = tuple(facts.roles.split())
     for role in roles:
-        _require_channel(file, role, facts.samples, Growth.GROWING if is_part else Growth.FINISHED)
+        _require_channel(file, role, facts.samples)
     columns = {
         table.name: tables.clip(tables.read_columns(file, table), table, facts.samples)
         for table in layout.TABLES
@@ -460,8 +447,8 @@ def _read(handle: OpenRecording) -> Recording:
     )
 
 
-def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -> None:
-    """Raise RecordingError unless the channel has the stated number of samples."""
+def _require_channel(file: h5py.File, role: str, samples: int) -> None:
+    """Raise RecordingError unless the channel has ``samples``; only in a ``.part`` it may be longer."""
     dataset = file.get(role)
     if (
         not isinstance(dataset, h5py.Dataset)
@@ -469,7 +456,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
         or dataset.dtype != np.dtype(layout.COUNT_DTYPE)
     ):
         raise RecordingError(f"the channel {role!r} is not an array of counts")
-    if len(dataset) < samples or (growth is Growth.FINISHED and len(dataset) != samples):
+    if len(dataset) < samples or (layout.N_VALID not in file and len(dataset) != samples):
         raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, the recording {samples}")
     if dataset.chunks is not None and dataset.id.get_num_chunks() != -(-len(dataset) // dataset.chunks[0]):
         raise RecordingError(f"the channel {role!r} lacks some of its samples")
