@@ -7,7 +7,7 @@ values. Because an event's text is limited in length, notes of version 1 omit th
 import json
 from enum import StrEnum
 from math import inf, isfinite
-from typing import Annotated, Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -384,9 +384,7 @@ FeedbackNote: TypeAlias = (
     | UntilNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
-_FOUND = ("settled", "achieved", "level", "jump", "resonance", "spectrum")
-_FOLLOWED = ("held_response", "branch_point", "branch_stability", "branch_end")
-_KINDS = frozenset((*_FOUND, *_FOLLOWED, "until"))
+_KINDS = frozenset(note.model_fields["kind"].default for note in get_args(FeedbackNote))
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:
