@@ -1,5 +1,6 @@
 """End of a run: report the first cause, silence the drive, stop sampling, finish the recording."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,13 +78,14 @@ class Ending:
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
         """Silence the drive, end sampling and finish the recording; do each step even if another fails."""
         with ExitStack() as leaving:
-            leaving.callback(self._finish, sink)
+            leaving.callback(self._note_failure, lambda: sink.finish(_RECORDED_AS[self.state], self.reason))
             leaving.callback(self._stop_listening, digitizer)
-            leaving.callback(self._silence, guard)
+            leaving.callback(self._note_failure, guard.silence)
 
-    def _silence(self, guard: DriveGuard) -> None:
+    def _note_failure(self, step: Callable[[], object]) -> None:
+        """Do a step; note its failure, and raise it."""
         try:
-            guard.silence()
+            step()
         except AcquisitionError as failure:
             self._add(failure)
             raise
@@ -96,13 +98,6 @@ class Ending:
             self._add(failure)
             if not has_failed_already:  # otherwise the first failure stays the cause of the end
                 raise
-
-    def _finish(self, sink: RecordingWriter) -> None:
-        try:
-            sink.finish(_RECORDED_AS[self.state], self.reason)
-        except AcquisitionError as failure:
-            self._add(failure)
-            raise
 
     def _add(self, failure: AcquisitionError) -> None:
         if self._cause is None:
