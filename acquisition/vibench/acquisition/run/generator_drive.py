@@ -154,7 +154,10 @@ class GeneratorDrive:
 
     def cut(self) -> None:
         """Turn the output off at once."""
-        self._stop()
+        self._generator.stop()
+        if self._is_on and self._dead_man is not None:
+            self._generator.end_burst()
+        self._is_on = False
 
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands; in any case, then turn the output off.
@@ -168,11 +171,11 @@ class GeneratorDrive:
             with suppress(AcquisitionError):  # if the ramp fails, stop() still switches the output off
                 self._ramp_down_blindly()
         finally:
-            self._stop()
+            self.cut()
         if self._setting_vpp > self._quiet_vpp() and (was_off or self._level > 0.0):
             with suppress(AcquisitionError):
                 self._lower()
-            self._stop()
+            self.cut()
 
     def _sound(self, play: Play | None) -> None:
         """Play the small sine of the check without a ramp; for any other signal, turn the output off."""
@@ -184,7 +187,7 @@ class GeneratorDrive:
                     self._begin_bursts(play, self._check_s)
             case _:
                 if self._is_on:
-                    self._stop()
+                    self.cut()
 
     def _begin(self, play: Play | None) -> None:
         """Change the signal, and turn the output on if needed.
@@ -254,12 +257,6 @@ class GeneratorDrive:
         # Set the level before the command, so that the output counts as on if the command fails half-way.
         self._is_on = True
         self._generator.start()
-
-    def _stop(self) -> None:
-        self._generator.stop()
-        if self._is_on and self._dead_man is not None:
-            self._generator.end_burst()
-        self._is_on = False
 
     def _lower(self) -> None:
         """Set the amplitude for level 0 while the output is off."""
