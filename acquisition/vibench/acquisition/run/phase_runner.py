@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from enum import Enum, auto
-from typing import Any, NoReturn, Protocol
+from typing import NoReturn, TypeAlias
 
 import numpy as np
 
@@ -29,13 +29,6 @@ changes, the delay shifts the count of cycles."""
 
 CLEAR = 0.3
 """Fraction of the amplitude above which a sample counts as clearly positive or negative."""
-
-
-class Sink(Protocol):
-    """Receiver of every block that is read."""
-
-    def append(self, block: Block) -> None:
-        """Receive the next block of samples."""
 
 
 class GlideWatch:
@@ -129,6 +122,9 @@ class SweepWatch:
         self._glide.take([block], mean_hz, duration_s, lambda t: self._sweep.cycles(began_s + t) - began)
 
 
+Sink: TypeAlias = list[Block] | SweepWatch
+"""Receiver of every block that is read."""
+
 HOLD_LONGEST_S = HOLD_ROOM_S
 """Longest total hold of a run [s], limited by the space in its recording."""
 
@@ -207,11 +203,6 @@ class PhaseRunner:
         self._late_steps = 0
         self._lost_cycles = 0.0
         self._glided_hz = self._planned_hz = 0.0
-
-    @property
-    def coefficients(self) -> tuple[Any, ...]:
-        """Measurements of a real-time controller since the start of the last phase."""
-        return self._drive.coefficients
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         """Play a phase and yield progress; the blocks of the phase are also appended to ``into``, if given.

@@ -337,8 +337,23 @@ class Run(ClosedOnLeaving):
                 self._log_bounds(loop)
             self._log_bounds(loop)
         else:
-            yield from _run_controller(runner, self._controller)
+            yield from self._run_controller(runner, self._controller)
         loop.enter(None)
+
+    def _run_controller(self, runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
+        """Carry out a controller's actions; the controller receives the samples of each action."""
+        try:
+            action = next(controller)
+            while True:
+                for note in action.notes:
+                    runner.loop.log(note.kind, note.text)
+                blocks: list[Block] = []
+                if action.phase is not None:
+                    yield from runner.run_phase(action.phase, blocks)
+                samples = replace(phase_samples(blocks), coefficients=self._drive.coefficients)
+                action = controller.send(samples)
+        except StopIteration:
+            pass
 
     def _log_bounds(self, loop: AcquisitionLoop) -> None:
         """Log the error bounds of each finished result; the reason for the run's end repeats the last one."""
@@ -378,21 +393,6 @@ class Run(ClosedOnLeaving):
         """Return the duration of the ramp of a stop [s]."""
         planned_s = self._measurement.ramp_s
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
-
-
-def _run_controller(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
-    """Carry out a controller's actions; the controller receives the samples of each action."""
-    try:
-        action = next(controller)
-        while True:
-            for note in action.notes:
-                runner.loop.log(note.kind, note.text)
-            blocks: list[Block] = []
-            if action.phase is not None:
-                yield from runner.run_phase(action.phase, blocks)
-            action = controller.send(replace(phase_samples(blocks), coefficients=runner.coefficients))
-    except StopIteration:
-        pass
 
 
 def ignore_progress(progress: Progress) -> None:
