@@ -46,8 +46,10 @@ class Beside:
     def _run(self) -> None:
         goes_on = True
         while goes_on:
-            with suppress(MemoryError), MEMORY_RESERVE.release_when_short():
+            try:
                 goes_on = self._step()
+            except MemoryError:
+                MEMORY_RESERVE.release()
 
     def _step(self) -> bool:
         with self._changed:

@@ -3,7 +3,6 @@
 import mmap
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from threading import Lock
@@ -216,15 +215,6 @@ class MemoryReserve:
         held, self._held = self._held, None
         if held is not None:
             held.close()
-
-    @contextmanager
-    def release_when_short(self) -> Iterator[None]:
-        """Release the reserve on a MemoryError inside the context, then raise the error again."""
-        try:
-            yield
-        except MemoryError:
-            self.release()
-            raise
 
 
 MEMORY_RESERVE = MemoryReserve()
