@@ -36,6 +36,8 @@ from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, Stop
 # the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
 
 SILENT_REASON = "a stop request in the state folder"
+Press = Callable[[StopLevel, str], None]
+"""Function that carries out a stop of a level, for a reason."""
 
 
 def engines_folder() -> Path:
@@ -50,9 +52,7 @@ def engines_folder() -> Path:
 class KeptStops:
     """The stop files that are addressed to one process."""
 
-    def __init__(
-        self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
-    ) -> None:
+    def __init__(self, pid: int, process_start: str, press: Press, folder: Path) -> None:
         self._paths = {
             level: Path(stop_path(str(folder), pid, process_start, level)) for level in reversed(StopLevel)
         }
@@ -64,7 +64,7 @@ class KeptStops:
         """Reserved file descriptor; once it is closed, a reason can be read even if no other is free."""
 
     @classmethod
-    def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
+    def of_this_process(cls, press: Press) -> "KeptStops":
         """Return the stop files of this process; ``press`` is called to carry out a stop."""
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
@@ -165,9 +165,6 @@ class Watchdog:
                 getLogger(__name__).exception("%s", self._thread.name)
 
 
-Press = Callable[[StopLevel, str], None]
-
-
 class Program(BaseModel):
     """Announcement of a program that drives a bench, or may do so at any moment."""
 
@@ -230,7 +227,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     Raises AcquisitionError when there is no state folder and none can be created.
     """
     found = []
-    for _, announcement in _announcements(model):
+    for announcement in _announcements(model):
         # The name of the computer may change while a program runs. Process number and start time identify it.
         is_here = announcement.place is Place.HERE and (
             announcement.computer in ("", platform.node()) or announcement.process_start != ""
@@ -246,7 +243,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
     `note_open_bench` removes them. Raises AcquisitionError in the same cases as `announced_programs`.
     """
-    dead = (each for _, each in _announcements(Program) if not each.is_alive)
+    dead = (each for each in _announcements(Program) if not each.is_alive)
     return tuple(each for each in dead if each.computer == platform.node() or not each.computer)
 
 
@@ -266,11 +263,11 @@ def programs_of_other_places() -> tuple[Program, ...]:
 
     Raises AcquisitionError in the same cases as `announced_programs`.
     """
-    others = (each for _, each in _announcements(Program) if each.place is not Place.HERE)
+    others = (each for each in _announcements(Program) if each.place is not Place.HERE)
     return tuple(sorted((each for each in others if each.is_alive), key=lambda each: each.started_utc))
 
 
-def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]:
+def _announcements(model: type[AnyProgram]) -> Iterator[AnyProgram]:
     try:
         # glob would find nothing in a folder without read permission.
         paths = sorted(engines_folder().iterdir())
@@ -283,7 +280,7 @@ def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]
         if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait for ever
             continue
         try:
-            yield path, model.model_validate_json(_read_announcement(path))
+            yield model.model_validate_json(_read_announcement(path))
         except (ValueError, OSError):  # the file is of another version or type, or was removed
             continue
 
