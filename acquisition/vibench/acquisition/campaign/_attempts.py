@@ -116,44 +116,30 @@ class Attempts:
                 raise
             else:
                 point_result = self._end_attempt(point, outcome)
-                if not (
-                    left
-                    and point_result.reason_code is ReasonCode.OVER_RANGE
-                    and self._is_retryable(point_result.reason_code)
-                ):
+                is_over = point_result.reason_code is ReasonCode.OVER_RANGE
+                if not (left and is_over and self._is_retryable(ReasonCode.OVER_RANGE)):
                     return point_result
-                self._note(
-                    CampaignEventKind.RETRY,
-                    f"{point.name} is tried again: {point_result.reason}",
-                    point,
-                    path,
-                )
+                text = f"{point.name} is tried again: {point_result.reason}"
+                self._note(CampaignEventKind.RETRY, text, point, path)
                 self._pause.wait(self._bench, point.name)
                 if self._switch.request is not None:
                     return point_result
         raise AssertionError("the last attempt returns or raises")
 
     def _end_attempt(self, point: Point, outcome: Outcome) -> PointResult:
-        if outcome.state is not RunState.FINISHED:
-            self._journal.end(
-                point.name,
-                JournalPointState.INTERRUPTED,
-                ReasonCode.STOPPED,
-                outcome.reason,
-                _seal_of(outcome.path),
-            )
-            self._note(
-                CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path
-            )
-            return PointResult(
-                point.name, PointOutcome.STOPPED, outcome.path, outcome.reason, ReasonCode.STOPPED
-            )
-        over = _over_range(outcome.path, point.measurement.excitation.result_labels)
-        reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
-        reason = f"{outcome.reason}; {over}" if over else outcome.reason
-        self._journal.end(point.name, JournalPointState.DONE, reason_code, reason, _seal_of(outcome.path))
-        self._note(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
-        return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, reason_code)
+        if outcome.state is RunState.FINISHED:
+            over = _over_range(outcome.path, point.measurement.excitation.result_labels)
+            reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
+            reason = f"{outcome.reason}; {over}" if over else outcome.reason
+            state, result = JournalPointState.DONE, PointOutcome.RECORDED
+            kind = CampaignEventKind.POINT_DONE
+        else:
+            reason_code, reason = ReasonCode.STOPPED, outcome.reason
+            state, result = JournalPointState.INTERRUPTED, PointOutcome.STOPPED
+            kind = CampaignEventKind.POINT_STOPPED
+        self._journal.end(point.name, state, reason_code, reason, _seal_of(outcome.path))
+        self._note(kind, f"{point.name}: {reason}", point, outcome.path)
+        return PointResult(point.name, result, outcome.path, reason, reason_code)
 
     def _fail_attempt(self, point: Point, path: Path, error: AcquisitionError) -> None:
         reason_code = reason_code_of(error)
