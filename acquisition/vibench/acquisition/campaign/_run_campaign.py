@@ -1,7 +1,7 @@
 """Run a campaign: make one recording for each point, and write every step to a journal."""
 
 import shutil
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -184,15 +184,10 @@ class CampaignRunner:
         return f"is finished, {count_text(failed, 'point')} failed" if failed else "is finished"
 
     def _report_end(self, text: str, reason_code: str) -> None:
-        counts = {
-            each.value: sum(point_result.outcome is each for point_result in self._results)
-            for each in PointOutcome
-        }
-        self._say(
-            CampaignEvent(
-                CampaignEventKind.ENDED, text, {"why": reason_code, "left": len(self._coming), **counts}
-            )
-        )
+        counts = Counter(point_result.outcome for point_result in self._results)
+        facts: dict[str, str | int | float] = {"why": reason_code, "left": len(self._coming)}
+        facts |= {each.value: counts[each] for each in PointOutcome}
+        self._say(CampaignEvent(CampaignEventKind.ENDED, text, facts))
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:
@@ -347,20 +342,13 @@ class ReconnectingBench:
 
     def close(self) -> None:
         """Silence and close all instruments. May be called at any time."""
-        bench, self._bench = self._bench, None
-        try:
-            if bench is not None:
-                bench.close()
-        finally:
-            self._power.__exit__(None, None, None)
+        self.__exit__(None, None, None)
 
     def __enter__(self) -> Self:
-        self._power.__enter__()
-        try:
+        with ExitStack() as undo:
+            undo.enter_context(self._power)
             self._bench = open_bench(self._rig, self._confirm, power=self._power)
-        except BaseException as error:
-            self._power.__exit__(type(error), error, error.__traceback__)
-            raise
+            undo.pop_all()
         return self
 
     def __exit__(

@@ -1,5 +1,6 @@
 """The engine, which owns a bench and publishes its state."""
 
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, partial
@@ -246,11 +247,8 @@ class Engine:
 
 
 def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
-    counts = {
-        result: sum(point_result.outcome is result for point_result in point_results)
-        for result in PointOutcome
-    }
-    text = ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)
+    counts = Counter(point_result.outcome for point_result in point_results)
+    text = ", ".join(f"{counts[each]} {each.value}" for each in PointOutcome if counts[each])
     return f"Campaign ended: {text or 'stopped before its first point'}"
 
 
