@@ -232,10 +232,9 @@ def require_same_bench(begun_on: BenchIdentity, now: BenchIdentity) -> None:
 
 def _require_no_differences(found: tuple[str, ...]) -> None:
     if found:
-        shown = "; ".join(found[:MOST_DIFFERENCES])
-        more = f"; and {len(found) - MOST_DIFFERENCES} more" if len(found) > MOST_DIFFERENCES else ""
+        shown = "; ".join(leading(found, MOST_DIFFERENCES))
         raise CheckFailed(
-            f"the bench has changed since the campaign started: {shown}{more}. Nothing was played; "
+            f"the bench has changed since the campaign started: {shown}. Nothing was played; "
             "restore the bench as it was, or accept the change (--accept-changed-bench)"
         )
 
