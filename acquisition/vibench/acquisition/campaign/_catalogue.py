@@ -30,6 +30,7 @@ from ..recording import (
     SealDepth,
     SealKey,
     SealState,
+    close_on_error,
     copy_sentence,
     first_copies,
     forget_checks,
@@ -217,12 +218,8 @@ def _open_catalogue(folder: Path, refresh: Refresh) -> sqlite3.Connection:
     if refresh is Refresh.ALL:
         for each in (path, *(path.with_name(path.name + end) for end in ("-wal", "-shm", "-journal"))):
             each.unlink(missing_ok=True)
-    connection = sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)
-    try:
+    with close_on_error(sqlite3.connect(path, timeout=WAIT_S, isolation_level=None)) as connection:
         return _prepare(connection)
-    except sqlite3.Error:
-        connection.close()
-        raise
 
 
 def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
