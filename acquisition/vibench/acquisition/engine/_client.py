@@ -5,8 +5,8 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from math import inf
 from pathlib import Path
 from threading import Lock
@@ -24,7 +24,7 @@ from ..host.chosen import member
 from ..host.toml_file import FrozenModel
 from ..plan import Campaign
 from ..stopping.program import (
-    AnyProgram,
+    Press,
     Program,
     announce_program,
     announced_programs,
@@ -33,7 +33,6 @@ from ..stopping.program import (
     unconfirmed_programs,
     withdraw,
 )
-from ..stopping.stop import StopLevel
 from ._status import ArmedPlan, ConnectionRole, EngineStatus, RowStatus
 from ._verbs import CampaignRequest, EngineVerbs, Verb
 from ._wire import ANSWERS, EngineError, EngineGone, EngineSilent, Message, receive, send
@@ -57,15 +56,13 @@ class Announcement(Program):
     address: EngineAddress
 
 
-@contextmanager
-def announce(address: EngineAddress, what: str, press: Callable[[StopLevel, str], None]) -> Iterator[None]:
+def announce(address: EngineAddress, what: str, press: Press) -> AbstractContextManager[None]:
     """Let `announced_engines` find this engine within the context; ``press`` is called for each stop file.
 
     Raises AcquisitionError when the state folder cannot be written: an unannounced engine cannot be stopped.
     """
     announcement = Announcement.model_validate({**facts_of_this_process(what), "address": address})
-    with announce_program(press, announcement):
-        yield
+    return announce_program(press, announcement)
 
 
 def announced_engines() -> tuple[Announcement, ...]:
@@ -94,8 +91,10 @@ def the_engine(pid: int | None) -> Announcement:
     Raises EngineError when there is no such engine, or several engines and ``pid`` is None.
     """
     chosen = [each for each in announced_engines() if pid in (None, each.pid)]
+    if len(chosen) > 1:
+        raise EngineError(f"several programs drive a bench: {_names(chosen)}; select one with --pid")
     if chosen:
-        return _only(chosen)
+        return chosen[0]
     wanted = "no engine is running" if pid is None else f"no engine runs as process {pid}"
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
@@ -135,12 +134,6 @@ def require_ended(engine: Announcement) -> None:
     """
     if engine.was_killed:
         raise EngineGone(f"The engine was killed. {SWITCH_OFF}")
-
-
-def _only(chosen: list[AnyProgram]) -> AnyProgram:
-    if len(chosen) > 1:
-        raise EngineError(f"several programs drive a bench: {_names(chosen)}; select one with --pid")
-    return chosen[0]
 
 
 def _names(programs: Sequence[Program]) -> str:
