@@ -3,7 +3,7 @@
 If the motion stays on the other branch, the drive is lowered until that motion stops.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -112,7 +112,7 @@ class JumpLocator:
         search = JumpBracket(list(points), after)
         found, why = yield from self._bisect(search)
         is_jump = found.is_jump(self._rule.factor)
-        end = yield from self._move_to(after.frequency_hz)
+        end = yield from _settle_at(self._controller, self._plan, after.frequency_hz)
         point = end.point
         has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
@@ -137,7 +137,12 @@ class JumpLocator:
                         return None
             if self._is_late():
                 return search.jump, JumpSearchEnd.OUT_OF_TIME
-            search.narrow((yield from self._search_at(search.jump.frequency_hz)))
+            numbers: dict[str, int | str] = {"direction": self._direction, "pass": self._number}
+            middle_hz = search.jump.frequency_hz
+            point = yield from _record_at(
+                self._controller, self._plan, middle_hz, SegmentLabel.SEARCH, numbers
+            )
+            search.narrow(point)
             if not search.jump.is_jump(self._rule.factor):
                 return search.jump, JumpSearchEnd.STEEP
         return search.jump, JumpSearchEnd.LOCALISED
@@ -168,7 +173,7 @@ class JumpLocator:
     ) -> Controller[tuple[int, SettledPoint] | None]:
         """Go forward. Return index and state where the motion left the branch; None if it stayed."""
         for place in steps:
-            found = yield from self._move_to(branch[place].frequency_hz)
+            found = yield from _settle_at(self._controller, self._plan, branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
                 return place, found.point
         return None
@@ -178,7 +183,7 @@ class JumpLocator:
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
-            found = yield from self._move_to(branch[place].frequency_hz)
+            found = yield from _settle_at(self._controller, self._plan, branch[place].frequency_hz)
             if is_on_branch(found.point, branch[place], self._rule.factor):
                 return place
             if place == 0:
@@ -191,25 +196,6 @@ class JumpLocator:
         yield from decay_motion(self._controller.loop)
         found = yield from self._controller.settle()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
-
-    def _move_to(self, frequency_hz: float) -> Controller[SettledState]:
-        plan = self._plan
-        yield from glide(self._controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
-        return (yield from self._controller.settle())
-
-    def _search_at(self, frequency_hz: float) -> Controller[SettledPoint]:
-        found = yield from self._move_to(frequency_hz)
-        segment = Segment(
-            SegmentLabel.SEARCH,
-            {
-                "frequency_hz": frequency_hz,
-                "direction": self._direction,
-                "pass": self._number,
-                **found.note.numbers,
-            },
-        )
-        yield from record_settled(self._controller, found, segment, self._plan.record_s)
-        return found.point
 
     def _is_late(self) -> bool:
         """Return whether too little time is left for another step and the move to the end of the bracket."""
@@ -232,6 +218,27 @@ class JumpLocator:
         )
 
 
+def _settle_at(
+    controller: SettlingController, plan: SettledSine, frequency_hz: float
+) -> Controller[SettledState]:
+    yield from glide(controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
+    return (yield from controller.settle())
+
+
+def _record_at(
+    controller: SettlingController,
+    plan: SettledSine,
+    frequency_hz: float,
+    label: SegmentLabel,
+    numbers: Mapping[str, int | str],
+) -> Controller[SettledPoint]:
+    """Settle at a frequency, and record a segment with these ``numbers`` and those of the settled motion."""
+    found = yield from _settle_at(controller, plan, frequency_hz)
+    segment = Segment(label, {"frequency_hz": frequency_hz, **numbers, **found.note.numbers})
+    yield from record_settled(controller, found, segment, plan.record_s)
+    return found.point
+
+
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     """Run all passes of a settled sine, from the ramp up to the ramp down."""
     controller = SettlingController(loop, plan.settling, plan.base_level)
@@ -239,57 +246,38 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     yield from start(loop, passes[0][1][0], plan.base_level)
     came_from = "rest"
     for number, (direction, frequencies_hz) in enumerate(passes, start=1):
-        stepping = Pass(controller, plan, number, direction)
-        yield from stepping.carry_out(frequencies_hz, came_from)
+        yield from _run_pass(controller, plan, number, direction, frequencies_hz, came_from)
         came_from = f"{direction} pass {number}, {frequencies_hz[-1]:g} Hz"
     yield from loop.ramp_down()
 
 
-class Pass:
-    """One pass through the frequencies; counts the branches on which the motion has been."""
-
-    def __init__(
-        self, controller: SettlingController, plan: SettledSine, number: int, direction: str
-    ) -> None:
-        self._controller = controller
-        self._plan = plan
-        self._number = number
-        self._direction = direction
-        self._branch = 1
-        """Number of the present branch in this pass, from 1; each jump increases it by 1."""
-
-    def carry_out(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
-        """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
-        points: list[SettledPoint] = []
-        searched = 0
-        search = self._plan.jumps
-        for frequency_hz in frequencies_hz:
-            point = yield from self._step_to(frequency_hz, came_from)
-            has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
-            if search is not None and has_jumped and searched < search.most_searches:
-                searched += 1
-                locator = JumpLocator(self._controller, self._plan, self._direction, self._number)
-                point, is_on_next_branch = yield from locator.localise(points, point)
-                if is_on_next_branch:
-                    self._branch += 1
-                    points = []
-            points.append(point)
-            came_from = f"{frequency_hz:g} Hz"
-
-    def _step_to(self, frequency_hz: float, came_from: str) -> Controller[SettledPoint]:
-        controller = self._controller
-        yield from glide(controller.loop, frequency_hz, self._plan.base_level, self._plan.glide_step_hz)
-        found = yield from controller.settle()
-        segment = Segment(
-            SegmentLabel.STEP,
-            {
-                "frequency_hz": frequency_hz,
-                "direction": self._direction,
-                "pass": self._number,
-                "branch": self._branch,
-                "came_from": came_from,
-                **found.note.numbers,
-            },
-        )
-        yield from record_settled(controller, found, segment, self._plan.record_s)
-        return found.point
+def _run_pass(
+    controller: SettlingController,
+    plan: SettledSine,
+    number: int,
+    direction: str,
+    frequencies_hz: Sequence[float],
+    came_from: str,
+) -> Controller[None]:
+    """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
+    points: list[SettledPoint] = []
+    searched, branch = 0, 1  # each jump increases the number of the branch by 1
+    for frequency_hz in frequencies_hz:
+        numbers: dict[str, int | str] = {
+            "direction": direction,
+            "pass": number,
+            "branch": branch,
+            "came_from": came_from,
+        }
+        point = yield from _record_at(controller, plan, frequency_hz, SegmentLabel.STEP, numbers)
+        search = plan.jumps
+        has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
+        if search is not None and has_jumped and searched < search.most_searches:
+            searched += 1
+            locator = JumpLocator(controller, plan, direction, number)
+            point, is_on_next_branch = yield from locator.localise(points, point)
+            if is_on_next_branch:
+                branch += 1
+                points = []
+        points.append(point)
+        came_from = f"{frequency_hz:g} Hz"
