@@ -155,8 +155,7 @@ class Committer:
         """Return the next batch (None if a commit is due or no batch is left), and whether all is written."""
         with self._changed:
             # If there is nothing to commit, wait for the next batch without a time limit.
-            remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
-            timeout_s = None if remaining_s is None else max(remaining_s, 0.0)
+            timeout_s = max(self._commit_due_s - time.monotonic(), 0.0) if self._counters else None
             self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)
             if not self._queue:
                 return None, self._is_closing
@@ -186,9 +185,6 @@ class Committer:
         self.committed_samples = self._written_samples
 
 
-Cell = str | int | float
-
-
 class TableWriter:
     """Encoder of the rows of one table, for their reserved offsets in the file."""
 
@@ -202,7 +198,7 @@ class TableWriter:
         """Number of rows that still fit into the table."""
         return self._places.table.capacity - self.rows
 
-    def append(self, cells: Sequence[Cell]) -> Batch:
+    def append(self, cells: Sequence[str | float]) -> Batch:
         """Return the writes that append a row; raises RecordingError when the table is full."""
         if not self.free_rows:
             raise RecordingError(
@@ -213,7 +209,7 @@ class TableWriter:
         self.rows += 1
         return self.replace(self.rows - 1, cells)
 
-    def replace(self, row: int, cells: Sequence[Cell]) -> Batch:
+    def replace(self, row: int, cells: Sequence[str | float]) -> Batch:
         """Return the writes that replace an existing row."""
         columns = self._places.table.columns
         writes = [
@@ -236,7 +232,7 @@ class OpenSegment:
     first_sample: int
     numbers_json: str
 
-    def cells(self, last_sample: int, is_complete: int) -> tuple[Cell, ...]:
+    def cells(self, last_sample: int, is_complete: int) -> tuple[str | float, ...]:
         """Return the values of the segment's row in the table of segments."""
         return (self.first_sample, last_sample, is_complete, self.label, self.numbers_json)
 

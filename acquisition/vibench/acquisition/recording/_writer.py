@@ -311,12 +311,10 @@ class RecordingWriter:
 
     def _fill_gap(self, first: int, stop: int) -> None:
         """Write the count that marks lost samples, in small pieces, and add the gap to the table of gaps."""
-        missing = np.full(GAP_PIECE_SAMPLES, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
+        shape = len(self._header.channels), min(GAP_PIECE_SAMPLES, stop - first)
+        missing = np.full(shape, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
         for begin in range(first, stop, GAP_PIECE_SAMPLES):
-            counts = np.broadcast_to(
-                missing[: min(GAP_PIECE_SAMPLES, stop - begin)],
-                (len(self._header.channels), min(GAP_PIECE_SAMPLES, stop - begin)),
-            )
+            counts = missing[:, : stop - begin]
             self._committer.put(Batch(writes=self._channel_writes(begin, counts), samples=counts.shape[1]))
         self._committer.put(self._journal.gap(first, stop - 1))
 
