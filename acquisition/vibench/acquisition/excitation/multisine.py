@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConfigurationError
-from .steps import Samples
+from ..instruments import Samples
 
 USUAL_POINTS = 8192
 """Default number of points in one period of a waveform."""

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from ..errors import ConfigurationError
 from ..host.toml_file import FrozenModel
-from ..instruments import Sweep
+from ..instruments import Samples, Sweep
 from ..recording import SegmentLabel
 from ..rig import Rig
 from .feedback import BaseLevel
@@ -22,7 +22,6 @@ from .steps import (
     LevelAtBase,
     Play,
     RelativeSetting,
-    Samples,
     Step,
     Stream,
     Tone,

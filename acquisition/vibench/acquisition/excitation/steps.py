@@ -5,13 +5,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import ClassVar, Protocol, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..instruments import Sweep
+from ..instruments import Samples, Sweep
 from ..recording import SegmentLabel
-
-Samples = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

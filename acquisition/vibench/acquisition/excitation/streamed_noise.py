@@ -8,9 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from ..instruments import Samples
 from ..recording import SegmentLabel
 from .periodic_noise import BandNoise
-from .steps import Samples, Segment, Step, Stream
+from .steps import Segment, Step, Stream
 
 CREST_FACTOR = 4.5
 """Ratio of half the amplitude setting (the peak) to the rms value. About seven Gaussian values in a million

@@ -8,7 +8,7 @@ from vibench.sim.branches import least_growth_time_s
 
 from ..excitation.kinds import EXCITATION_KINDS
 from ..excitation.plan import SignalPreview
-from ..excitation.steps import Samples
+from ..instruments import Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks
