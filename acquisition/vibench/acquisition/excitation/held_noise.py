@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
 from ..host.toml_file import FrozenModel
+from ..instruments import Samples
 from .periodic_noise import PeriodicNoise
 from .plan import AbstractFeedback, Family, FrequencyHz
-from .steps import Samples
 
 Decibels = Annotated[float, Field(gt=0, le=40)]
 
@@ -89,8 +89,3 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     def stretches(self) -> int:
         """Number of noise realisations, including those for equalisation."""
         return self.equalisations + self.realisations
-
-    @property
-    def playing_s(self) -> float:
-        """Duration of settling and recording of all realisations, including those for equalisation [s]."""
-        return self.stretches * (self.settle_s + self.periods / self.repetition_hz)

@@ -96,7 +96,7 @@ class PeriodicNoise(BandNoise):
     @property
     def playing_s(self) -> float:
         """Duration of settling and recording of all realisations [s]."""
-        return self.realisations * (self.settle_s + self.periods / self.repetition_hz)
+        return self.stretches * (self.settle_s + self.periods / self.repetition_hz)
 
     @property
     def stretches(self) -> int:
