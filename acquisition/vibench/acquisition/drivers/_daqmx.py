@@ -1,7 +1,7 @@
 """Digitizer on NI-DAQmx: continuous hardware-timed sampling without gaps; the device is always released."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -95,21 +95,17 @@ def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:
     Raises InstrumentLost when the server does not answer, and InstrumentError when this computer has no
     driver.
     """
-    session = daqmx_session(server)
-    try:
-        with daqmx_call(f"listing the devices of {session.place}"):
-            return tuple(
-                FoundDevice(
-                    name=device.name,
-                    product=device.product_type,
-                    serial=f"{device.serial_num:08X}",
-                    inputs=tuple(channel.name for channel in device.ai_physical_chans),
-                    outputs=tuple(channel.name for channel in device.ao_physical_chans),
-                )
-                for device in session.system().devices
+    with closing(daqmx_session(server)) as session, daqmx_call(f"listing the devices of {session.place}"):
+        return tuple(
+            FoundDevice(
+                name=device.name,
+                product=device.product_type,
+                serial=f"{device.serial_num:08X}",
+                inputs=tuple(channel.name for channel in device.ai_physical_chans),
+                outputs=tuple(channel.name for channel in device.ao_physical_chans),
             )
-    finally:
-        session.close()
+            for device in session.system().devices
+        )
 
 
 _TERMINALS = {

@@ -25,12 +25,9 @@ def overload_ranges(
         if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # this form skips NaN, which `read_block` refuses
             continue
         past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
-        breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)
-        firsts = past[np.concatenate(([0], breaks + 1))]
-        lasts = past[np.concatenate((breaks, [past.size - 1]))]
+        ranges = np.split(past, np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES) + 1)
         found += [
-            Overload(role, first_sample + int(first), first_sample + int(last))
-            for first, last in zip(firsts, lasts, strict=True)
+            Overload(role, first_sample + int(each[0]), first_sample + int(each[-1])) for each in ranges
         ]
     return tuple(found)
 
