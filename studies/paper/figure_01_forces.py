@@ -35,10 +35,12 @@ def draw(options: FigureOptions) -> report.DrawnFigure:
             label = f"n = {model.removeprefix('power:')}"
             axes.plot(1e6 * p, forces[model], color=colour, linestyle=line, label=label)
         axes.axvline(1e6 * options.gap_m, color="#9a9a9a", linewidth=0.8)
-        axes.set_ylim(0, _HIGHEST * float(forces["hertz"].max()))
-        axes.set_xlim(0, 1e6 * float(p[-1]))
-        axes.set_xlabel("relative displacement p [µm]")
-        axes.set_ylabel("force between m1 and m2 [N]")
+        axes.set(
+            ylim=(0, _HIGHEST * float(forces["hertz"].max())),
+            xlim=(0, 1e6 * float(p[-1])),
+            xlabel="relative displacement p [µm]",
+            ylabel="force between m1 and m2 [N]",
+        )
         report.legend_above(figure, [axes])
     columns = {f"force_{model.replace(':', '_').replace('+', '_')}_n": forces[model] for model in forces}
     return report.DrawnFigure(

@@ -80,10 +80,9 @@ def _draw_exponents(axes: "Axes", f: Reals, curves: dict[str, Reals], title: str
     ):
         axes.plot(f, values, color=colour, linestyle=line, linewidth=0.9, label=label)
     axes.axhline(0.0, color="#9a9a9a", linewidth=0.8)
-    axes.set_xlim(float(f[0]), float(f[-1]))
-    axes.set_title(title)
-    axes.set_ylabel("exponent [1/s]")
-    axes.set_xlabel("drive frequency [Hz]")
+    axes.set(
+        xlim=(float(f[0]), float(f[-1])), title=title, ylabel="exponent [1/s]", xlabel="drive frequency [Hz]"
+    )
 
 
 def _draw_motions(outlines: "Axes", spectra: "Axes", options: FigureOptions) -> None:
@@ -96,12 +95,16 @@ def _draw_motions(outlines: "Axes", spectra: "Axes", options: FigureOptions) -> 
     for bound_hz in specimen.bound_frequencies_hz:
         spectra.axvline(float(bound_hz), color=report.TERMINAL, linestyle=":", linewidth=1.0)
     report.magnitude_axis(spectra)
-    spectra.set_ylim(1e-5, 100)
-    spectra.set_xlim(0, SPECTRUM_HZ)
-    spectra.set_xlabel("frequency [Hz]")
-    spectra.set_ylabel("|x| / A0")
-    spectra.set_title(f"piece-wise at {_SHOWN_HZ:g} Hz: spectra")
-    outlines.set_xlim(0, options.duration_s)
-    outlines.set_xlabel("time [s]")
-    outlines.set_ylabel("x / A0")
-    outlines.set_title(f"piece-wise at {_SHOWN_HZ:g} Hz: envelopes")
+    spectra.set(
+        ylim=(1e-5, 100),
+        xlim=(0, SPECTRUM_HZ),
+        xlabel="frequency [Hz]",
+        ylabel="|x| / A0",
+        title=f"piece-wise at {_SHOWN_HZ:g} Hz: spectra",
+    )
+    outlines.set(
+        xlim=(0, options.duration_s),
+        xlabel="time [s]",
+        ylabel="x / A0",
+        title=f"piece-wise at {_SHOWN_HZ:g} Hz: envelopes",
+    )

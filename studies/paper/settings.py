@@ -89,8 +89,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
         figure = report.new_figure(4.6)
         top, low = figure.subplots(2, 1, sharex=True)
         top.plot(1e6 * damping_s, held, color=report.MEASURED, marker="o")
-        top.set_ylim(0, count)
-        top.set_ylabel(f"claims that hold, of {count}")
+        top.set(ylim=(0, count), ylabel=f"claims that hold, of {count}")
         low.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # before plotting: margins depend on the scale
         for values, label, colour, marker in (
             (weak, "1 µm: near zero in the paper", report.LEVELS[0], "o"),
@@ -99,8 +98,7 @@ def score_figure(scores: Sequence[DampingScore]) -> report.DrawnFigure:
             low.plot(1e6 * damping_s, values, color=colour, marker=marker, label=label)
         for bound in (NEAR_ZERO_PER_S, SEVERE_PER_S):
             low.axhline(bound, color=report.TERMINAL, linestyle=":", linewidth=1.0)
-        low.set_ylabel("largest exponent [1/s]")
-        low.set_xlabel("c / k [µs]")
+        low.set(ylabel="largest exponent [1/s]", xlabel="c / k [µs]")
         low.legend()
     columns = {"claims_that_hold": held, "exponent_1um_per_s": weak, "exponent_5um_per_s": moderate}
     return report.DrawnFigure(

@@ -51,10 +51,8 @@ def rates_figure(
                 for part in ("rate", "low", "high"):
                     columns[f"{part}_{short}"] = np.array([getattr(each, part) for each in found])
             axes.set_xticks(range(len(AMPLITUDES_M)), [f"{1e6 * each:g}" for each in AMPLITUDES_M])
-            axes.set_xlabel("A0 [µm]")
-            axes.set_title(heading)
-        panels[0].set_ylim(0, 100)
-        panels[0].set_ylabel("similar frequencies R [%]")
+            axes.set(xlabel="A0 [µm]", title=heading)
+        panels[0].set(ylim=(0, 100), ylabel="similar frequencies R [%]")
         report.legend_above(figure, [panels[0]], columns=5)
     caption = f"Bars: 95 % intervals by block bootstrap. {definition(options)} {options.sentence}"
     return report.DrawnFigure(name, title, caption, figure, (report.table(name, **columns),))

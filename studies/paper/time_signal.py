@@ -59,9 +59,7 @@ def draw_outline(axes: "Axes", signal: TimeSignal, options: FigureOptions) -> No
     """Draw the outline over time; the evaluated window is grey."""
     axes.axvspan(options.duration_s - options.window_s, options.duration_s, color=report.COLLIDING, zorder=0)
     axes.fill_between(signal.time_s, signal.lower, signal.upper, color=report.MEASURED, linewidth=0)
-    axes.set_xlim(0, options.duration_s)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("x / A0")
+    axes.set(xlim=(0, options.duration_s), xlabel="time [s]", ylabel="x / A0")
 
 
 def draw_spectrum(axes: "Axes", signal: TimeSignal, specimen: Specimen, drive_hz: float) -> None:
@@ -73,7 +71,6 @@ def draw_spectrum(axes: "Axes", signal: TimeSignal, specimen: Specimen, drive_hz
     axes.plot(signal.frequency_hz[shown], signal.amplitude[shown], color=report.MEASURED, linewidth=0.8)
     report.magnitude_axis(axes)
     top = float(np.max(signal.amplitude[shown]))
-    axes.set_ylim(top * 10**-_DECADES, 3 * top)
-    axes.set_xlim(0, SPECTRUM_HZ)
-    axes.set_xlabel("frequency [Hz]")
-    axes.set_ylabel("|x| / A0")
+    axes.set(
+        ylim=(top * 10**-_DECADES, 3 * top), xlim=(0, SPECTRUM_HZ), xlabel="frequency [Hz]", ylabel="|x| / A0"
+    )

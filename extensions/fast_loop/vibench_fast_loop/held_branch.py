@@ -124,8 +124,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
             if chosen.any():
                 look = {"color": MEASURED, "linestyle": "none", "label": label, **marks}
                 axes.plot(found.frequency_hz[chosen], scale * found.m0_m[chosen], **look)
-        axes.set_xlabel("drive frequency [Hz]")
-        axes.set_ylabel(f"amplitude of m0 [{unit}]")
+        axes.set(xlabel="drive frequency [Hz]", ylabel=f"amplitude of m0 [{unit}]")
         legend_above(figure, [axes], columns=2)
     name = f"branch_{analysis.facts.name}"
     return DrawnFigure(

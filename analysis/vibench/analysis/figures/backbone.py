@@ -133,8 +133,7 @@ def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> Non
         of = f"at {levels[0].harmonic} times the drive"
     if levels[0].subharmonic > 1:
         of = f"at 1/{levels[0].subharmonic} of the drive"
-    axes.set_ylabel(f"m0 {of} [{unit}]")
-    axes.set_ylim(0.0, (1.0 + _MARGIN) * axes.dataLim.ymax)
+    axes.set(ylabel=f"m0 {of} [{unit}]", ylim=(0.0, (1.0 + _MARGIN) * axes.dataLim.ymax))
 
 
 def _simulated_m(

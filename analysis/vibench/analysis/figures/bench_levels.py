@@ -24,8 +24,7 @@ def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
             )
             role = style.plain_label(level.header.role).replace("_", "\n")
             axes.set_ylabel(f"{role}\n[{style.plain_label(unit)}]", fontsize=7.5)
-        panels[-1].set_xlabel("time since the first sample [s]")
-        panels[-1].set_xlim(0, facts.duration_s)
+        panels[-1].set(xlabel="time since the first sample [s]", xlim=(0, facts.duration_s))
         figure.align_ylabels()
     columns = {"time_s": facts.channels[0].envelope.time_s}
     for level in facts.channels:

@@ -129,8 +129,7 @@ def _growth(
     axes.set_yscale("log")
     low, high = axes.get_ylim()
     axes.axhspan(min(low, 0.5 * least_s), least_s, color=style.COLLIDING, alpha=0.6)
-    axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
-    axes.set_ylabel("e-folding\ntime [s]")
+    axes.set(ylim=(min(low, 0.5 * least_s), max(high, 2.0 * least_s)), ylabel="e-folding\ntime [s]")
 
 
 def _place(diagram: BranchDiagram, line: BranchLine) -> Reals:
@@ -167,8 +166,7 @@ def _label_x_axis(axes: Axes, diagram: BranchDiagram) -> None:
         axes.set_xlabel("drive frequency [Hz]")
         style.frequency_axis(axes, request.start, request.stop)
         return
-    axes.set_xlabel("base amplitude A0 [µm]")
-    axes.set_xlim(1e6 * request.start, 1e6 * request.stop)
+    axes.set(xlabel="base amplitude A0 [µm]", xlim=(1e6 * request.start, 1e6 * request.stop))
 
 
 def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:

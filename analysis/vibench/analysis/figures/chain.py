@@ -72,8 +72,7 @@ def _waves(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
     for band_hz in found.bands_hz.T:
         axes.plot(band_hz, found.wave_numbers / np.pi, color=style.LINEAR, label="phase")
-    axes.set_ylabel("phase / π")
-    axes.set_ylim(0.0, 1.0)
+    axes.set(ylabel="phase / π", ylim=(0.0, 1.0))
     decay = axes.twinx()
     decay.plot(found.linear_hz, found.attenuation_db, color=style.BOUNDS, linewidth=0.8)
     decay.set_ylabel("decay [dB per unit]", color=style.BOUNDS)
@@ -93,8 +92,7 @@ def _draw_cells(axes: Axes, found: ChainAnswer) -> None:
         axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker)
     axes.plot([], "--", color=style.BOUNDS, linewidth=0.8, label="without contact")
     style.magnitude_axis(axes)
-    axes.set_ylabel("|x / U|")
-    axes.set_xlabel("frequency [Hz]")
+    axes.set(ylabel="|x / U|", xlabel="frequency [Hz]")
 
 
 def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
@@ -116,8 +114,7 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
     )
     size = 2.0 if is_steady else 0.6
     axes.plot(run.impact_time_s, run.impact_cell + 1, ".", color=style.MEASURED, markersize=size)
-    axes.set_xlim(times[0], times[-1])
-    axes.set_ylabel("cell")
+    axes.set(xlim=(times[0], times[-1]), ylabel="cell")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("time [s]")
     axes.grid(visible=False)

@@ -59,8 +59,7 @@ def comparison_figure(
         for curve in curves:
             _curve(top, curve, style.LEVELS[sources.index(curve.source) % len(style.LEVELS)])
         style.magnitude_axis(top)
-        top.set_ylim(*_heights(curves))
-        top.set_ylabel("|x / U|  (m0 over base)")
+        top.set(ylim=_heights(curves), ylabel="|x / U|  (m0 over base)")
         if difference is not None and pair is not None:
             _difference(panels[1], difference)
         for marker_hz in markers_hz:

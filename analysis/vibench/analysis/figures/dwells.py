@@ -66,8 +66,10 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
     stop_s = (motion.samples.size - motion.edge_samples) / motion.sample_rate_hz
     axes.axvspan(stop_s - response.window_s, stop_s, color=style.COLLIDING, zorder=0, label="window analysed")
     axes.fill_between(found.time_s, factor * found.lower, factor * found.upper, color=style.MEASURED)
-    axes.set_xlim(0, motion.samples.size / motion.sample_rate_hz)
-    axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of {analysis.facts.mass} [{unit}]")
+    axes.set(
+        xlim=(0, motion.samples.size / motion.sample_rate_hz),
+        ylabel=f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of {analysis.facts.mass} [{unit}]",
+    )
 
 
 def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
@@ -85,8 +87,7 @@ def _zoom(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None) -> 
     if overlay is not None:
         simulated = factor * last_periods(overlay.response)[1]
         axes.plot(1e3 * time_s, simulated, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
-    axes.set_xlim(1e3 * float(time_s[0]), 0)
-    axes.set_ylabel(f"x [{unit}]")
+    axes.set(xlim=(1e3 * float(time_s[0]), 0), ylabel=f"x [{unit}]")
 
 
 def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None, at: ModelResonances) -> None:
@@ -99,9 +100,7 @@ def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None,
         axes.plot(*curve, color=style.SIMULATED, linewidth=0.6, zorder=3)
     style.magnitude_axis(axes)
     top = float(np.max(size))
-    axes.set_ylim(top * 10**-_RANGE_DECADES, 3 * top)
-    axes.set_xlim(0, float(frequency_hz[-1]))
-    axes.set_ylabel("|x| / A0")
+    axes.set(ylim=(top * 10**-_RANGE_DECADES, 3 * top), xlim=(0, float(frequency_hz[-1])), ylabel="|x| / A0")
 
 
 def dwells_caption(rising: Sequence[Pair]) -> str:

@@ -63,8 +63,7 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     time_s = motion.time_s[: count * length : length]
     axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED)
     _stops(axes, motion)
-    axes.set_xlim(motion.time_s[0], motion.time_s[-1])
-    axes.set_xlabel("time [s]")
+    axes.set(xlim=(motion.time_s[0], motion.time_s[-1]), xlabel="time [s]")
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
@@ -119,8 +118,7 @@ def _impulses(axes: Axes, motion: HiddenMotion) -> None:
     for impacts, mark, color in ((found, ".", style.MEASURED), (free, "x", style.PREDICTED)):
         time_s = (motion.first_sample + impacts.samples) / motion.sample_rate_hz
         axes.plot(time_s, factor * impacts.impulses, mark, color=color, markersize=2.0, rasterized=True)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel(f"impulse [{unit}]")
+    axes.set(xlabel="time [s]", ylabel=f"impulse [{unit}]")
 
 
 def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
@@ -129,8 +127,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     depth = np.linspace(0.0, _DEEPEST_SHOWN_M, _POINTS)
     force = tracked.steepness * depth**tracked.exponent
     axes.plot(_MICRO * depth, force, color=style.MEASURED)
-    axes.set_xlabel("penetration [µm]")
-    axes.set_ylabel("force [N]")
+    axes.set(xlabel="penetration [µm]", ylabel="force [N]")
     at_1um, exponent = found.get(Hidden.FORCE), found.get(Hidden.EXPONENT)
     is_determined = at_1um is not None and exponent is not None and at_1um.is_determined
     if not is_determined or at_1um is None or exponent is None:
@@ -158,8 +155,7 @@ def _energy(axes: Axes, motion: HiddenMotion) -> None:
     axes.axhline(0.0, color=style.BOUNDS, linewidth=0.8)
     if good.any():
         axes.axhline(100 * float(np.median(share[good])), color=style.MEASURED, linewidth=1.0)
-    axes.set_xlabel("speed of approach [m/s]")
-    axes.set_ylabel("energy lost [%]")
+    axes.set(xlabel="speed of approach [m/s]", ylabel="energy lost [%]")
 
 
 def _gaps(axes: Axes, motion: HiddenMotion) -> None:
@@ -171,8 +167,7 @@ def _gaps(axes: Axes, motion: HiddenMotion) -> None:
     for gap, dashes in zip(motion.gaps_m, ("--", "-"), strict=True):
         if np.isfinite(gap):
             axes.axvline(_MICRO * gap, color=style.SIMULATED, linestyle=dashes, linewidth=1.0)
-    axes.set_xlabel("gap [µm]")
-    axes.set_ylabel("impacts")
+    axes.set(xlabel="gap [µm]", ylabel="impacts")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize="small")
 

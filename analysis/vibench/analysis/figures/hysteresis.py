@@ -33,9 +33,11 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
             for jump in jumps:
                 axes.axvspan(jump.lower_hz, jump.upper_hz, color=colour, alpha=0.4, linewidth=0.5)
         style.magnitude_axis(axes)
-        axes.set_xlim(float(found.frequency_hz[0]), float(found.frequency_hz[-1]))
-        axes.set_xlabel("drive frequency [Hz]")
-        axes.set_ylabel("Response II\n|x at f| / A0")
+        axes.set(
+            xlim=(float(found.frequency_hz[0]), float(found.frequency_hz[-1])),
+            xlabel="drive frequency [Hz]",
+            ylabel="Response II\n|x at f| / A0",
+        )
         style.legend_above(figure, [axes])
     name = f"hysteresis_{up.facts.name}_{down.facts.name}"
     content = columns(found, "frequency_hz response_ii_up=up response_ii_down=down")

@@ -193,8 +193,7 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
             draw_line(panels[1], line, place, MICRO * (line.states[:, 1] - line.states[:, 2]))
     style.magnitude_axis(panels[0])
     panels[0].set_ylabel("Response I of m0 over A0")
-    panels[1].set_ylabel("p once per drive period [µm]")
-    panels[1].set_xlabel(label)
+    panels[1].set(ylabel="p once per drive period [µm]", xlabel=label)
     if quantity.axis == "frequency":
         style.frequency_axis(panels[1], float(values[0]), float(values[-1]))
     style.legend_above(figure, list(panels), columns=4)

@@ -151,8 +151,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
             axes.plot(found.frequency_hz, size, line, color=colour, linewidth=1.0, label=label)
         if view.scale is MagnitudeScale.LOG:
             style.magnitude_axis(axes)
-        axes.set_ylabel(view.label(rising[0].facts.mass))
-        axes.set_xlabel("frequency [Hz]")
+        axes.set(ylabel=view.label(rising[0].facts.mass), xlabel="frequency [Hz]")
         lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
         highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
         style.frequency_axis(axes, min(lows), max(highs))
@@ -209,17 +208,14 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
         signal.fill_between(
             shape.time_s, factor * shape.lower, factor * shape.upper, color=style.PREDICTED, linewidth=0.3
         )
-        signal.set_xlim(0, float(shape.time_s[-1]))
-        signal.set_xlabel("time [s]")
-        signal.set_ylabel(f"planned voltage [{unit}]")
+        signal.set(xlim=(0, float(shape.time_s[-1])), xlabel="time [s]", ylabel=f"planned voltage [{unit}]")
         factor, unit = style.with_prefix(float(np.max(size)), "V")
         spectrum.plot(frequency_hz, factor * size, color=style.PREDICTED, linewidth=0.8)
         style.frequency_axis(
             spectrum, 0.8 * float(frequency_hz[strong[0]]), 1.25 * float(frequency_hz[strong[-1]])
         )
         spectrum.set_ylim(bottom=0)
-        spectrum.set_xlabel("frequency [Hz]")
-        spectrum.set_ylabel(f"amplitude of a line [{unit}]")
+        spectrum.set(xlabel="frequency [Hz]", ylabel=f"amplitude of a line [{unit}]")
     name = f"excitation_{measurement.name}"
     return style.DrawnFigure(
         name=name,

@@ -64,9 +64,11 @@ def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     axes.plot(*orbit, color=style.BOUNDS, linewidth=0.4, label=label)
     points = length * section.displacement_m[-_MOST_POINTS:], speed * section.velocity_m_per_s[-_MOST_POINTS:]
     axes.plot(*points, ".", color=style.SIMULATED, markersize=2.5, label="once per drive period")
-    axes.set_xlabel(f"x of {analysis.facts.mass} [{unit}]")
-    axes.set_ylabel(f"velocity of {analysis.facts.mass} [{speed_unit}]")
-    axes.set_title(f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}")
+    axes.set(
+        xlabel=f"x of {analysis.facts.mass} [{unit}]",
+        ylabel=f"velocity of {analysis.facts.mass} [{speed_unit}]",
+        title=f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}",
+    )
 
 
 def _caption(rising: Sequence[DwellAnalysis]) -> str:

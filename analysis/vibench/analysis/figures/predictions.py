@@ -51,8 +51,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
             chosen = [(each.time_s, max(each.error, _LEAST)) for each in points if each.is_chosen]
             ring = {"color": style.BOUNDS, "marker": "o", "markersize": 11, "fillstyle": "none"}
             axes.plot(*np.array(chosen).T, linestyle="none", **ring)
-            axes.set_xscale("log")
-            axes.set_yscale("log")
+            axes.set(xscale="log", yscale="log")
             if len(curves) > 1:
                 axes.set_title(scene)
         for axes in panels[-1]:
@@ -197,13 +196,11 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     stop_m, p = side * nearer_m, side * np.linspace(first_m, nearer_m + _BEYOND_M, _POINTS)
     axes.axvline(1e6 * stop_m, color=_GREY, linewidth=0.8)
     axes.set_title(label, fontsize="small")
-    axes.set_xlabel("p [µm]")
-    axes.set_ylabel("force [N]")
+    axes.set(xlabel="p [µm]", ylabel="force [N]")
     if isinstance(specimen.contact, RigidStops):
         axes.plot([1e6 * p[0], 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, side], color=style.MEASURED)
         axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3)
-        axes.set_ylim(min(-0.1 * side, side), max(-0.1 * side, side))
-        axes.set_yticks([0.0])
+        axes.set(ylim=(min(-0.1 * side, side), max(-0.1 * side, side)), yticks=[0.0])
         return []
     pressed, let_go = (_force(specimen, p, side * each) for each in (_SPEED_M_PER_S, -_SPEED_M_PER_S))
     axes.plot(1e6 * p, pressed, color=style.MEASURED)

@@ -47,9 +47,7 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
         if view.scale is MagnitudeScale.LOG:
             style.magnitude_axis(magnitudes)
         magnitudes.set_ylabel(view.label("point"))
-        phases.set_ylabel("phase [°]")
-        phases.set_ylim(-190, 190)
-        phases.set_yticks([-180, -90, 0, 90, 180])
+        phases.set(ylabel="phase [°]", ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
         few = len(points) <= _MOST_NAMES
         names = [
             style.plain_label(each.name) if few else str(node)

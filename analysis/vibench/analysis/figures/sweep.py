@@ -63,9 +63,11 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None)
         for outline in (overlay.response.upper, overlay.response.lower):
             swept_s = overlay.response.time_s
             axes.plot(swept_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label)
-    axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
-    axes.set_ylabel(f"{analysis.facts.mass} velocity\n[{unit}]")
-    axes.set_xlabel("time of the sweep [s]")
+    axes.set(
+        xlim=(float(found.time_s[0]), float(found.time_s[-1])),
+        ylabel=f"{analysis.facts.mass} velocity\n[{unit}]",
+        xlabel="time of the sweep [s]",
+    )
     _frequency_on_top(axes, found)
 
 
@@ -203,8 +205,9 @@ def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
     shown.set_clim(-_RANGE_DB, 0)
     factor, unit = style.with_prefix(top, "m/s")
     figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
-    axes.set_xlabel("time of the sweep [s]")
-    axes.set_ylabel(f"frequency in the\nvelocity of {analysis.facts.mass} [Hz]")
+    axes.set(
+        xlabel="time of the sweep [s]", ylabel=f"frequency in the\nvelocity of {analysis.facts.mass} [Hz]"
+    )
     axes.grid(visible=False)
 
 
@@ -221,8 +224,7 @@ def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
         axes.plot(response.harmonics_hz, size, line, color=colour, linewidth=1.0, label=label)
     axes.set_xlim(*sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1]))))
     style.magnitude_axis(axes)
-    axes.set_xlabel("drive frequency [Hz]")
-    axes.set_ylabel(f"displacement of {analysis.facts.mass} [{unit}]")
+    axes.set(xlabel="drive frequency [Hz]", ylabel=f"displacement of {analysis.facts.mass} [{unit}]")
 
 
 def _caption(analysis: SweepAnalysis) -> str:

@@ -121,9 +121,11 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, a
     axes.plot(
         *_cut_wrap(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=style.MEASURED, linewidth=0.9
     )
-    axes.set_ylim(-_HALF_TURN_DEG, _HALF_TURN_DEG)
-    axes.set_yticks([-_HALF_TURN_DEG, 0, _HALF_TURN_DEG])
-    axes.set_ylabel("phase [°]")
+    axes.set(
+        ylim=(-_HALF_TURN_DEG, _HALF_TURN_DEG),
+        yticks=[-_HALF_TURN_DEG, 0, _HALF_TURN_DEG],
+        ylabel="phase [°]",
+    )
 
 
 def _cut_wrap(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
@@ -137,8 +139,7 @@ def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None
     mark_resonances(axes, at)
     axes.plot(measured.frequency_hz, measured.coherence, color=style.MEASURED, linewidth=0.8)
     axes.axhline(measured.coherence_significance, color=style.SIMULATED, linewidth=0.9, linestyle="-.")
-    axes.set_ylim(0, 1.05)
-    axes.set_ylabel("coherence")
+    axes.set(ylim=(0, 1.05), ylabel="coherence")
 
 
 def _differences(axes: Axes, overlay: NoiseOverlay, at: ModelResonances) -> None:
@@ -147,8 +148,7 @@ def _differences(axes: Axes, overlay: NoiseOverlay, at: ModelResonances) -> None
     axes.plot(overlay.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
     axes.axhline(0, color=style.MEASURED, linewidth=0.6)
     reach = max(1.0, float(np.nanmax(np.abs(shown))) * 1.1)
-    axes.set_ylim(-reach, reach)
-    axes.set_ylabel("meas. − sim.\n[dB]")
+    axes.set(ylim=(-reach, reach), ylabel="meas. − sim.\n[dB]")
 
 
 def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> str:
