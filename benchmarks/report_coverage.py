@@ -168,12 +168,15 @@ def true_values(rig: Rig, plan: object) -> dict[str, float]:
 
 
 def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]) -> bool:
-    """Return whether linear motion of m1 would exceed a gap, as even a weak dwell may at a resonance."""
+    """Return whether linear motion of m1 may exceed a gap, as even a weak dwell may at a resonance.
+
+    While the motion settles, it may beat up to twice its amplitude, and then continue to strike the stops.
+    """
     if not isinstance(plan, Dwell) or "base amplitude A0" not in found:
         return False
     specimen = specimen_of(rig)
     relative = abs(base_transmissibility(specimen, [plan.frequency_hz])[0, 3])
-    return bool(1e-6 * found["base amplitude A0"][0] * relative > min(specimen.gaps_m))
+    return bool(1e-6 * found["base amplitude A0"][0] * 2 * relative > min(specimen.gaps_m))
 
 
 def stable_name(quantity: str, specimen: Specimen) -> str | None:
