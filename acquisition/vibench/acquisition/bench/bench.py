@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from getpass import getuser
@@ -242,6 +242,7 @@ class BenchKind(StrEnum):
     SIMULATED = "simulated"
 
 
+@dataclass(eq=False, repr=False)
 class Bench:
     """The open instruments of a rig. Use it in a ``with`` block, or `close` it.
 
@@ -249,27 +250,16 @@ class Bench:
     the block is raised again; errors that occur while leaving are added to it as notes.
     """
 
-    def __init__(
-        self,
-        rig: Rig,
-        generator: FunctionGenerator,
-        digitizer: Digitizer,
-        output: AnalogOutput | None,
-        controller: RealTimeController | None,
-        confirmations: KnobSheet,
-        power: RigPower,
-        closing: ExitStack,
-    ) -> None:
-        self.rig = rig
-        self.generator = generator
-        self.digitizer = digitizer
-        self.output = output
-        self.controller = controller
-        self.confirmations = confirmations
-        self.last_check: CheckResult | None = None
-        """Bench check by which this bench was admitted to measurements; see `vibench.acquisition.check`."""
-        self._power = power
-        self._closing = closing
+    rig: Rig
+    generator: FunctionGenerator
+    digitizer: Digitizer
+    output: AnalogOutput | None
+    controller: RealTimeController | None
+    confirmations: KnobSheet
+    _power: RigPower
+    _closing: ExitStack
+    last_check: CheckResult | None = None
+    """Bench check by which this bench was admitted to measurements; see `vibench.acquisition.check`."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:

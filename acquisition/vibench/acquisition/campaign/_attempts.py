@@ -1,6 +1,7 @@
 """Measure a point until it is recorded or all attempts are used; pause between points for cooling."""
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -59,60 +60,50 @@ LOOK_EVERY_S = 1.0
 """Interval between two searches for a lost instrument, and pause before another attempt [s]."""
 
 
+@dataclass
 class Attempts:
     """Measurement of points on a bench, with as many attempts as the policy allows."""
 
-    def __init__(
-        self,
-        bench: Bench,
-        journal: Journal,
-        policy: RetryPolicy,
-        switch: StopSwitch,
-        say: CampaignListener,
-        pause: CoolingPause,
-        beam: BeamMover,
-        reopen: Reopen | None,
-    ) -> None:
-        self._bench = bench
-        self._journal = journal
-        self._policy = policy
-        self._switch = switch
-        self._say = say
-        self._pause = pause
-        self._beam = beam
-        self._reopen = reopen
+    bench: Bench
+    journal: Journal
+    policy: RetryPolicy
+    switch: StopSwitch
+    say: CampaignListener
+    pause: CoolingPause
+    beam: BeamMover
+    reopen: Reopen | None
 
     def wait_before(self, name: str, measurement: Measurement) -> None:
         """Pause before a point, and wait until the operator has moved the beam; a stop ends both waits."""
-        self._pause.wait(self._bench, name)
-        self._beam.ask(self._bench, measurement)
+        self.pause.wait(self.bench, name)
+        self.beam.ask(self.bench, measurement)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Measure a point until it has a valid recording; ``tell`` is called after every block.
 
         Raises the AcquisitionError of the last attempt, and writes it to the journal.
         """
-        for left in reversed(range(self._policy.attempts)):
-            path = next_attempt(self._journal.path.parent, point.name)
-            self._pause.require()
-            self._journal.start(point.name, path.name)
+        for left in reversed(range(self.policy.attempts)):
+            path = next_attempt(self.journal.path.parent, point.name)
+            self.pause.require()
+            self.journal.start(point.name, path.name)
             self._note(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
-                with self._beam.beam_at(self._bench, point.name, point.measurement) as bench:
+                with self.beam.beam_at(self.bench, point.name, point.measurement) as bench:
                     outcome = run_measurement(
-                        bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
+                        bench, point.measurement, path, on_progress=partial(tell, path), switch=self.switch
                     )
             except AcquisitionError as error:
                 self._fail_attempt(point, path, error)
                 if not (left and self._is_retryable(reason_code_of(error))):
                     raise
                 self._prepare_retry(point, path, error)
-                self._pause.wait(self._bench, point.name)
-                if self._switch.request is not None:
+                self.pause.wait(self.bench, point.name)
+                if self.switch.request is not None:
                     raise
             except BaseException as error:
                 reason = f"{type(error).__name__}: {error}".removesuffix(": ")
-                self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
+                self.journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
                 raise
             else:
                 point_result = self._end_attempt(point, outcome)
@@ -121,8 +112,8 @@ class Attempts:
                     return point_result
                 text = f"{point.name} is tried again: {point_result.reason}"
                 self._note(CampaignEventKind.RETRY, text, point, path)
-                self._pause.wait(self._bench, point.name)
-                if self._switch.request is not None:
+                self.pause.wait(self.bench, point.name)
+                if self.switch.request is not None:
                     return point_result
         raise AssertionError("the last attempt returns or raises")
 
@@ -137,17 +128,17 @@ class Attempts:
             reason_code, reason = ReasonCode.STOPPED, outcome.reason
             state, result = JournalPointState.INTERRUPTED, PointOutcome.STOPPED
             kind = CampaignEventKind.POINT_STOPPED
-        self._journal.end(point.name, state, reason_code, reason, _seal_of(outcome.path))
+        self.journal.end(point.name, state, reason_code, reason, _seal_of(outcome.path))
         self._note(kind, f"{point.name}: {reason}", point, outcome.path)
         return PointResult(point.name, result, outcome.path, reason, reason_code)
 
     def _fail_attempt(self, point: Point, path: Path, error: AcquisitionError) -> None:
         reason_code = reason_code_of(error)
         try:
-            self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
+            self.journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
         except RecordingError as second:  # the journal failed too: the first error is the cause
             error.add_note(str(second))
-        self._say(
+        self.say(
             CampaignEvent(
                 CampaignEventKind.FAULT,
                 f"{point.name}: {error}",
@@ -156,18 +147,18 @@ class Attempts:
         )
 
     def _is_retryable(self, reason_code: ReasonCode) -> bool:
-        is_stopping = self._switch.request is not None
-        return not is_stopping and reason_code.value in {each.value for each in self._policy.on}
+        is_stopping = self.switch.request is not None
+        return not is_stopping and reason_code.value in {each.value for each in self.policy.on}
 
     def _prepare_retry(self, point: Point, path: Path, error: AcquisitionError) -> None:
         """Prepare another attempt: reopen the bench after an instrument error, otherwise wait briefly."""
         if isinstance(error, InstrumentError):
-            if self._reopen is None:
+            if self.reopen is None:
                 raise error
-            self._bench = self._reopen_bench(self._reopen, error)
+            self.bench = self._reopen_bench(self.reopen, error)
             self._note(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self._bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
+            self.bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
         self._note(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _reopen_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
@@ -178,18 +169,18 @@ class Attempts:
             except AcquisitionError as error:
                 # A virtual rig may wait in simulated time, which passes faster: use the longer of the two.
                 looked_s = max(monotonic() - began, idled_s)
-                if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
+                if looked_s >= self.policy.reopen_for_s or self.switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
                     raise lost from error
                 # The bench is not notified when somebody reconnects an instrument, so try again to open it.
-                self._bench.idle(LOOK_EVERY_S)
+                self.bench.idle(LOOK_EVERY_S)
                 idled_s += LOOK_EVERY_S
             else:
-                require_same_bench(self._journal.bench, BenchIdentity.of(bench))
+                require_same_bench(self.journal.bench, BenchIdentity.of(bench))
                 return bench
 
     def _note(self, kind: CampaignEventKind, text: str, point: Point, path: Path) -> None:
-        self._say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
+        self.say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
 
 
 def _seal_of(path: Path) -> str:

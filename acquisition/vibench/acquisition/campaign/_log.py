@@ -299,28 +299,26 @@ class CommandMessenger:
         return f"{self.arguments[0]} ended with {ended.returncode}" if ended.returncode else ""
 
 
+@dataclass(frozen=True)
 class Notifier:
     """Sender of notices of faults, damaged recordings and the campaign's end; failures are only logged."""
 
-    def __init__(
-        self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
-    ) -> None:
-        """``say`` is called with a clause on the result of each notice."""
-        self._campaign = campaign
-        self._folder = folder
-        self._messengers = messengers
-        self._say = say
+    campaign: str
+    folder: Path
+    messengers: tuple[Messenger, ...]
+    say: CampaignListener
+    """Function called with a clause on the result of each notice."""
 
     def __call__(self, event: CampaignEvent) -> None:
         if event.kind not in TOLD_OF:
             return
         notice = {
-            "campaign": self._campaign,
-            "folder": str(self._folder.resolve()),
+            "campaign": self.campaign,
+            "folder": str(self.folder.resolve()),
             "utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "event": event.kind.value,
             "reason": event.text,
             **event.facts,
         }
-        for messenger in self._messengers:
-            self._say(CampaignEvent(CampaignEventKind.NOTICE, messenger.send(notice)))
+        for messenger in self.messengers:
+            self.say(CampaignEvent(CampaignEventKind.NOTICE, messenger.send(notice)))

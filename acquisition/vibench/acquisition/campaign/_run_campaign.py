@@ -59,27 +59,20 @@ from ._log import (
 from ._opening import make_folder, open_journal, planned_recordings, require_all_within_limits, require_new
 
 
+@dataclass
 class CampaignRunner:
     """Measurement of the points of a campaign, and of further points that are requested after a result."""
 
-    def __init__(
-        self,
-        journal: Journal,
-        folder: Path,
-        attempts: Attempts,
-        stop: StopSwitch,
-        after_failure: AfterFailure,
-        after: After | None,
-        say: CampaignListener,
-    ) -> None:
-        self._journal = journal
-        self._folder = folder
-        self._attempts = attempts
-        self._stop = stop
-        self._after_failure = after_failure
-        self._after = after
-        self._say = say
-        self._coming = deque(journal.points())
+    journal: Journal
+    folder: Path
+    attempts: Attempts
+    stop: StopSwitch
+    after_failure: AfterFailure
+    after: After | None
+    say: CampaignListener
+
+    def __post_init__(self) -> None:
+        self._coming = deque(self.journal.points())
         self._count = len(self._coming)
         self._results: list[PointResult] = []
 
@@ -94,7 +87,7 @@ class CampaignRunner:
         is_resumed = done or any(point.attempts for point in self._coming)
         begun = CampaignEventKind.RESUMED if is_resumed else CampaignEventKind.BEGUN
         text = f"{campaign.name}: {count_text(self._count, 'point')}, {done} already done"
-        self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
+        self.say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         self._report_damage()
         try:
             while self._coming and self._may_begin(self._coming[0]):
@@ -128,56 +121,54 @@ class CampaignRunner:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
                 text = f"{point.name} is measured again: {point.reason}"
                 facts = {"point": point.name, "file": point.file, "why": point.reason_code.value}
-                self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
+                self.say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
         """Pause, and wait until the beam has been moved, before a measurement; return False after a stop."""
-        if point.state is not JournalPointState.DONE and self._stop.request is None:
-            self._attempts.wait_before(point.name, point.measurement)
-        return self._stop.request is None
+        if point.state is not JournalPointState.DONE and self.stop.request is None:
+            self.attempts.wait_before(point.name, point.measurement)
+        return self.stop.request is None
 
     def _measure(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
         if point.state is JournalPointState.DONE:
-            path = self._folder / point.file
+            path = self.folder / point.file
             return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.reason_code)
         try:
-            return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
+            return self.attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
             raise  # without an instrument or disk space, the next point would fail too
         except AcquisitionError as error:
-            if self._after_failure is AfterFailure.STOP:
+            if self.after_failure is AfterFailure.STOP:
                 raise
-            path = self._folder / next(
-                each.file for each in self._journal.points() if each.name == point.name
-            )
+            path = self.folder / next(each.file for each in self.journal.points() if each.name == point.name)
             return PointResult(point.name, PointOutcome.FAILED, path, str(error), reason_code_of(error))
 
     def _follow_up(self, point: JournalPoint, point_result: PointResult) -> None:
         """Call ``after`` once for a point that is done, and insert the measurements that it returns."""
         is_done = point_result.outcome in (PointOutcome.RECORDED, PointOutcome.KEPT)
-        if not is_done or point.is_followed_up or self._after is None:
+        if not is_done or point.is_followed_up or self.after is None:
             return
         done = tuple(
-            DonePoint(each.name, each.measurement, self._folder / each.file)
-            for each in self._journal.points()
+            DonePoint(each.name, each.measurement, self.folder / each.file)
+            for each in self.journal.points()
             if each.state is JournalPointState.DONE
         )
         this = next(each for each in done if each.name == point.name)
         with open_recording(point_result.path) as recording:
-            follow_ups = tuple(self._after(FinishedPoint(this, done), recording))
+            follow_ups = tuple(self.after(FinishedPoint(this, done), recording))
         further = tuple(Point(name, each) for each in follow_ups for name in _names(each))
-        self._journal.follow_up(point.name, further)
+        self.journal.follow_up(point.name, further)
         if not further:
             return
         names = {each.name for each in further}
-        added = [each for each in self._journal.points() if each.name in names]
+        added = [each for each in self.journal.points() if each.name in names]
         self._coming.extendleft(reversed(added))
         self._count += len(added)
         text = f"after {point.name}, these points follow: {', '.join(each.name for each in added)}"
-        self._say(CampaignEvent(CampaignEventKind.FURTHER, text, {"point": point.name, "points": len(added)}))
+        self.say(CampaignEvent(CampaignEventKind.FURTHER, text, {"point": point.name, "points": len(added)}))
 
     def _closing(self) -> str:
-        request = self._stop.request
+        request = self.stop.request
         if request is not None:
             return f"was stopped: {request.reason}"
         failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
@@ -187,7 +178,7 @@ class CampaignRunner:
         counts = Counter(point_result.outcome for point_result in self._results)
         facts: dict[str, str | int | float] = {"why": reason_code, "left": len(self._coming)}
         facts |= {each.value: counts[each] for each in PointOutcome}
-        self._say(CampaignEvent(CampaignEventKind.ENDED, text, facts))
+        self.say(CampaignEvent(CampaignEventKind.ENDED, text, facts))
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:

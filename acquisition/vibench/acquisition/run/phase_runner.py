@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from typing import NoReturn, TypeAlias
 
@@ -168,6 +168,7 @@ class StopRequested(Exception):
         self.request = request
 
 
+@dataclass(eq=False)
 class PhaseRunner:
     """The sampling part of a run: phases, holds, and the ramp at an early end.
 
@@ -175,26 +176,17 @@ class PhaseRunner:
     RunStalled or `StopRequested` is raised, and the run ramps down.
     """
 
-    def __init__(
-        self,
-        drive: Drive,
-        loop: AcquisitionLoop,
-        limit_monitor: LimitMonitor,
-        silence: SilenceWatch,
-        glide: GlideWatch,
-        switch: StopSwitch,
-        total_s: float,
-        until: UntilWatch | None = None,
-    ) -> None:
+    drive: Drive
+    loop: AcquisitionLoop
+    limit_monitor: LimitMonitor
+    silence: SilenceWatch
+    glide: GlideWatch
+    switch: StopSwitch
+    total_s: float
+    until: UntilWatch | None
+
+    def __post_init__(self) -> None:
         self.state = RunState.CHECKING
-        self.loop = loop
-        self._drive = drive
-        self._limit_monitor = limit_monitor
-        self._silence = silence
-        self._glide = glide
-        self._switch = switch
-        self._total_s = total_s
-        self._until = until
         self._look: Callable[[Block], None] = self._go_on
         self._held_s = 0.0
         self._play: Play | None = None
@@ -223,7 +215,7 @@ class PhaseRunner:
             yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
             self.loop.enter(None)  # exclude the time that the next command takes
-        waits = self._drive.perform(commanded)
+        waits = self.drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
             yield from self._catch_up()
@@ -236,20 +228,20 @@ class PhaseRunner:
                 yield from self._catch_up(into)
             wait_s = next(waits, None)
         if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
-            self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
+            self.glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _drive_checks(self, phase: Phase) -> Sink | None:
         """Return a consumer of the phase's blocks that checks the drive against the plan, or None."""
         if not self._may_glide(phase):
             return None
-        return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
+        return SweepWatch(self.glide, phase.play) if isinstance(phase.play, Sweep) else []
 
     def _may_glide(self, phase: Phase) -> bool:
         """Return whether a phase may be a step of a recorded sweep that is played by commands."""
-        return self._drive.is_commanded and phase.state is RunState.RECORDING
+        return self.drive.is_commanded and phase.state is RunState.RECORDING
 
     def _pace_of(self, phase: Phase) -> "_Pace":
-        if not self._drive.is_commanded:
+        if not self.drive.is_commanded:
             return _Pace.OF_ITSELF
         if phase.state in _RAMPS:
             return _Pace.OF_THE_COMMANDS
@@ -279,8 +271,8 @@ class PhaseRunner:
 
     def _note_lost_cycles(self) -> None:
         """Log a deviation of the recorded drive from its plan at the end of a sweep."""
-        more, self._lost_cycles = self._glide.more_cycles, 0.0
-        self._glide.begin()
+        more, self._lost_cycles = self.glide.more_cycles, 0.0
+        self.glide.begin()
         if abs(more) > TOLD_CYCLES:
             text = f"at its end, the recorded drive was {more:+.2g} cycles off its plan"
             self.loop.log(EventKind.LATE, text)
@@ -332,26 +324,26 @@ class PhaseRunner:
         A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of the ramp for a stop
         level [s]. The method records until silence is measured; raises InstrumentError if the drive stays on.
         """
-        self._look = self._silence.take
+        self._look = self.silence.take
         self.loop.log(EventKind.END, reason)
-        self._silence.begin(self.loop.samples)
-        if self._drive.is_playing:
+        self.silence.begin(self.loop.samples)
+        if self.drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
         if level is StopLevel.OFF:
-            self._drive.cut()  # switch off before reading, because the converter may not answer
+            self.drive.cut()  # switch off before reading, because the converter may not answer
         self.loop.cut()
-        while level is not StopLevel.OFF and self._drive.is_playing:
-            for wait_s in self._drive.ramp_down(ramp_s(level), self.loop.time_s):
+        while level is not StopLevel.OFF and self.drive.is_playing:
+            for wait_s in self.drive.ramp_down(ramp_s(level), self.loop.time_s):
                 yield from self._record(self.loop.pass_time(wait_s))
-                if (harder := self._switch.harder_than(level)) is not None:
+                if (harder := self.switch.harder_than(level)) is not None:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
                     break
-        self._drive.cut()
+        self.drive.cut()
         self.loop.log(EventKind.OFF, "output switched off")
         yield from self._listen()
-        self.loop.log(EventKind.SILENCE, f"{level.value}: {self._silence.text()}")
-        self._silence.require_silence()
+        self.loop.log(EventKind.SILENCE, f"{level.value}: {self.silence.text()}")
+        self.silence.require_silence()
 
     def _listen(self) -> Iterator[Progress]:
         """Continue to record until the measured drive is silent, but no longer than `LONGEST_S`.
@@ -360,15 +352,15 @@ class PhaseRunner:
         """
         give_up_s, wait_s = self.loop.elapsed_s + LONGEST_S, LOWER_AFTER_S
         yield from self._read(LISTEN_S)
-        if not self._silence.is_silent:
+        if not self.silence.is_silent:
             self.loop.cut()
             yield from self._read(LISTEN_S)  # this also reads samples converted before the output was off
         lower_s = self.loop.elapsed_s + wait_s
-        while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
+        while not self.silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
-                self._silence.note_signal()
+                self.silence.note_signal()
                 with suppress(AcquisitionError):  # the measured drive shows whether this succeeded
-                    self._drive.silence()
+                    self.drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
                 self.loop.cut()
                 lower_s, wait_s = lower_s + 2 * wait_s, 2 * wait_s
@@ -377,7 +369,7 @@ class PhaseRunner:
     def _read(self, duration_s: float, into: Sink | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s, lead_s):
             yield from self._record([block], into)
-            if self._switch.is_holding and self._look == self._go_on:
+            if self.switch.is_holding and self._look == self._go_on:
                 yield from self._hold()
 
     def _hold(self) -> Iterator[Progress]:
@@ -390,7 +382,7 @@ class PhaseRunner:
             self._stop_hold(f"{refusal}: the run was ramped down")
         before = self.state
         self._enter(RunState.HELD)
-        while self._switch.is_holding:
+        while self.switch.is_holding:
             self._held_s += BLOCK_S
             if self._held_s > HOLD_LONGEST_S:
                 self._stop_hold(f"held for {HOLD_LONGEST_S:g} s, the longest hold that fits in the recording")
@@ -399,34 +391,34 @@ class PhaseRunner:
 
     def refusal_to_hold(self) -> str:
         """Return the reason why the drive cannot be held now; empty if it can be held."""
-        source = self._drive.drive_source.value
-        return "" if self._drive.can_hold else f"the present signal of the {source} cannot be held"
+        source = self.drive.drive_source.value
+        return "" if self.drive.can_hold else f"the present signal of the {source} cannot be held"
 
     def _stop_hold(self, reason: str) -> NoReturn:
         """Stop the run, and thus the campaign, because a hold is impossible."""
         request = StopRequest.of(Cause.OPERATOR, reason)
-        self._switch.ask(request)
+        self.switch.ask(request)
         raise StopRequested(request)
 
     def _go_on(self, block: Block) -> None:
         """Raise an exception if the run must end early: a limit, a stall, or a request."""
-        self._limit_monitor.require_safe(block)
-        if (request := self._switch.request) is not None:
+        self.limit_monitor.require_safe(block)
+        if (request := self.switch.request) is not None:
             raise RunStalled(request.reason) if request.cause is Cause.FAULT else StopRequested(request)
 
     def _report_progress(self, block: Block) -> Progress:
         """Write requested events to the recording, and return the progress."""
         loop = self.loop
-        for text in self._switch.take_marks():
+        for text in self.switch.take_marks():
             loop.log(EventKind.MARK, text)
-        for text in self._switch.take_changes():
+        for text in self.switch.take_changes():
             loop.log(EventKind.SPECIMEN, text)
-            self._limit_monitor.note_change(text, loop.samples)
-        level_vpp = self._drive.setting_vpp
+            self.limit_monitor.note_change(text, loop.samples)
+        level_vpp = self.drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
-        until = None if self._until is None else self._until.progress
+        until = None if self.until is None else self.until.progress
         return Progress(
-            self.state, loop.segment, block, loop.elapsed_s, self._total_s, level_vpp, frequency_hz, until
+            self.state, loop.segment, block, loop.elapsed_s, self.total_s, level_vpp, frequency_hz, until
         )
 
     def _enter(self, state: RunState) -> None:
