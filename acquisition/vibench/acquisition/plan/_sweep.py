@@ -77,9 +77,9 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 """Values of an axis in a file: a list, or a table with start, stop, and step or count."""
 
 
-def values_of(given: Values) -> tuple[float, ...]:
-    """Return the values of an axis: a range in ascending order, a list in the given order."""
-    return given.values if isinstance(given, Range) else given
+def values_of(given: Values | None) -> tuple[float, ...]:
+    """Return the values of an axis: a range in ascending order, a list in the given order; or none."""
+    return given.values if isinstance(given, Range) else given or ()
 
 
 MOST_POINTS = 10_000
@@ -201,18 +201,14 @@ class Sweep(FrozenModel):
         return sum(2 if way in _TURNING and self.continue_from_previous else 1 for way in self.direction)
 
     def _axes(self) -> dict[SweepAxis, tuple[Any, ...]]:
-        given: dict[SweepAxis, tuple[Any, ...]] = {}
-        if self.repetitions > 1:
-            given[SweepAxis.REPETITION] = tuple(range(1, self.repetitions + 1))
-        if self.excitations:
-            given[SweepAxis.EXCITATION] = tuple(range(len(self.excitations)))
-        if self.amplitude_vpp is not None:
-            given[SweepAxis.LEVEL] = values_of(self.amplitude_vpp)
-        if self.direction:
-            given[SweepAxis.DIRECTION] = self.direction
-        if self.frequency_hz is not None:
-            given[SweepAxis.FREQUENCY] = values_of(self.frequency_hz)
-        return given
+        axes: dict[SweepAxis, tuple[Any, ...]] = {
+            SweepAxis.REPETITION: tuple(range(1, self.repetitions + 1)) if self.repetitions > 1 else (),
+            SweepAxis.EXCITATION: tuple(range(len(self.excitations))),
+            SweepAxis.LEVEL: values_of(self.amplitude_vpp),
+            SweepAxis.DIRECTION: self.direction,
+            SweepAxis.FREQUENCY: values_of(self.frequency_hz),
+        }
+        return {axis: values for axis, values in axes.items() if values}
 
     def _places(self, axes: Mapping[SweepAxis, tuple[Any, ...]]) -> Iterator[_Place]:
         ordered = [axis for axis in self.order if axis in axes]
