@@ -32,7 +32,8 @@ def main() -> None:
         if options.attendance is Supervision.ATTENDED:
             Thread(target=_follow_parent, args=(handler,), name="engine parent", daemon=True).start()
         else:
-            _end_when_unused(handler, options.forgotten_s)
+            arguments = (handler, options.forgotten_s)
+            Thread(target=_end_when_unused, args=arguments, name="engine forgotten", daemon=True).start()
         jobs.run()
 
 
@@ -59,15 +60,11 @@ def _handle_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
-    """End an idle engine that nobody uses, because it may block a bench for other programs."""
-
-    def look() -> None:
-        pause = Event()
-        while not handler.is_forgotten(after_s):
-            pause.wait(after_s / 10)
-        handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to run")
-
-    Thread(target=look, name="engine forgotten", daemon=True).start()
+    """Wait until an idle engine is not used, then end it, because it may block a bench for other programs."""
+    pause = Event()
+    while not handler.is_forgotten(after_s):
+        pause.wait(after_s / 10)
+    handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to run")
 
 
 def _follow_parent(handler: RequestHandler) -> None:
