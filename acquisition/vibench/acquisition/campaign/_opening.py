@@ -4,7 +4,7 @@ After a crash, journal and folder are compared to find the state of the point th
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
@@ -258,8 +258,8 @@ def _resume_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    journal = Journal.open(path)
-    try:
+    with ExitStack() as undo:
+        journal = undo.enter_context(Journal.open(path))
         _require_same_plan(journal, campaign)
         begun_on = journal.bench
         match changed:
@@ -268,9 +268,7 @@ def _resume_journal(
             case ChangedBench.ACCEPT if begun_on.differences(now):
                 journal.accept_bench(now)
         reconcile(journal, folder, stop)
-    except BaseException:
-        journal.close()
-        raise
+        undo.pop_all()
     return journal
 
 
