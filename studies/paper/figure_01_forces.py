@@ -31,9 +31,9 @@ def draw(options: FigureOptions) -> report.DrawnFigure:
         figure = report.new_figure(3.4)
         axes = figure.subplots()
         axes.plot(1e6 * p, forces["hertz"], color=report.MEASURED, linewidth=1.8, label="Hertz stops")
-        for model, colour, line in zip(_MODELS, report.LEVELS, report.LEVEL_STYLES, strict=False):
-            label = f"n = {model.removeprefix('power:')}"
-            axes.plot(1e6 * p, forces[model], color=colour, linestyle=line, label=label)
+        axes.set_prop_cycle(color=report.LEVELS, linestyle=report.LEVEL_STYLES)
+        for model in _MODELS:
+            axes.plot(1e6 * p, forces[model], label=f"n = {model.removeprefix('power:')}")
         axes.axvline(1e6 * options.gap_m, color="#9a9a9a", linewidth=0.8)
         axes.set(
             ylim=(0, _HIGHEST * float(forces["hertz"].max())),

@@ -75,10 +75,9 @@ def _label(model: str) -> str:
 
 
 def _draw_exponents(axes: "Axes", f: Reals, curves: dict[str, Reals], title: str) -> None:
-    for (label, values), colour, line in zip(
-        curves.items(), report.LEVELS, report.LEVEL_STYLES, strict=False
-    ):
-        axes.plot(f, values, color=colour, linestyle=line, linewidth=0.9, label=label)
+    axes.set_prop_cycle(color=report.LEVELS, linestyle=report.LEVEL_STYLES)
+    for label, values in curves.items():
+        axes.plot(f, values, linewidth=0.9, label=label)
     axes.axhline(0.0, color="#9a9a9a", linewidth=0.8)
     axes.set(
         xlim=(float(f[0]), float(f[-1])), title=title, ylabel="exponent [1/s]", xlabel="drive frequency [Hz]"

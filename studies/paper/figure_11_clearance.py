@@ -28,12 +28,10 @@ def draw(options: FigureOptions, *results: StudyResults) -> report.DrawnFigure:
         ):
             for bound_hz in options.specimen().bound_frequencies_hz:
                 axes.axvline(float(bound_hz), color=report.TERMINAL, linestyle=":", linewidth=1.0)
-            for (gap_m, curve), colour, line in zip(
-                curves.items(), report.LEVELS, report.LEVEL_STYLES, strict=False
-            ):
+            axes.set_prop_cycle(color=report.LEVELS, linestyle=report.LEVEL_STYLES)
+            for gap_m, curve in curves.items():
                 name = f"gap = A0 = {1e6 * gap_m:g} µm"
-                values = getattr(curve, what)
-                axes.plot(f, values, color=colour, linestyle=line, linewidth=1.0, label=name)
+                axes.plot(f, getattr(curve, what), linewidth=1.0, label=name)
             finish(axes, f, label)
         panels[1].set_xlabel("drive frequency [Hz]")
         report.legend_above(figure, [panels[0]])
