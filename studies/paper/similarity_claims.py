@@ -1,5 +1,7 @@
 """Claims on the similarity of the continuous models and the piece-wise one (Figs. 1(c) and 7 to 9)."""
 
+from functools import partial
+
 import numpy as np
 
 from vibench.analysis import LogarithmOf, SimilarityCurve, similarity
@@ -30,6 +32,8 @@ FITTED = (
 )
 """Alternatives: choices in eq. 6, which need no further simulation, and the indentation of the fit."""
 _OTHERS = ("n = 5", "n = 7", "n = 3+5+7")
+_fitted_claim = partial(costly_claim, tried=FITTED, draws=_DRAWS)
+"""Decorator for a claim on the rates of several models."""
 
 
 def orders(case: Case) -> tuple[str, ...]:
@@ -114,62 +118,52 @@ def cubic_ii_lowest(r: Reading) -> Values:
     return found[0], np.min(found[1:-1]), found[-1]
 
 
-@costly_claim(
+@_fitted_claim(
     "4, Fig. 8(a)",
     "Rate at 50 µm minus rate at 1 µm.",
     *(at_most(each, "%", 0.0) for each in ("change, n = 3", *_OTHERS)),
-    tried=FITTED,
-    draws=_DRAWS,
 )
 def rates_fall_i(r: Reading) -> Values:
     """For Response I the similarity of every model falls from 1 to 50 µm."""
     return tuple(each[-1] - each[0] for each in _all_rates(r, FIRST))
 
 
-@costly_claim(
+@_fitted_claim(
     "4, Fig. 8(a)",
     "Largest increase of the rate from one amplitude to the next.",
     *(at_most(each, "%", _READ_OFF) for each in ("largest rise, n = 3", *_OTHERS)),
-    tried=FITTED,
-    draws=_DRAWS,
 )
 def rates_fall_steadily_i(r: Reading) -> Values:
     """For Response I the similarity falls from each amplitude to the next."""
     return tuple(np.max(np.diff(each)) for each in _all_rates(r, FIRST))
 
 
-@costly_claim(
+@_fitted_claim(
     "4, Fig. 8(b)",
     "Smaller rate of 1 and 50 µm minus smaller rate of 5 and 10 µm.",
     *(at_least(each, "%", 0.0) for each in ("depth of minimum, n = 3", *_OTHERS)),
-    tried=FITTED,
-    draws=_DRAWS,
 )
 def rates_fall_rise_ii(r: Reading) -> Values:
     """For Response II the similarity of every model first falls with A0, then rises."""
     return tuple(min(each[0], each[-1]) - np.min(each[1:-1]) for each in _all_rates(r, SECOND))
 
 
-@costly_claim(
+@_fitted_claim(
     "4, Fig. 8",
     "Rate of n = 7 minus rate of n = 3, mean over the four amplitudes.",
     at_least("7 minus 3, Response I", "%", 0.0),
     at_least("Response II", "%", 0.0),
-    tried=FITTED,
-    draws=_DRAWS,
 )
 def rates_grow_with_n(r: Reading) -> Values:
     """With larger n the similarity of both responses is higher."""
     return _seventh_above(r, CUBIC)
 
 
-@costly_claim(
+@_fitted_claim(
     "4, Fig. 8",
     "Rate of n = 7 minus rate of the sum, mean over the four amplitudes.",
     at_least("7 minus sum, Response I", "%", 0.0),
     at_least("Response II", "%", 0.0),
-    tried=FITTED,
-    draws=_DRAWS,
 )
 def sum_below_seventh(r: Reading) -> Values:
     """The sum 3+5+7 has lower similarity than n = 7."""
