@@ -14,7 +14,7 @@ from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
 from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
-from .range_option import Range, range_of
+from .range_option import axis_fields, range_of
 from .specimen_option import SPECIMEN, specimen_request
 
 FILE = "branches.h5"
@@ -125,7 +125,7 @@ def _drive(
             f"--amplitude was given as {amplitude!r} and --frequency as {frequency!r}; give one of them as a "
             "range START:STOP and the other as one number"
         )
-    return (), _axis_options(a, f)
+    return (), axis_fields(a, f)
 
 
 def _resonance(
@@ -144,22 +144,6 @@ def _resonance(
         "resonance_band_hz": (band.start, band.stop),
         "start": levels.start,
         "stop": levels.stop,
-    }
-
-
-def _axis_options(amplitude: Range, frequency: Range) -> dict[str, object]:
-    if frequency.stop is not None:
-        return {
-            "along": Parameter.FREQUENCY,
-            "amplitude_m": amplitude.start,
-            "start": frequency.start,
-            "stop": frequency.stop,
-        }
-    return {
-        "along": Parameter.AMPLITUDE,
-        "frequency_hz": frequency.start,
-        "start": amplitude.start,
-        "stop": amplitude.stop,
     }
 
 

@@ -46,6 +46,18 @@ def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: st
         ) from error
 
 
+def axis_fields(amplitude: Range, frequency: Range) -> dict[str, object]:
+    """Return a request's fields for the axis with its limits, and for the fixed level or frequency.
+
+    The axis is the frequency, also if it has one value, unless the amplitude is given as a range.
+    """
+    fixed: dict[str, object] = {"along": Parameter.FREQUENCY, "amplitude_m": amplitude.start}
+    swept = frequency
+    if amplitude.stop is not None:
+        fixed, swept = {"along": Parameter.AMPLITUDE, "frequency_hz": frequency.start}, amplitude
+    return {**fixed, "start": swept.start, "stop": swept.stop or swept.start}
+
+
 def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
     numbers = [_number(part) for part in text.split(":")]
     if len(numbers) not in parts:

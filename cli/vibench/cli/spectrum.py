@@ -11,7 +11,7 @@ from .dynamics_answer import SHOWN, compute_parts, keep, leave, print_answer, ro
 from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
-from .range_option import Range, range_of
+from .range_option import axis_fields, range_of
 from .specimen_option import SPECIMEN, specimen_request
 
 FILE = "spectrum.h5"
@@ -27,7 +27,12 @@ def spectrum(
 ) -> None:
     """Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension."""
     a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 3)), range_of(frequency, Parameter.FREQUENCY, (1, 3))
-    request = specimen_request(options, options.typed.get("specimen"), amplitude, **_drive(a, f))
+    if a.stop is not None and f.stop is not None:
+        raise InvalidRequest(
+            "--amplitude and --frequency were both given as ranges; give one of them as one number"
+        )
+    drive = axis_fields(a, f) | {"step": a.step or f.step or 1.0}
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
     from vibench.analysis.report import exponent_spectrum_figure
 
     room_for(FILE, out)
@@ -46,20 +51,6 @@ def spectrum(
             is_path_printed=not as_json,
         )
     leave(is_complete=is_complete)
-
-
-def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
-    """Return the request's fields for the drive; a single frequency becomes an axis with one value."""
-    if amplitude.stop is not None and frequency.stop is not None:
-        raise InvalidRequest(
-            "--amplitude and --frequency were both given as ranges; give one of them as one number"
-        )
-    if amplitude.stop is not None:
-        along = {"along": Parameter.AMPLITUDE, "frequency_hz": frequency.start}
-        return {**along, "start": amplitude.start, "stop": amplitude.stop, "step": amplitude.step}
-    stop, step = frequency.stop or frequency.start, frequency.step or 1.0
-    along = {"along": Parameter.FREQUENCY, "amplitude_m": amplitude.start}
-    return {**along, "start": frequency.start, "stop": stop, "step": step}
 
 
 def _print_result(found: ExponentSpectrum) -> None:
