@@ -72,10 +72,6 @@ class Analyst:
                 case results:
                     yield results
 
-    def together(self) -> CampaignResults:
-        """Return the results of all recordings as one campaign."""
-        return merge_results(self._name, tuple(self.results()))
-
 
 @contextmanager
 def second_process(name: str, draws: int) -> Iterator[Analyst]:
@@ -115,16 +111,15 @@ def demo(
             point_results = engine.measure(
                 CampaignRequest(campaign=campaign, folder=folder / "recordings"), take_recording
             )
-        if {
-            point_result.name
-            for point_result in point_results
-            if point_result.outcome is PointOutcome.RECORDED
-        } != set(campaign.recording_names()):
+        recorded = {each.name for each in point_results if each.outcome is PointOutcome.RECORDED}
+        if recorded != set(campaign.recording_names()):
             raise typer.Exit(ExitCode.STOPPED)
         with analysis_bar(analyst.submitted) as observer:
-            for done, _ in enumerate(analyst.results(), start=1):
-                observer(Progress(done, analyst.submitted))
-        results = analyst.together()
+            parts = []
+            for part in analyst.results():
+                parts.append(part)
+                observer(Progress(len(parts), analyst.submitted))
+    results = merge_results(campaign.name, tuple(parts))
     report = write_report(results, folder / "report.html", folder / "figures")
     summary = campaign_summary(results)
     with replace_file(folder / "results.json") as coming:
