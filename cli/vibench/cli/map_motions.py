@@ -152,28 +152,24 @@ def document(results: MapResults, stability: tuple[KickStability, ...], file: Pa
         "points": results.plan.grid.size,
         "computed": results.points,
         "is_complete": results.is_complete,
-        "audit": None
-        if audit is None
-        else {"filled": audit.filled, "audited": audit.audited, "wrong": audit.wrong},
+        "audit": None if audit is None else _values(audit, "filled audited wrong"),
         "motions": [
             {
-                "motion": str(each.motion),
-                "period": each.period,
-                "has_impacts": each.has_impacts,
-                "response_i": each.response_i,
-                "response_ii": each.response_ii,
+                **_values(each, "motion period has_impacts response_i response_ii"),
                 "share": each.share.share,
                 "share_low": each.share.low,
                 "share_high": each.share.high,
             }
             for each in results.motions
         ],
-        "uncertainty_exponent": None
-        if rough is None
-        else {"exponent": rough.exponent, "low": rough.low, "high": rough.high, "steps": rough.steps},
+        "uncertainty_exponent": None if rough is None else _values(rough, "exponent low high steps"),
         "kicks": [
             {"motion": each.motion, "size": each.size, "returned": each.returned.share} for each in stability
         ],
         "failures": [{**where, "message": why} for where, why in results.failures()],
         "map": results.plan.model_dump(mode="json"),
     }
+
+
+def _values(part: object, names: str) -> dict[str, object]:
+    return {name: getattr(part, name) for name in names.split()}
