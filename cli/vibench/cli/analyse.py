@@ -213,18 +213,15 @@ def _analyse(
         motion_document = {} if hidden is _Output.OMITTED else {"hidden_motion": known}
         further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
         print_json({**campaign_summary(results), **fitted, **motion_document, **(further if others else {})})
-    for sentence in (
-        ()
-        if as_json
-        else (
+    else:
+        for sentence in (
             *findings(results),
             *(f"warning: {each}" for each in check_warnings(results)),
             *(s for each in motions for s in each.sentences),
             *budget_sentences(results),
             *(f"{role}: {text}" for role, each in others.items() for text in budget_sentences(each)),
-        )
-    ):
-        console.print(sentence)
+        ):
+            console.print(sentence)
     if results.results and has_report:
         diagrams, maps = overlays
         place = free_path(folder / "report.html")
