@@ -214,8 +214,7 @@ def excitation_figure(measurement: Measurement) -> style.DrawnFigure:
         style.frequency_axis(
             spectrum, 0.8 * float(frequency_hz[strong[0]]), 1.25 * float(frequency_hz[strong[-1]])
         )
-        spectrum.set_ylim(bottom=0)
-        spectrum.set(xlabel="frequency [Hz]", ylabel=f"amplitude of a line [{unit}]")
+        spectrum.set(ylim=(0, None), xlabel="frequency [Hz]", ylabel=f"amplitude of a line [{unit}]")
     name = f"excitation_{measurement.name}"
     return style.DrawnFigure(
         name=name,

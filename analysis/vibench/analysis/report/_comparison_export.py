@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from enum import StrEnum
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +110,5 @@ def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
 
 def first_free_path(path: Path) -> Path:
     """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that does not exist yet."""
-    if not path.exists():
-        return path
     numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
-    return next(each for each in numbered if not each.exists())
+    return next(each for each in chain((path,), numbered) if not each.exists())

@@ -23,7 +23,7 @@ from ..figures.style import DrawnFigure
 from ..hidden_motion import HiddenMotion
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult
-from ..recordings.checks import Check, Verdict
+from ..recordings.checks import Verdict
 from ..recordings.facts import RecordingFacts
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from ..results.compared_recording import drive_level
@@ -359,12 +359,6 @@ def version_table(facts: RecordingFacts) -> ReportTable:
     return ReportTable("Versions that made the recordings", (), rows)
 
 
-def check_table(checks: tuple[Check, ...]) -> ReportTable:
-    """Return a table with verdict, name and text of each check."""
-    rows = tuple((each.verdict.value, each.what, each.text) for each in checks)
-    return ReportTable("Checks", (), rows)
-
-
 CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Copies", "Overloads", "Drop-outs", "Drive level"})
 """Checks whose warnings mean a wrong or unplanned result; other warnings only limit its validity."""
 _MOST_NUMBERS = 3
@@ -448,6 +442,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
     figure, *more = drawing.figures(result)
     agreement, look_at = agreement_of(result, failed.get(facts.name))
     warned = [each for each in result.analysis.checks if each.verdict is Verdict.WARNING]
+    checks = tuple((each.verdict.value, each.what, each.text) for each in result.analysis.checks)
     looks = [each for each in (look_at, ", ".join(each.what.lower() for each in warned)) if each]
     return Card(
         name=facts.name,
@@ -465,7 +460,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
             ),
             Fold(
                 "Checks, settings and levels",
-                tables=(check_table(result.analysis.checks), measured_table(facts)),
+                tables=(ReportTable("Checks", (), checks), measured_table(facts)),
                 figures=recording_figures(result),
             ),
         ),
