@@ -26,14 +26,14 @@ from vibench.sim.operating_system.this import replace_file, state_folder
 from ..recordings.channels import BASE, RESPONSE
 from ..signals.arrays import Reals
 from ..tables import Tabular
-from ._filtering import LOSS_LIMIT, FilterPredictions, FilterState, MotionModel, motion_model, run_filter
+from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, run_filter
 from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._parameters import Hidden, with_values
 from ._prepared_motion import ChannelNoise, PreparedMotion, dropout_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, reliable_samples
-from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
+from ._tracking_model import STATES, tracked_specimen
 
 # Detection of changes of the specimen: innovations of a track compared with a baseline, block by block.
 #
@@ -404,7 +404,8 @@ class LiveTwin:
             self._state, self._why = LiveState.LOST, "the motion does not fit the specimen model"
             self._wait_longer()
         self._states[begin : begin + kept] = run.states[:kept]
-        self._squares.append(_clipped_innovations(run))
+        in_flight = run.nis[~np.isnan(run.nis)]
+        self._squares.append(np.asarray(np.minimum(in_flight, _CLIPPED)))
 
     def _wait_longer(self) -> None:
         """Retry the start of a track at once, then less and less often, to limit the computing load."""
@@ -472,7 +473,9 @@ class LiveTwin:
                 each.what: KnownNumber(value=each.value, low=each.low, high=each.high)
                 for each in parameters.values()
             }
-            self._track_with(found.tracked)
+            self._tracked = found.tracked
+            if self._at is not None:
+                self._model = motion_model(found.tracked, self._motion)
             self.watch = ChangeWatch()
 
     def _is_other(self, found: FoundParameter) -> bool:
@@ -480,11 +483,6 @@ class LiveTwin:
         return before is not None and abs(found.value - before.value) > _APART * float(
             np.hypot(found.half_width, 0.5 * (before.high - before.low))
         )
-
-    def _track_with(self, tracked: TrackedSpecimen) -> None:
-        self._tracked = tracked
-        if self._at is not None:
-            self._model = motion_model(tracked, self._motion)
 
     @property
     def numbers(self) -> dict[Hidden, KnownNumber]:
@@ -501,9 +499,3 @@ class LiveTwin:
         states = self._states[at.sample + 1 - count : at.sample + 1]
         if not np.isnan(states[:, 0]).any():
             self._forecast = self._forecaster.forecast(self._model, motion, at, states, frequency_hz)
-
-
-def _clipped_innovations(run: FilterPredictions) -> Reals:
-    """Return the squared innovations in flight, clipped."""
-    squared = run.nis
-    return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))
