@@ -1,8 +1,5 @@
 """The Run page: arm, start and watch a test; plots show the newest samples."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum, auto
 from pathlib import Path
 from typing import TypeAlias
 
@@ -20,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition.engine import DRIVING, EngineClient, EngineState, EngineStatus, RunStatus, TwinSwitch
-from vibench.acquisition.plan import EXCITATION_KINDS, Family, Measurement, rows_by_kind
+from vibench.acquisition.plan import EXCITATION_KINDS, Family, Measurement
 from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
@@ -56,39 +53,6 @@ from .live_plots import (
     sweep_envelope,
     sweep_history,
 )
-
-
-class LivePicture(Enum):
-    """Name of a plot of the Run page that is updated during a run."""
-
-    FREQUENCY_RESPONSE = auto()
-    HISTORY = auto()
-    """Measured responses over the drive frequency at the time of measurement."""
-    ENVELOPE = auto()
-    SPECTRUM = auto()
-    PORTRAIT = auto()
-
-
-@dataclass(frozen=True)
-class KindView:
-    """The two plots that are shown first in a run with one kind of excitation."""
-
-    left: LivePicture
-    right: LivePicture
-
-
-OF_A_BAND = KindView(LivePicture.FREQUENCY_RESPONSE, LivePicture.SPECTRUM)
-OF_A_SINE = KindView(LivePicture.HISTORY, LivePicture.PORTRAIT)
-KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
-    {
-        Family.NOISE: OF_A_BAND,
-        Family.SWEEP: OF_A_SINE,
-        Family.DWELL: OF_A_SINE,
-        Family.STEPPED: OF_A_SINE,
-    },
-    {},
-)
-"""Live plots by family of excitation; the second table lists the kinds that differ from their family."""
 
 _ROW = 1.9
 """Height of the meter of one channel, in font heights."""
@@ -271,22 +235,18 @@ UNREAD = "Read to the end  (PgDn)"
 class ArmCard(QGroupBox):
     """Buttons to arm, start, cancel and hold, with the description of the armed plan."""
 
-    arm_wanted = Signal()
-    start_wanted = Signal()
-    cancel_wanted = Signal()
-    hold_wanted = Signal()
     news = Signal()
     """Emitted when another plan was armed, whose description must be shown from the beginning."""
 
-    def __init__(self) -> None:
+    def __init__(self, actions: UserActions) -> None:
         super().__init__("What will happen")
         self._words = SentenceLabel(name="What will happen")
         self.arm_button = push_button(
-            "A&rm…  (Ctrl+Return)", "Arm, and describe what will be played", self.arm_wanted.emit, "first"
+            "A&rm…  (Ctrl+Return)", "Arm, and describe what will be played", actions.arm_test, "first"
         )
-        self.cancel_button = push_button("Cancel", "Disarm; nothing was played", self.cancel_wanted.emit)
-        self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit, "first")
-        self.hold_button = push_button("Hold", "Hold the run; the drive stays on", self.hold_wanted.emit)
+        self.cancel_button = push_button("Cancel", "Disarm; nothing was played", actions.disarm)
+        self.start_button = push_button("▶ Start  (F5)", "Start the drive", actions.start, "first")
+        self.hold_button = push_button("Hold", "Hold the run; the drive stays on", actions.hold_or_resume)
         fill_box(QVBoxLayout(self), self._words)
         self.buttons = column(
             self.arm_button, row(self.cancel_button, (self.start_button, 1)), self.hold_button
@@ -357,13 +317,12 @@ class RunPage(Page):
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
         theme = context.theme
-        self._actions = UserActions(context, self)
         self._view: LiveView | None = None
         self._ended: Path | None = None
         self._drawn: tuple[int, int, int, float] | None = None
         self._was_driving = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.arm_card = ArmCard()
+        self.arm_card = ArmCard(UserActions(context, self))
         self.watch_card = WatchCard(theme)
         self.time_histories = TimeHistoryPlots(theme)
         self.frequency_response = TransmissibilityPlot(theme)
@@ -432,7 +391,7 @@ class RunPage(Page):
     @property
     def _of_the_run(self) -> tuple[QWidget, ...]:
         card = self.watch_card
-        return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
+        return (self.time_histories, card.impacts, card.meters, *self._pictures)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Freeze with Space, mark with M, scroll with PgDn, unless the focused widget uses the key."""
@@ -449,14 +408,8 @@ class RunPage(Page):
                 super().keyPressEvent(event)
 
     @property
-    def _pictures(self) -> Mapping[LivePicture, LivePlot]:
-        return {
-            LivePicture.FREQUENCY_RESPONSE: self.frequency_response,
-            LivePicture.SPECTRUM: self.spectrum,
-            LivePicture.HISTORY: self.history,
-            LivePicture.ENVELOPE: self.envelope,
-            LivePicture.PORTRAIT: self.portrait,
-        }
+    def _pictures(self) -> tuple[LivePlot, ...]:
+        return self.frequency_response, self.spectrum, self.history, self.envelope, self.portrait
 
     def _begin(self, view: LiveView) -> None:
         """Clear the plots, show the run's prediction, and select the plots for its excitation."""
@@ -467,8 +420,7 @@ class RunPage(Page):
             measurement is None or prediction.measurement.excitation != measurement.excitation
         ):
             prediction = None
-        pictures = self._pictures
-        for picture in pictures.values():
+        for picture in self._pictures:
             picture.clear()
         for shown_beside in (self.frequency_response, self.history, self.envelope):
             shown_beside.show_prediction(prediction)
@@ -476,9 +428,9 @@ class RunPage(Page):
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
                 # Fix the range: a preceding check plays outside the band, and would compress the plot.
                 plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
-        shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
-        self.left_tabs.setCurrentWidget(pictures[shown.left])
-        self.right_tabs.setCurrentWidget(pictures[shown.right])
+        has_a_band = measurement is None or measurement.excitation.family is Family.NOISE
+        self.left_tabs.setCurrentWidget(self.frequency_response if has_a_band else self.history)
+        self.right_tabs.setCurrentWidget(self.spectrum if has_a_band else self.portrait)
 
     def _show_end(self, path: Path) -> None:
         self._ended = path
@@ -530,10 +482,6 @@ class RunPage(Page):
         return self.arm_card.is_read
 
     def _connect(self) -> None:
-        self.arm_card.arm_wanted.connect(self._actions.arm_test)
-        self.arm_card.start_wanted.connect(self._actions.start)
-        self.arm_card.cancel_wanted.connect(self._actions.disarm)
-        self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
         self.arm_card.news.connect(lambda: self._parts.side.verticalScrollBar().setValue(0))
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
