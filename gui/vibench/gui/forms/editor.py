@@ -101,40 +101,39 @@ class ChoiceEditor:
     complaint = ""
 
     def __init__(self, values: tuple[Any, ...], changed: Callable[..., None]) -> None:
-        self._box = Choice()
-        self._box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.widget = Choice()
+        self.widget.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for value in values:
-            self._box.addItem(str(value).replace("_", " "), value)
-        self._box.currentIndexChanged.connect(changed)
-        self.widget = self._box
+            self.widget.addItem(str(value).replace("_", " "), value)
+        self.widget.currentIndexChanged.connect(changed)
 
     def content(self) -> Any:
         """Return the value chosen in the list."""
-        return self._box.currentData()
+        return self.widget.currentData()
 
     def show_content(self, content: Any) -> None:
         """Choose a value in the list."""
-        place = self._box.findData(content)
+        place = self.widget.findData(content)
         if place >= 0 and content is not None:
-            self._box.setCurrentIndex(place)
+            self.widget.setCurrentIndex(place)
 
     def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
         """Group the choices under headings; ``lines`` has the heading and description of each choice."""
-        blocked, chosen = self._box.blockSignals(True), self.content()
-        self._box.clear()
-        model = self._box.model()
+        blocked, chosen = self.widget.blockSignals(True), self.content()
+        self.widget.clear()
+        model = self.widget.model()
         assert isinstance(model, QStandardItemModel)
         for heading in dict.fromkeys(heading for heading, _ in lines.values()):
-            self._box.addItem(heading.upper())
+            self.widget.addItem(heading.upper())
             model.item(model.rowCount() - 1).setEnabled(False)
             for value, (_, line) in (each for each in lines.items() if each[1][0] == heading):
-                self._box.addItem(value.replace("_", " "), value)
-                self._box.setItemData(self._box.count() - 1, line, Qt.ItemDataRole.ToolTipRole)
-        view = self._box.view()
-        view.setItemDelegate(_LineOnEach(self._box))
+                self.widget.addItem(value.replace("_", " "), value)
+                self.widget.setItemData(self.widget.count() - 1, line, Qt.ItemDataRole.ToolTipRole)
+        view = self.widget.view()
+        view.setItemDelegate(_LineOnEach(self.widget))
         view.setMinimumWidth(view.sizeHintForColumn(0) + view.verticalScrollBar().sizeHint().width())
         self.show_content(chosen)
-        self._box.blockSignals(blocked)
+        self.widget.blockSignals(blocked)
 
 
 class TextEditor:
@@ -143,17 +142,16 @@ class TextEditor:
     complaint = ""
 
     def __init__(self, changed: Callable[..., None]) -> None:
-        self._line = LineField()
-        self._line.editingFinished.connect(changed)
-        self.widget = self._line
+        self.widget = LineField()
+        self.widget.editingFinished.connect(changed)
 
     def content(self) -> str:
         """Return the typed text."""
-        return self._line.text()
+        return self.widget.text()
 
     def show_content(self, content: Any) -> None:
         """Show a text in the field."""
-        self._line.setText("" if content is None else str(content))
+        self.widget.setText("" if content is None else str(content))
 
 
 class SuggestionEditor:
@@ -162,31 +160,30 @@ class SuggestionEditor:
     complaint = ""
 
     def __init__(self, examples: tuple[str, ...], changed: Callable[..., None]) -> None:
-        self._box = Choice()
-        self._box.setEditable(True)
-        self._box.setInsertPolicy(Choice.InsertPolicy.NoInsert)
-        self._box.addItems(examples)
-        self._shown = self._box.currentText()
+        self.widget = Choice()
+        self.widget.setEditable(True)
+        self.widget.setInsertPolicy(Choice.InsertPolicy.NoInsert)
+        self.widget.addItems(examples)
+        self._shown = self.widget.currentText()
         self._changed = changed
-        self._box.activated.connect(self._note_text)
-        line = self._box.lineEdit()
+        self.widget.activated.connect(self._note_text)
+        line = self.widget.lineEdit()
         if line is not None:
             line.setPlaceholderText(_LEFT_OPEN)
             line.editingFinished.connect(self._note_text)
-        self.widget = self._box
 
     def content(self) -> str:
         """Return the chosen or typed text."""
-        return self._box.currentText()
+        return self.widget.currentText()
 
     def show_content(self, content: Any) -> None:
         """Show a text in the field."""
         self._shown = "" if content is None else str(content)
-        self._box.setCurrentText(self._shown)
+        self.widget.setCurrentText(self._shown)
 
     def _note_text(self, *_: object) -> None:
-        if self._box.currentText() != self._shown:
-            self._shown = self._box.currentText()
+        if self.widget.currentText() != self._shown:
+            self._shown = self.widget.currentText()
             self._changed()
 
 
@@ -198,13 +195,12 @@ class ListEditor:
 
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:
         self._unit = unit if unit in CHOICES else ""
-        self._line = LineField()
-        self._line.setPlaceholderText("none, or a list such as 95, 266, 500")
-        self._line.editingFinished.connect(changed)
+        self.widget = LineField()
+        self.widget.setPlaceholderText("none, or a list such as 95, 266, 500")
+        self.widget.editingFinished.connect(changed)
         self._complaint = ""
         self._shown: tuple[str, list[Any]] = ("", [])
         """Last text shown in the field, and its numbers in full precision."""
-        self.widget = self._line
 
     @property
     def complaint(self) -> str:
@@ -214,7 +210,7 @@ class ListEditor:
 
     def content(self) -> Any:
         """Return the numbers of the typed list."""
-        self._complaint, text = "", self._line.text()
+        self._complaint, text = "", self.widget.text()
         if text == self._shown[0]:
             return self._shown[1]
         try:
@@ -238,7 +234,7 @@ class ListEditor:
         texts = (quantity_text(each, self._unit) for each in values)
         text = ", ".join(texts) if self._unit else json.dumps(values)[1:-1]
         self._shown = (text, values)
-        self._line.setText(text)
+        self.widget.setText(text)
 
 
 def unwrap_optional(annotation: Any) -> tuple[Any, bool]:
