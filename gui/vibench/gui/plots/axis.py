@@ -92,19 +92,15 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         """Coordinates of the ticks painted last; ticks with numbers come first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
-        self._axis = axis
+        self.axis = axis
+        """Quantity, unit and scale of this axis."""
         UNITS.on_change(self._show_other_unit)
         # Cache the image of the axis, because its text takes the largest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
-    @property
-    def axis(self) -> PlotAxis:
-        """Quantity, unit and scale of this axis."""
-        return self._axis
-
     def show_unit(self, axis: PlotAxis) -> None:
         """Replace quantity, unit and scale of this axis."""
-        self._axis = axis
+        self.axis = axis
         self._show_other_unit()
 
     def _show_other_unit(self) -> None:
@@ -116,7 +112,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
         """Adapt the label to the available length."""
         # pyqtgraph also calls this method before the object is initialised.
-        if getattr(self, "_axis", None) is not None and self.label is not None:
+        if getattr(self, "axis", None) is not None and self.label is not None:
             self._fit_label()
         super().resizeEvent(event)
 
@@ -152,7 +148,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _fit_label(self) -> None:
         room = self.size().height() if self._is_upright else self.size().width()
         metrics = QFontMetricsF(self.label.font())
-        texts = (self._axis.text, self._axis.short_text, "")
+        texts = (self.axis.text, self.axis.short_text, "")
         text = next(each for each in texts if metrics.horizontalAdvance(each) <= room or not each)
         if text != self.labelText:
             self._is_fitting = True
@@ -171,14 +167,14 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
-            factor = self._axis.display.per_si
+            factor = self.axis.display.per_si
             # Return only ticks with numbers, because each grid line takes time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
             step, values = thin_ticks(step, values, self._most_labels(size, f"{widest}0"))
             return [(step / factor, [value / factor for value in values])]
-        shift = log10(self._axis.display.per_si)
+        shift = log10(self.axis.display.per_si)
         ticks = logarithmic_ticks(low + shift, high + shift)
         if len(ticks[0][1]) > self._most_labels(size):
             ticks = [thin_ticks(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
@@ -189,9 +185,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         if self._blankness is Blankness.BLANK or (self.logMode and spacing == _MINOR):
             return [""] * len(values)
         if not self.logMode:
-            factor = self._axis.display.per_si
+            factor = self.axis.display.per_si
             return list(super().tickStrings([v * factor for v in values], scale, spacing * factor))
-        factor = self._axis.display.per_si
+        factor = self.axis.display.per_si
         return [number_text(10**value * factor) for value in values]
 
     def _most_labels(self, size: float, widest: str = _WIDE) -> int:
