@@ -53,6 +53,12 @@ class Theme:
     """Colour of simulated curves, which are dashed as well."""
 
 
+_STRONG_TONES = {
+    Tone.GOOD: Paint("#00694d", "#ffffff"),
+    Tone.ACTIVE: Paint("#005a94", "#ffffff"),
+    Tone.CAUTION: Paint("#f0c445", "#14181f"),
+    Tone.DANGER: Paint("#b3261e", "#ffffff"),
+}
 LIGHT = Theme(
     name="light",
     window="#f3f4f6",
@@ -63,13 +69,7 @@ LIGHT = Theme(
     text="#14181f",
     muted="#4a5361",
     accent="#005a94",
-    tones={
-        Tone.CALM: Paint("#dfe3e9", "#14181f"),
-        Tone.GOOD: Paint("#00694d", "#ffffff"),
-        Tone.ACTIVE: Paint("#005a94", "#ffffff"),
-        Tone.CAUTION: Paint("#f0c445", "#14181f"),
-        Tone.DANGER: Paint("#b3261e", "#ffffff"),
-    },
+    tones={Tone.CALM: Paint("#dfe3e9", "#14181f"), **_STRONG_TONES},
     traces=("#0072b2", "#c77700", "#009e73", "#d55e00", "#aa4f8d", "#2f8fc4"),
     predicted="#5b6470",
 )
@@ -83,13 +83,7 @@ DARK = Theme(
     text="#eceff4",
     muted="#aeb8c6",
     accent="#6cbcf0",
-    tones={
-        Tone.CALM: Paint("#343b46", "#eceff4"),
-        Tone.GOOD: Paint("#00694d", "#ffffff"),
-        Tone.ACTIVE: Paint("#005a94", "#ffffff"),
-        Tone.CAUTION: Paint("#f0c445", "#14181f"),
-        Tone.DANGER: Paint("#b3261e", "#ffffff"),
-    },
+    tones={Tone.CALM: Paint("#343b46", "#eceff4"), **_STRONG_TONES},
     traces=("#56b4e9", "#e69f00", "#23c297", "#f0844c", "#dd9cc4", "#f0e442"),
     predicted="#b3bcc8",
 )
@@ -147,7 +141,7 @@ QListWidget#rail::item:selected {{ background: {theme.base}; border-left: 4px so
     color: {theme.text}; font-weight: bold; }}
 QLabel[rank="second"] {{ color: {theme.muted}; }}
 QLabel[rank="title"] {{ font-size: {round(_TITLE * QApplication.font().pointSize())}pt; font-weight: bold; }}
-QLabel[rank="complaint"] {{ color: {complaint_colour(theme)}; }}
+QLabel[rank="complaint"] {{ color: {"#a11d16" if theme is LIGHT else "#ff9d94"}; }}
 QPushButton[rank="first"] {{ background: {theme.accent}; color: {theme.base};
     border: 2px solid {theme.accent}; border-radius: 4px; padding: 0.35em 1.2em; font-weight: bold; }}
 QPushButton[rank="first"]:disabled {{ background: {theme.raised}; color: {theme.muted};
@@ -160,8 +154,3 @@ QTableView:focus {{ border-color: {theme.accent}; }}
 QHeaderView::section {{ background: {theme.raised}; color: {theme.text}; border: none;
     border-right: 1px solid {theme.line}; padding: 0.3em 0.5em; }}
 {tones}"""
-
-
-def complaint_colour(theme: Theme) -> Colour:
-    """Return the text colour of a complaint."""
-    return "#a11d16" if theme is LIGHT else "#ff9d94"
