@@ -281,7 +281,8 @@ class MessageStrip(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self.setAccessibleName("Messages")
-        self._notices: list[Notice] = []
+        self.notices: tuple[Notice, ...] = ()
+        """All messages in the list of Details, the newest last."""
         self.is_said = False
         self._hint = ""
         self._text = SentenceLabel()
@@ -306,16 +307,11 @@ class MessageStrip(QFrame):
         self._fit()
         self.dismiss()
 
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """All messages in the list of Details, the newest last."""
-        return tuple(self._notices)
-
     def say(self, notice: Notice) -> None:
         """Show a message; earlier messages remain in Details."""
-        self._notices = [*self._notices, notice][-MOST_KEPT:]
+        self.notices = (*self.notices, notice)[-MOST_KEPT:]
         sentences = "  ▸ ".join(part for part in (notice.what, notice.done, notice.next_step) if part)
-        self._details.setPlainText("\n\n".join(each.text for each in reversed(self._notices)))
+        self._details.setPlainText("\n\n".join(each.text for each in reversed(self.notices)))
         self.is_said = True
         self._show(f"{SYMBOLS[notice.kind]}  {sentences}", TONES[notice.kind].value)
         self._text.setAccessibleName(f"{notice.kind.value}: {notice.what}")
@@ -356,7 +352,7 @@ class MessageStrip(QFrame):
         for widget in (self, self._text):
             set_tone(widget, tone)
         for button in self._buttons:
-            button.setVisible(self.is_said or (button is self._more and bool(self._notices)))
+            button.setVisible(self.is_said or (button is self._more and bool(self.notices)))
 
     def _show_details(self) -> None:
         host = self.window()
@@ -369,8 +365,8 @@ class MessageStrip(QFrame):
         self._details.raise_()
 
     def _copy(self) -> None:
-        if self._notices:
-            QGuiApplication.clipboard().setText(self._notices[-1].text)
+        if self.notices:
+            QGuiApplication.clipboard().setText(self.notices[-1].text)
 
     def _button(self, label: str, name: str, act: Callable[[], object]) -> QPushButton:
         button = push_button(label, name, act)
