@@ -48,11 +48,7 @@ class UserActions(QObject):
         named = measurement.model_copy(update={"name": free_name(folder, measurement)})
         self._arm(Campaign(name=named.name, measurements=(named,)), folder)
 
-    def arm_campaign(
-        self,
-        existing: ExistingRecordings = ExistingRecordings.REFUSE,
-        attendance: Supervision | None = None,
-    ) -> None:
+    def arm_campaign(self, existing: ExistingRecordings, attendance: Supervision) -> None:
         """Arm the campaign of the Queue page; recordings go into a folder named after the campaign."""
         campaign = self._context.selection.campaign
         if campaign is None:

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -151,12 +152,15 @@ class QueuePage(Page):
         self.summary = SentenceLabel(name="Summary of the campaign")
         self.progress = ProgressBar("Progress of the campaign", "not running")
         self.arm_button = push_button(
-            "Arm the ca&mpaign…", "Arm, and describe what will be played", self._arm, "first"
+            "Arm the ca&mpaign…",
+            "Arm, and describe what will be played",
+            partial(self._arm, ExistingRecordings.REFUSE),
+            "first",
         )
         self.resume_button = push_button(
             "Resume: arm what is missin&g…",
             "Keep the complete recordings of the folder; record only the missing ones",
-            self._arm_missing,
+            partial(self._arm, ExistingRecordings.RESUME),
         )
         self.unattended = QCheckBox("Unattended")
         self.unattended.setToolTip(
@@ -298,15 +302,11 @@ class QueuePage(Page):
             self.context.selection.choose_campaign(move_up(campaign, number))
             self.entries.setCurrentCell(number - 1, 0)
 
-    def _arm(self) -> None:
-        self._actions.arm_campaign(ExistingRecordings.REFUSE, self._attendance)
-
-    def _arm_missing(self) -> None:
-        self._actions.arm_campaign(ExistingRecordings.RESUME, self._attendance)
-
-    @property
-    def _attendance(self) -> Supervision:
-        return Supervision.UNATTENDED if self.unattended.isChecked() else Supervision.ATTENDED
+    def _arm(self, existing: ExistingRecordings) -> None:
+        is_unattended = self.unattended.isChecked()
+        self._actions.arm_campaign(
+            existing, Supervision.UNATTENDED if is_unattended else Supervision.ATTENDED
+        )
 
     def _open(self) -> None:
         given, _ = QFileDialog.getOpenFileName(
