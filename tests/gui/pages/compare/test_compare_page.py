@@ -116,11 +116,11 @@ def test_removed_curves_are_no_longer_drawn_or_listed(overlaid):
 def test_invalid_options_are_refused_with_an_explanation(page):
     form = page.panel.form.form
     form.show_content({"estimator": "hv"})
-    assert page.panel.options() is None
+    assert page.panel.form.value is None
     assert "hv was requested without a noise ratio" in page.panel.form.complaint
     assert not page.panel._again.isEnabled()
     form.show_content({"estimator": "hv", "noise_ratio": 2.0})
-    assert page.panel.options().request.noise_ratio == 2.0
+    assert page.panel.form.value.request.noise_ratio == 2.0
 
 
 @pytest.mark.thorough

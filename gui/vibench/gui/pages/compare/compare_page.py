@@ -64,10 +64,6 @@ class AnalysisPanel(QGroupBox):
         self.form.changed.connect(self._validate)
         self.show_progress(0, 0)
 
-    def options(self) -> AnalysisOptions | None:
-        """Return the options; None if they are not valid."""
-        return self.form.value
-
     def show_progress(self, done: int, total: int) -> None:
         """Show how many recordings have been analysed; hide the bar once all have been."""
         self._bar.show_done(done, total)
@@ -124,7 +120,7 @@ class ComparePage(Page):
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
         """Analyse recordings in the background, then overlay their curves."""
-        options = self.panel.options()
+        options = self.panel.form.value
         if options is None:
             return
         for path in paths:
