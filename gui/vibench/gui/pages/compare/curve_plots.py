@@ -80,8 +80,7 @@ class CurvePlots(QWidget):
         self.markers.draw_in((self.magnitudes, self.differences))
 
     def _draw(self, curve: Curve, line_style: LineStyle) -> None:
-        lone = curve.frequency_hz.size == 1
-        if lone:
+        if curve.frequency_hz.size == 1:
             self.magnitudes.dots(line_style, curve.name, size=_DOTS.get(curve.origin, _OTHER_DOTS)).setData(
                 curve.frequency_hz, curve.magnitude
             )
@@ -187,32 +186,28 @@ class CurveList(QListWidget):
         self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
         self.setWordWrap(True)
         self._theme = theme
-        self._curves: list[Curve] = []
+        self.curves: tuple[Curve, ...] = ()
+        """All curves of the list, ticked or not."""
         self.itemChanged.connect(lambda _item: self.changed.emit())
         UNITS.on_change(self._show_units)
-
-    @property
-    def curves(self) -> tuple[Curve, ...]:
-        """All curves of the list, ticked or not."""
-        return tuple(self._curves)
 
     def ticked_curves(self) -> tuple[tuple[Curve, LineStyle], ...]:
         """Return the ticked curves with their line styles."""
         return tuple(
             (each, self.line_style(each))
-            for row, each in enumerate(self._curves)
+            for row, each in enumerate(self.curves)
             if self.item(row).checkState() is Qt.CheckState.Checked
         )
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw a hint while the list is empty."""
         super().paintEvent(event)
-        if not self._curves:
+        if not self.curves:
             hint_in_list(self, "No curves yet: add recordings, or overlay a simulation.")
 
     def line_style(self, curve: Curve) -> LineStyle:
         """Return the line style of a curve: colour by its source, dash by its kind."""
-        sources = list(dict.fromkeys(each.source for each in self._curves))
+        sources = list(dict.fromkeys(each.source for each in self.curves))
         first, second = _DASHES[curve.origin]
         dash = second if curve.response is CurveKind.RESPONSE_II else first
         return curve_style(sources.index(curve.source), dash)
@@ -220,27 +215,27 @@ class CurveList(QListWidget):
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Replace the curves of one recording or prediction by new curves."""
         ticked = {each.name for each, _ in self.ticked_curves()}
-        known = {each.name for each in self._curves}
-        others = [each for each in self._curves if not _is_of(each, source)]
-        place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
+        known = {each.name for each in self.curves}
+        others = [each for each in self.curves if not _is_of(each, source)]
+        place = next((n for n, each in enumerate(self.curves) if _is_of(each, source)), len(others))
         place = min(place, len(others))
-        self._curves = [*others[:place], *curves, *others[place:]]
+        self.curves = (*others[:place], *curves, *others[place:])
         self._list(
             lambda each: each.name in ticked or (each.name not in known and each.response in _SHOWN_FIRST)
         )
 
     def remove_chosen(self) -> tuple[str, ...]:
         """Remove the selected curves; return the sources that have no curve left."""
-        before = {each.source for each in self._curves}
+        before = {each.source for each in self.curves}
         ticked = {each.name for each, _ in self.ticked_curves()}
         rows = {index.row() for index in self.selectedIndexes()}
-        self._curves = [each for row, each in enumerate(self._curves) if row not in rows]
+        self.curves = tuple(each for row, each in enumerate(self.curves) if row not in rows)
         self._list(lambda each: each.name in ticked)
-        return tuple(before - {each.source for each in self._curves})
+        return tuple(before - {each.source for each in self.curves})
 
     def tick(self, name: str, state: Qt.CheckState) -> None:
         """Show or hide the curve ``name``."""
-        for row, each in enumerate(self._curves):
+        for row, each in enumerate(self.curves):
             if each.name == name:
                 self.item(row).setCheckState(state)
 
@@ -248,7 +243,7 @@ class CurveList(QListWidget):
         """Redraw the line samples of all curves in the colours of another theme."""
         self._theme = theme
         with QSignalBlocker(self):
-            for row, each in enumerate(self._curves):
+            for row, each in enumerate(self.curves):
                 self.item(row).setIcon(_swatch(self.line_style(each), theme))
 
     def _show_units(self) -> None:
@@ -258,7 +253,7 @@ class CurveList(QListWidget):
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
         with QSignalBlocker(self):
             self.clear()
-            for each in self._curves:
+            for each in self.curves:
                 item = QListWidgetItem(_name(each))
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
                 wanted = is_ticked(each)
