@@ -89,10 +89,6 @@ class LegendLine(QLabel):
             self.setText(text)
             self.setAccessibleName("Legend: " + ", ".join(names))
 
-    def height_for(self, width: int) -> int:
-        """Return the height of all entries; zero if there are none."""
-        return self.heightForWidth(width) + 2 * _MARGIN if self.text() else 0
-
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """Plot with one pair of axes. Curves get plain values, which the plot converts for logarithmic axes.
@@ -415,6 +411,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             return
         left = self.fontMetrics().height()
         width = max(1, self.width() - 2 * left)
-        height = self._legend.height_for(width)
+        height = self._legend.heightForWidth(width) + 2 * _MARGIN if self._legend.text() else 0
         self._legend.setGeometry(left, 0, width, height)
         self.getPlotItem().layout.setRowFixedHeight(0, height)

@@ -90,11 +90,6 @@ class NavigationBar(QListWidget):
         self.show_done({})
         self.currentRowChanged.connect(self._emit_choice)
 
-    @property
-    def chosen_name(self) -> str:
-        """Name of the selected page; empty if there is none."""
-        return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
-
     def choose(self, name: str) -> None:
         """Select the page ``name`` in the list; the window already shows this page."""
         self.setCurrentRow(self._names.index(name))
@@ -167,7 +162,7 @@ class Window(QMainWindow):
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._drawn_s: deque[float] = deque()
-        self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
+        self.event_loop_monitor = EventLoopMonitor(lambda: self.page.accessibleName(), self)  # noqa: PLW0108 - the page that is then visible
 
     @property
     def page(self) -> Page:

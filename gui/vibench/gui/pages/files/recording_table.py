@@ -65,11 +65,6 @@ class ListedRecording:
         return self.catalogue_entry.path.removesuffix(".part").removesuffix(".h5")
 
     @property
-    def is_readable(self) -> bool:
-        """Whether the recording can be opened."""
-        return self.catalogue_entry.state != UNREADABLE
-
-    @property
     def excitation_text(self) -> str:
         """Excitation and band: ``"sine sweep 150 to 350 Hz"``."""
         low, high = self.catalogue_entry.frequency_low_hz, self.catalogue_entry.frequency_high_hz
@@ -175,12 +170,8 @@ _STATE_SYMBOLS: dict[str, str] = {
 }
 
 
-def state_text(state: str) -> str:
-    """Return symbol and word for a recording's state, which are readable without colour."""
-    return f"{_symbol(state)} {state}"
-
-
 def _symbol(state: str) -> str:
+    """Return the symbol of a recording's state, which is readable without colour."""
     return _STATE_SYMBOLS.get(state, "✖")
 
 
@@ -309,7 +300,8 @@ class RecordingModel(QAbstractTableModel):
 
     def missing_pictures(self) -> tuple[Path, ...]:
         """Return the readable files that have no thumbnail yet."""
-        return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
+        readable = (each.path for each in self.entries if each.catalogue_entry.state != UNREADABLE)
+        return tuple(path for path in readable if path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
         """Add thumbnails to the rows of their recordings."""
@@ -458,7 +450,7 @@ def _cells(entry: ListedRecording) -> tuple[Cell, ...]:
     return (
         ("", entry.name),
         (printable(entry.name), entry.name),
-        (state_text(facts.state), facts.state),
+        (f"{_symbol(facts.state)} {facts.state}", facts.state),
         (printable(facts.verdict), facts.verdict),
         (moment_text(facts.started_utc), facts.started_utc),
         (printable(entry.excitation_text), entry.excitation_text),

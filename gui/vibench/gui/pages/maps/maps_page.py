@@ -299,8 +299,6 @@ class MapsPage(Page):
                     self._state.setText(part.text)
                 case Trouble():
                     self.context.warn(part.sentence)
-                case _:
-                    pass
 
     def _show_motion(self, request: MotionRequest, motion: SettledMotion) -> None:
         self._motion_of = request

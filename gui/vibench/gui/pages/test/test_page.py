@@ -108,12 +108,13 @@ class TestForm(ValidatedForm[Measurement]):
         excitation.set_starting_values(USUAL, FRESH, lines)
         choice = excitation.kind_choice
         assert choice is not None
-        choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
 
-    def _rename(self, kind: str) -> None:
-        """Rename the test after a change of kind, because the old name contains the former kind."""
-        self.form.editors["name"].show_content(kind)
-        self.form.changed.emit()
+        def rename(_place: int) -> None:
+            """Rename the test after a change of kind, because the old name contains the former kind."""
+            self.form.editors["name"].show_content(str(choice.currentData()))
+            self.form.changed.emit()
+
+        choice.activated.connect(rename)
 
 
 FIRST = "quick"
@@ -142,7 +143,7 @@ def shipped_tests() -> tuple[NamedTest, ...]:
 
 def own_tests(folder: Path) -> tuple[NamedTest, ...]:
     """Return the tests saved in a folder; skip files that cannot be read."""
-    found = _readable(sorted(folder.glob("*.toml")), load_test)
+    found = _readable(sorted(folder.glob("*.toml")), lambda path: load_toml(path, Measurement))
     return tuple(NamedTest(f"own / {path.stem}", test) for path, test in found)
 
 
@@ -150,11 +151,6 @@ def _readable(paths: Iterable[Path], load: Callable[[Path], Any]) -> Iterator[tu
     for path in paths:
         with suppress(ConfigurationError):
             yield path, load(path)
-
-
-def load_test(path: Path) -> Measurement:
-    """Return the test in a file; raise ConfigurationError with file, key and allowed values."""
-    return load_toml(path, Measurement)
 
 
 COLLISION = LineStyle(lambda theme: theme.traces[3], fill_opacity=0.18)
@@ -251,17 +247,17 @@ class LimitTable(ReadTable):
                 )
                 for check, unit in zip(checks, units, strict=True)
             ],
-            [f"{check.what}\nLimit from: {check.source}{_remedy(check)}" for check in checks],
+            [
+                f"{check.what}\nLimit from: {check.source}"
+                + ("" if check.is_kept else f"\nTo do: {check.remedy}")
+                for check in checks
+            ],
         )
         for place, check in enumerate(checks):
             item = self.item(place, _USED)
             if isinstance(item, QTableWidgetItem):
                 item.setData(SHARE_ROLE, float(check.use))
                 item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
-
-
-def _remedy(check: LimitCheck) -> str:
-    return "" if check.is_kept else f"\nTo do: {check.remedy}"
 
 
 def _mark(check: LimitCheck) -> str:
@@ -492,11 +488,9 @@ class TestPage(Page):
             return
         wish = str(self._own_folder / f"{measurement.name}.toml")
         given, _ = QFileDialog.getSaveFileName(self, "Save the test", wish, "Tests (*.toml)")
-        if given:
-            self.save_as(measurement, Path(given))
-
-    def save_as(self, measurement: Measurement, path: Path) -> None:
-        """Save a test; if it is in the folder of tests, it appears in the list."""
+        if not given:
+            return
+        path = Path(given)
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
@@ -504,7 +498,7 @@ class TestPage(Page):
         else:
             self.context.note_file(path)
             self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
-            self._list_tests()
+            self._list_tests()  # the folder of tests may contain the file
 
     def _open(self) -> None:
         given, _ = QFileDialog.getOpenFileName(self, "Open a test", str(self._own_folder), "Tests (*.toml)")
@@ -514,7 +508,7 @@ class TestPage(Page):
     def open_file(self, path: Path) -> None:
         """Load the test of a file for editing."""
         try:
-            self.form.show_value(load_test(path))
+            self.form.show_value(load_toml(path, Measurement))
             self.context.note_file(path)
         except ConfigurationError as error:
             self.context.fail(error)
