@@ -200,12 +200,10 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
         raise RecordingError(f"{folder} is not a folder; give the folder that contains the recordings.")
     try:
         with closing(_open_catalogue(folder, member(Refresh, refresh))) as connection:
-            _update(folder, connection)
-            return _entries(connection)
+            return _update(folder, connection)
     except (sqlite3.OperationalError, OSError):  # the disk is full or read-only
         with closing(_prepare(sqlite3.connect(":memory:", isolation_level=None))) as connection:
-            _update(folder, connection)
-            return _entries(connection)
+            return _update(folder, connection)
     except sqlite3.DatabaseError as error:
         raise RecordingError(
             f"{folder / CATALOGUE_NAME} is not a catalogue ({error}). Nothing was changed; rebuild the "
@@ -233,8 +231,8 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
     return connection
 
 
-def _update(folder: Path, connection: sqlite3.Connection) -> None:
-    """Read new or changed files and remove entries of missing files, in one transaction."""
+def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
+    """Read new or changed files and remove entries of missing files, in one transaction; return all."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
     noted = cache(noted_seals)
     for path in recordings_below(folder):
@@ -259,6 +257,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
     connection.execute("COMMIT")
+    return _entries(connection)
 
 
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:

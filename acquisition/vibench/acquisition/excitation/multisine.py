@@ -5,7 +5,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConfigurationError
 from ..instruments import Samples
 
 USUAL_POINTS = 8192
@@ -16,23 +15,8 @@ CANDIDATES = 20
 """Number of sets of random phases that are tried; the set with the lowest crest factor is played. 20 sets
 lower the crest factor of 1000 lines from about 3.8 to about 3.3; more sets hardly lower it further.
 """
-NEAREST_IMAGE_RATIO = 2.0
-"""Lowest allowed frequency of a held waveform's first image, divided by the upper edge of the band.
-A nearer image could not be removed by an analogue low-pass filter.
-"""
 
 Lines = NDArray[np.int64]
-
-
-def band_lines(start_hz: float, stop_hz: float, repetition_hz: float) -> Lines:
-    """Return the harmonics of ``repetition_hz`` from ``start_hz`` to ``stop_hz``, including the edges.
-
-    A harmonic within 1e-9 of an edge belongs to the band, because 200 times 0.1 Hz may not be exactly 20 Hz.
-    """
-    tolerance = 1e-9
-    first = int(np.ceil(start_hz / repetition_hz * (1 - tolerance)))
-    last = int(np.floor(stop_hz / repetition_hz * (1 + tolerance)))
-    return np.arange(max(first, 1), last + 1, dtype=np.int64)
 
 
 def hold_droop(lines: NDArray[np.integer], points: int) -> Samples:
@@ -108,26 +92,3 @@ def _period(lines: Lines, seed: int, key: tuple[int, ...], points: int, peaks: S
     spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
     spectrum[lines] = peaks * np.exp(2j * np.pi * random.random(len(lines))) / hold_droop(lines, points)
     return np.fft.irfft(spectrum, points)
-
-
-def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None:
-    """Refuse a band whose first image lies below `NEAREST_IMAGE_RATIO` times its upper edge ``stop_hz``.
-
-    Raises ConfigurationError, with the lowest allowed ``repetition_hz``.
-    """
-    image_hz = points * repetition_hz - stop_hz
-    if image_hz < NEAREST_IMAGE_RATIO * stop_hz:
-        lowest_hz = (1 + NEAREST_IMAGE_RATIO) * stop_hz / points
-        raise ConfigurationError(
-            f"repetition_hz = {repetition_hz:g} puts the first image of {stop_hz:g} Hz at {image_hz:g} Hz, "
-            f"too near the band; repetition_hz must be at least {lowest_hz:.4g} with {points} points"
-        )
-
-
-def require_lines(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
-    """Refuse a band without spectral lines; raises ConfigurationError."""
-    if len(lines) == 0:
-        raise ConfigurationError(
-            f"no harmonic of {repetition_hz:g} Hz is in the band up to {stop_hz:g} Hz; "
-            "lower repetition_hz or widen the band"
-        )

@@ -7,16 +7,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from ..recording import SegmentLabel
-from .multisine import (
-    FEWEST_POINTS,
-    MOST_POINTS,
-    USUAL_POINTS,
-    Lines,
-    band_lines,
-    flat_periods,
-    require_far_image,
-    require_lines,
-)
+from .multisine import FEWEST_POINTS, MOST_POINTS, USUAL_POINTS, Lines, flat_periods
 from .plan import AbstractExcitation, Family, FrequencyHz
 from .steps import RmsSetting, Segment, Step, Waveform
 
@@ -51,6 +42,10 @@ class BandNoise(AbstractExcitation):
         return self.band_start_hz, self.band_stop_hz
 
 
+NEAREST_IMAGE_RATIO = 2.0
+"""Lowest allowed frequency of a held waveform's first image, divided by the upper edge of the band.
+A nearer image could not be removed by an analogue low-pass filter.
+"""
 MOST_REALISATIONS = 1000
 """Largest number of realisations in one measurement; all are computed together for a common rms value."""
 
@@ -80,12 +75,27 @@ class PeriodicNoise(BandNoise):
     @property
     def candidates(self) -> Lines:
         """Harmonics in the band that a plan of this kind may excite."""
-        return band_lines(self.band_start_hz, self.band_stop_hz, self.repetition_hz)
+        # A harmonic within 1e-9 of an edge belongs to the band: 200 times 0.1 Hz may not be exactly 20 Hz.
+        first = int(np.ceil(self.band_start_hz / self.repetition_hz * (1 - 1e-9)))
+        last = int(np.floor(self.band_stop_hz / self.repetition_hz * (1 + 1e-9)))
+        return np.arange(max(first, 1), last + 1, dtype=np.int64)
 
     @model_validator(mode="after")
     def _band_fits_the_memory(self) -> Self:
-        require_far_image(self.band_stop_hz, self.repetition_hz, self.points)
-        require_lines(self.candidates, self.band_stop_hz, self.repetition_hz)
+        stop_hz, repetition_hz = self.band_stop_hz, self.repetition_hz
+        image_hz = self.points * repetition_hz - stop_hz
+        if image_hz < NEAREST_IMAGE_RATIO * stop_hz:
+            lowest_hz = (1 + NEAREST_IMAGE_RATIO) * stop_hz / self.points
+            raise ValueError(
+                f"repetition_hz = {repetition_hz:g} puts the first image of {stop_hz:g} Hz at {image_hz:g} "
+                f"Hz, too near the band; repetition_hz must be at least {lowest_hz:.4g} with {self.points} "
+                "points"
+            )
+        if len(self.candidates) == 0:
+            raise ValueError(
+                f"no harmonic of {repetition_hz:g} Hz is in the band up to {stop_hz:g} Hz; "
+                "lower repetition_hz or widen the band"
+            )
         return self
 
     @property
@@ -105,8 +115,8 @@ class PeriodicNoise(BandNoise):
 
     def steps(self) -> Iterator[Step]:
         """Yield one step for every noise realisation."""
-        lines = np.asarray(self.lines, dtype=np.int64)
-        for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed, self.points)):
+        periods = flat_periods(self.lines, self.realisations, self.seed, self.points)
+        for realisation, values in enumerate(periods):
             yield Step(
                 play=Waveform(values, self.repetition_hz),
                 settle_s=self.settle_s,
