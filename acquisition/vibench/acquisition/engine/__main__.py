@@ -1,6 +1,7 @@
 """``python -m vibench.acquisition.engine``: process of an engine. Its first line of output is its address."""
 
 import argparse
+import json
 import os
 import signal
 import sys
@@ -11,7 +12,7 @@ from ..stopping.program import signal_name, stop_signals
 from ..stopping.stop import Cause
 from ._engine import Engine, JobQueue
 from ._request_handler import RequestHandler
-from ._server import LOOPBACK, address_line, serving
+from ._server import LOOPBACK, serving
 from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
@@ -28,7 +29,8 @@ def main() -> None:
     handler = RequestHandler(engine, jobs)
     _handle_signals(handler)
     with serving(handler, options.what, options.host) as server:
-        print(address_line(server.address), flush=True)  # noqa: T201 - this line is the handshake
+        line = json.dumps(server.address.model_dump())
+        print(line, flush=True)  # noqa: T201 - this line is the handshake with the parent program
         if options.attendance is Supervision.ATTENDED:
             Thread(target=_follow_parent, args=(handler,), name="engine parent", daemon=True).start()
         else:

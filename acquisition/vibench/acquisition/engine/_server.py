@@ -6,7 +6,6 @@ engine's own thread is busy.
 
 import errno
 import hmac
-import json
 import os
 import secrets
 import selectors
@@ -282,11 +281,6 @@ class Server:
         viewer.request_s = monotonic()
         if viewer.role is ConnectionRole.ATTENDING:
             self._handler.note_presence()
-
-
-def address_line(address: EngineAddress) -> str:
-    """Return an address as one line of JSON, for the parent program."""
-    return json.dumps(address.model_dump())
 
 
 @contextmanager

@@ -117,11 +117,6 @@ def json_schema(kind: str) -> Json:
     return {"$schema": DRAFT, "title": f"vibench {kind}, version {VERSION}", **made}
 
 
-def schema_name(kind: str) -> str:
-    """Return the name of the shipped schema file, in the folder ``schemas``."""
-    return f"{kind}-{VERSION}.schema.json"
-
-
 def schema_line(model: BaseModel, schemas: Path) -> str:
     """Return the line that tells an editor the schema of a file of ``model``; empty if there is none.
 
@@ -129,7 +124,7 @@ def schema_line(model: BaseModel, schemas: Path) -> str:
     """
     names = {each.__name__ for each in type(model).__mro__}
     kind = next((kind for kind, each in SCHEMAS.items() if each.model in names), None)
-    return "" if kind is None else f"#:schema {(schemas / schema_name(kind)).as_uri()}\n"
+    return "" if kind is None else f"#:schema {(schemas / f'{kind}-{VERSION}.schema.json').as_uri()}\n"
 
 
 def _draft_4(part: Any) -> Any:
