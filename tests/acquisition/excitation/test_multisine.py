@@ -6,11 +6,11 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.excitation.multisine import (
     USUAL_POINTS as MEMORY_POINTS,
-    band_lines,
     flat_periods,
     held_lines,
     hold_droop,
 )
+from vibench.acquisition.excitation.white_noise import WhiteNoise
 
 BAND = np.arange(20, 801)
 OVERSAMPLING = 16
@@ -97,13 +97,18 @@ def test_multisine_values_are_close_to_gaussian():
 
 @given(
     start=st.integers(1, 400),
-    width=st.integers(0, 400),
+    width=st.integers(1, 400),
     repetition_hz=st.sampled_from([0.1, 0.3, 0.5, 1.0, 2.0]),
 )
 def test_a_band_includes_harmonics_at_its_edges(start, width, repetition_hz):
-    lines = band_lines(start * repetition_hz, (start + width) * repetition_hz, repetition_hz)
-    assert lines[0] == start
-    assert lines[-1] == start + width
+    noise = WhiteNoise(
+        amplitude_vpp=1.0,
+        band_start_hz=start * repetition_hz,
+        band_stop_hz=(start + width) * repetition_hz,
+        repetition_hz=repetition_hz,
+    )
+    assert noise.lines[0] == start
+    assert noise.lines[-1] == start + width
 
 
 def test_spectrum_of_held_samples_matches_a_finely_sampled_staircase():
