@@ -72,13 +72,12 @@ def find_recordings(
     Damaged recordings are returned too. So are recordings whose seal is in no journal of the folder: the
     campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
     """
-
-    def find_attempt(point: Point) -> KeptRecording | None:
+    found: dict[str, KeptRecording] = {}
+    for point in points:
         now = depth if stop is None or stop.request is None else SealDepth.QUICK
-        return complete_attempt(folder, point.name, point.measurement, now)
-
-    found = {each.name: find_attempt(each) for each in points}
-    return {name: kept for name, kept in found.items() if kept is not None}
+        if (kept := complete_attempt(folder, point.name, point.measurement, now)) is not None:
+            found[point.name] = kept
+    return found
 
 
 def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:

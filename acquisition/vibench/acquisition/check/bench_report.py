@@ -61,7 +61,11 @@ def bench_report(
             f"the bench {bench.rig.name!r} plays back a recording, so there is nothing to check. Measure "
             "with the plan of that recording"
         )
-    findings = [*_identities(bench), *_calibrations(bench), _disk_finding(bench, folder)]
+    findings = [
+        Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
+        for part, identity in bench.identities.items()
+    ]
+    findings += [*_calibrations(bench), _disk_finding(bench, folder)]
     if amplitude_vpp is None:
         amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
     drive = drive_for(bench, _small_sine(amplitude_vpp))
@@ -161,13 +165,6 @@ def _small_sine(amplitude_vpp: float) -> Measurement:
         duration_s=_READ_S,
     )
     return Measurement(name="check", excitation=sine)
-
-
-def _identities(bench: Bench) -> list[Finding]:
-    return [
-        Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
-        for part, identity in bench.identities.items()
-    ]
 
 
 def _calibrations(bench: Bench) -> list[Finding]:

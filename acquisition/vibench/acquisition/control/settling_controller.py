@@ -293,7 +293,8 @@ def record_settled(
     controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
 ) -> Controller[None]:
     """Record a settled motion as a segment, and write a note on the motion."""
-    yield from _record_held(controller, segment, duration_s)
+    controller.loop.forget()
+    yield from controller.loop.listen(RunState.RECORDING, duration_s, segment)
     _note(controller, found, segment)
 
 
@@ -303,15 +304,11 @@ def record_and_judge(
     """Record a motion long enough to decide whether it has settled; return its state."""
     shortest_s = (controller.rule.periods + 2) / controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
-    yield from _record_held(controller, segment, duration_s)
+    controller.loop.forget()
+    yield from controller.loop.listen(RunState.RECORDING, duration_s, segment)
     found = controller.settled_state(waited_s)
     _note(controller, found, segment)
     return found
-
-
-def _record_held(controller: SettlingController, segment: Segment, duration_s: float) -> Controller[None]:
-    controller.loop.forget()
-    yield from controller.loop.listen(RunState.RECORDING, duration_s, segment)
 
 
 def _note(controller: SettlingController, found: SettledState, segment: Segment) -> None:

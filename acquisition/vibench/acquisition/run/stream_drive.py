@@ -96,7 +96,8 @@ class OutputSynthesizer:
             elif self.level > 0.0:
                 self._fade(RELEASE_S)
             else:
-                self._add_silence(wanted)
+                self._stretch = _Stretch(None, self._sample, self._sample + wanted, 0.0, 0.0)
+                self._due_s = self._stretch.end / self._rate_hz
 
     def _begin(self, phase: Phase) -> None:
         self._due_s += phase.duration_s
@@ -107,10 +108,6 @@ class OutputSynthesizer:
         end = self._sample + max(1, round(duration_s * self._rate_hz))
         self._stretch = _Stretch(self._stretch.play, self._sample, end, self.level, 0.0)
         self._due_s = end / self._rate_hz
-
-    def _add_silence(self, samples: int) -> None:
-        self._stretch = _Stretch(None, self._sample, self._sample + samples, 0.0, 0.0)
-        self._due_s = self._stretch.end / self._rate_hz
 
     def _sound(self, play: Play | None, count: int) -> Samples:
         match play:
