@@ -88,7 +88,9 @@ LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """Axes of a sweep in the usual order, by the names used in ``order``."""
+    """Axes of a sweep, by the names used in ``order``."""
+
+    # These are in the usual order, from the outermost (slowest) to the innermost.
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
