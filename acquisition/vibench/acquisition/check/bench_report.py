@@ -96,13 +96,12 @@ class _BlockReader:
 
     def in_silence(self) -> Samples:
         """Return all channels while nothing plays, after the AC couplings have settled."""
-        digitizer = self._bench.digitizer
         self._begin()
         try:
             self._read_for(_SETTLE_S)
             return np.concatenate(self._read_for(_READ_S), axis=1)
         finally:
-            digitizer.stop()
+            self._bench.digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
         """Play the sine without a ramp, like the check before a run; return the settled samples."""

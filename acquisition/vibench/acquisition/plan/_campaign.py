@@ -214,23 +214,20 @@ def _fill_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
 
 def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
     """Return the defaults of one kind of excitation; raise ValueError if they are not a table."""
-    match defaults.get(present_word(str(kind)), {}):
-        case dict(shared):
-            return shared
-        case _:
-            raise ValueError(
-                f"defaults.{kind} is not a table; write [defaults.{kind}] and its values below it"
-            )
+    shared = defaults.get(present_word(str(kind)), {})
+    if not isinstance(shared, dict):
+        raise ValueError(  # noqa: TRY004 - pydantic reports only a ValueError
+            f"defaults.{kind} is not a table; write [defaults.{kind}] and its values below it"
+        )
+    return shared
 
 
 def _with_defaults(measurement: object, defaults: Mapping[str, Any]) -> object:
-    match measurement:
-        case dict():
-            shared = {key: value for key, value in defaults.items() if key not in EXCITATION_KINDS}
-            own = {**shared, **measurement}
-            match own.get("excitation"):
-                case {"kind": str(kind), **values}:
-                    own["excitation"] = {**_of_kind(defaults, kind), **values, "kind": kind}
-            return own
-        case _:
-            return measurement
+    if not isinstance(measurement, dict):
+        return measurement
+    shared = {key: value for key, value in defaults.items() if key not in EXCITATION_KINDS}
+    own = {**shared, **measurement}
+    match own.get("excitation"):
+        case {"kind": str(kind), **values}:
+            own["excitation"] = {**_of_kind(defaults, kind), **values, "kind": kind}
+    return own
