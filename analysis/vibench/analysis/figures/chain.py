@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ..dynamics import ChainAnswer, ChainDrive, ChainRun
-from ..tables import Table, table
+from ..tables import Table, rows, table
 from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
@@ -114,9 +114,8 @@ def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
     )
     size = 2.0 if is_steady else 0.6
     axes.plot(run.impact_time_s, run.impact_cell + 1, ".", color=style.MEASURED, markersize=size)
-    axes.set(xlim=(times[0], times[-1]), ylabel="cell")
+    axes.set(xlim=(times[0], times[-1]), ylabel="cell", xlabel="time [s]")
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_xlabel("time [s]")
     axes.grid(visible=False)
     what = "x" if is_steady else "rms of x"
     figure.colorbar(mesh, ax=axes, label=f"{what} of m0 [{unit}]", pad=0.01)
@@ -147,7 +146,7 @@ def _numbers(found: ChainAnswer) -> list[Table]:
     )
     if not found.runs:
         return [waves]
-    rows = [
+    places = [
         (run, line, cell)
         for run in found.runs
         for line in range(len(run.over_hz))
@@ -155,22 +154,17 @@ def _numbers(found: ChainAnswer) -> list[Table]:
     ]
     across = table(
         "chain_transmission",
-        cells=[run.cells for run, _, _ in rows],
-        frequency_hz=[run.over_hz[line] for run, line, _ in rows],
-        cell=[cell + 1 for _, _, cell in rows],
-        transmission=[run.transmission[line, cell] for run, line, cell in rows],
+        cells=[run.cells for run, _, _ in places],
+        frequency_hz=[run.over_hz[line] for run, line, _ in places],
+        cell=[cell + 1 for _, _, cell in places],
+        transmission=[run.transmission[line, cell] for run, line, cell in places],
     )
-    each = [(run, cell) for run in found.runs for cell in range(run.cells)]
+    each = [run for run in found.runs for _ in range(run.cells)]
     cells = table(
         "chain_cells",
-        cells=[run.cells for run, _ in each],
-        frequency_hz=[run.frequency_hz for run, _ in each],
-        cell=[cell + 1 for _, cell in each],
-        energy_j=[run.energy_j[cell] for run, cell in each],
-        energy_error_j=[run.energy_error_j[cell] for run, cell in each],
-        impacts=[run.impacts[cell] for run, cell in each],
-        largest_p_m=[run.largest_m[cell] for run, cell in each],
-        exponent_per_s=[run.exponent_per_s for run, _ in each],
-        exponent_error_per_s=[run.exponent_error_per_s for run, _ in each],
+        **rows(each, "cells frequency_hz"),
+        cell=np.concatenate([np.arange(run.cells) + 1 for run in found.runs]),
+        **rows(found.runs, "energy_j energy_error_j impacts largest_p_m=largest_m"),
+        **rows(each, "exponent_per_s exponent_error_per_s"),
     )
     return [waves, across, cells]

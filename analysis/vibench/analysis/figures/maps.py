@@ -176,8 +176,8 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     panels = figure.subplots(2, 1, sharex=True)
     quantity = results.plan.varying[0]
     values = np.array(results.plan.axes[-1].values)
-    _, label = _axis_edges(results, quantity)
-    factor = _axis_edges(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
+    edges, label = _axis_edges(results, quantity)
+    factor = edges[0] / results.plan.range_of(quantity).edges[0]
     for index, start in enumerate(results.plan.start_labels):
         colour, text = _UP_AND_DOWN.get(start, (style.LEVELS[index % len(style.LEVELS)], f"from {start}"))
         dots = {"color": colour, "linestyle": "none", "marker": "."}

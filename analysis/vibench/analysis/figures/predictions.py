@@ -59,7 +59,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         for axes in panels[:, 0]:
             axes.set_ylabel("relative error of the responses")
         style.legend_above(figure, [panels[0, 0]])
-    rows = [(scene, each) for scene, points in curves.items() for each in points]
+    every = [each for points in curves.values() for each in points]
     return style.DrawnFigure(
         name="tradeoff_scene" if len(curves) == 1 else "tradeoff",
         title=f"Speed against accuracy: {'; '.join(curves)}",
@@ -71,12 +71,10 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         tables=(
             table(
                 "tradeoff_scene" if len(curves) == 1 else "tradeoff",
-                scene=np.array([scene for scene, _ in rows]),
-                method=np.array([each.method for _, each in rows]),
-                time_s=np.array([each.time_s for _, each in rows]),
-                error=np.array([each.error for _, each in rows]),
-                is_stated=np.array([int(each.is_stated) for _, each in rows]),
-                is_chosen=np.array([int(each.is_chosen) for _, each in rows]),
+                scene=[scene for scene, points in curves.items() for _ in points],
+                **rows(every, "method time_s error"),
+                is_stated=[int(each.is_stated) for each in every],
+                is_chosen=[int(each.is_chosen) for each in every],
             ),
         ),
     )
