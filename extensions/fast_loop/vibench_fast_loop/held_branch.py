@@ -29,7 +29,7 @@ from vibench.analysis.recordings.facts import specimen_of
 from vibench.analysis.report import STEPPED
 from vibench.analysis.signals.arrays import Reals
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
-from vibench.analysis.tables import Tabular, table
+from vibench.analysis.tables import Tabular, rows, table
 from vibench.sim import Branch, Specimen
 
 from .fast_loop import impact_branch
@@ -72,9 +72,8 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
     stabilities = [by_point.get(each.point) for each in points]
     sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in stabilities]
     multiplier, multiplier_u = np.array(sizes, dtype=np.float64).reshape(-1, 2).T
-    of_points = ("frequency_hz", "base_m", "m0_m", "phase_deg", "residue", "residue_acceleration")
     return HeldBranch(
-        **{name: np.array([getattr(each, name) for each in points]) for name in of_points},
+        **rows(points, "frequency_hz base_m m0_m phase_deg residue residue_acceleration"),
         stability=tuple("" if each is None else each.stability.value for each in stabilities),
         multiplier=multiplier,
         multiplier_u=multiplier_u,

@@ -11,7 +11,7 @@ from vibench.acquisition import printable
 from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
 from ..overlay.ensemble import CurveDifference
-from ..tables import Table, table
+from ..tables import Table, rows, table
 from . import style
 
 Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
@@ -51,9 +51,9 @@ def comparison_figure(
         raise InvalidRequest("a figure without curves was requested; choose one or more curves")
     difference = None if pair is None else curve_difference(*pair)
     with style.figure_style():
-        rows = 1 if difference is None else 2
-        figure = style.new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
-        panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
+        count = 1 if difference is None else 2
+        figure = style.new_figure(_HEIGHT_IN + (count - 1) * _DIFFERENCE_IN)
+        panels = figure.subplots(count, 1, sharex=True, height_ratios=(3.2, 1.0)[:count], squeeze=False)[:, 0]
         top: Axes = panels[0]
         sources = list(dict.fromkeys(each.source for each in curves))
         for curve in curves:
@@ -146,9 +146,7 @@ def comparison_tables(
             table(
                 f"{name}_peaks",
                 curve=[label for label, _ in peaks],
-                frequency_hz=[each.frequency_hz for _, each in peaks],
-                magnitude=[each.magnitude for _, each in peaks],
-                half_power_width_hz=[each.half_power_width_hz or np.nan for _, each in peaks],
+                **rows([each for _, each in peaks], "frequency_hz magnitude half_power_width_hz"),
             )
         )
     if pair is not None:
