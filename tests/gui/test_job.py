@@ -108,7 +108,7 @@ def test_a_measurement_takes_five_key_presses_from_start_to_recording(bench, qtb
     key(Qt.Key.Key_Return, CONTROL)
     reach(qtbot, bench, EngineState.ARMED)
     assert bench.page is bench.pages[RUN]
-    qtbot.waitUntil(lambda: "1.5 Vpp" in bench.pages[RUN].arm_card.words, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: "1.5 Vpp" in bench.pages[RUN].arm_card.words.text(), timeout=PATIENCE_MS)
     key(Qt.Key.Key_F5)
     reach(qtbot, bench, EngineState.RUNNING)
     space_freezes_the_picture_and_opens_nothing(qtbot, bench)

@@ -349,8 +349,9 @@ class ValidatedForm(QWidget, Generic[Model]):
         """The validated model; None if the content is not allowed."""
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint", name=f"Complaint about the {name}")
-        self._warning = SentenceLabel(name=f"Warning about the {name}")
-        fill_box(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
+        self.warning = SentenceLabel(name=f"Warning about the {name}")
+        """Warnings about allowed values that may be mistakes, such as springs derived from another mass."""
+        fill_box(QVBoxLayout(self), self.form, self._complaint, self.warning, margin=0)
         self.form.changed.connect(self._take)
         UNITS.on_change(self._validate)
         self.form.show_content({})
@@ -359,11 +360,6 @@ class ValidatedForm(QWidget, Generic[Model]):
     def complaint(self) -> str:
         """All complaints about the content, as one text."""
         return self._complaint.text()
-
-    @property
-    def warning(self) -> str:
-        """Warnings about allowed values that may be mistakes, such as springs derived from another mass."""
-        return self._warning.text()
 
     def show_value(self, value: Model) -> None:
         """Replace the displayed value."""
@@ -383,7 +379,7 @@ class ValidatedForm(QWidget, Generic[Model]):
                 complaints = complaints_of(error)
             else:
                 self.value = value if self.form.is_read else None
-        self._warning.setText("; ".join(f"⚠ {each.message}" for each in warned))
-        self._warning.setVisible(bool(warned))
+        self.warning.setText("; ".join(f"⚠ {each.message}" for each in warned))
+        self.warning.setVisible(bool(warned))
         self._complaint.setText("; ".join(self.form.complain(complaints)))
         self._complaint.setVisible(bool(self._complaint.text()))

@@ -82,7 +82,7 @@ def test_the_table_lists_peaks_with_damping(overlaid):
 def test_the_second_curve_is_compared_with_the_first(overlaid):
     curve, reference = overlaid.pair_box.pair()
     assert (curve.source, reference.source) == ("half", "one")
-    assert overlaid.pair_box.summary.startswith("Median 6 dB")
+    assert overlaid.pair_box.summary.text().startswith("Median 6 dB")
     (line,) = overlaid.plots.differences.getPlotItem().listDataItems()
     frequency_hz, decibel = line.getOriginalDataset()
     assert np.median(decibel) == pytest.approx(-6.02, abs=0.02)
@@ -139,7 +139,7 @@ def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
     for name, factor in (("twice", 2.0), ("thrice", 3.0)):
         curve = by_name[f"{name}, transmission, measured"]
         assert np.median(curve.magnitude) == pytest.approx(factor, rel=0.01)
-    assert working.pair_box.summary.startswith("Median 3.5 dB")
+    assert working.pair_box.summary.text().startswith("Median 3.5 dB")
     working.add_prediction((mode("model"),))
     for ending in ("svg", "csv", "html"):
         working.export_to(tmp_path / f"out.{ending}")
@@ -203,7 +203,7 @@ def test_colour_shows_the_recording_and_line_style_the_kind_of_curve(page):
     page.pair_box._curve.setCurrentText(progress.curves()[0].name)
     measured = curves["sweep", CurveOrigin.MEASURED, CurveKind.RESPONSE_I]
     page.pair_box._reference.setCurrentText(measured.name)
-    assert "5 µm and as driven" in page.pair_box.summary
+    assert "5 µm and as driven" in page.pair_box.summary.text()
 
 
 def test_progress_does_not_move_the_controls_on_the_left(page, qapp):

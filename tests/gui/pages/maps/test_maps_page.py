@@ -46,7 +46,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, wait_for):
     assert page.picture.classes.shape == (5, 7)
     assert 0 <= page.picture.classes.min() <= page.picture.classes.max() < len(MOTION_CLASSES)
     assert page.map.image.image.shape == (5, 7, 4)
-    assert "points computed" in page.summary
+    assert "points computed" in page.summary.text()
     page.quantity.setCurrentText("Response I")
     before = page.map.image.image.copy()
     page.refresh()

@@ -52,7 +52,7 @@ def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qap
     page, status = small
     show(page, status, qapp)
     card, bar = page.arm_card, page._parts.side.verticalScrollBar()
-    assert card._words.height() >= card._words.heightForWidth(card._words.width()), "no line is cut"
+    assert card.words.height() >= card.words.heightForWidth(card.words.width()), "no line is cut"
     assert bar.value() == 0
     assert not card.is_read
     assert not card.start_button.isEnabled()

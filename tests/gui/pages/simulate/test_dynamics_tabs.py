@@ -60,8 +60,8 @@ def test_branches_are_drawn_with_error_and_cost(page, wait_for):
     assert view.simulator.is_busy
     wait_for(lambda: not view.simulator.is_busy, 100.0)
     page.refresh()
-    assert view.summary.startswith("Complete. 1 branch ")
-    assert "relative to the fundamental of p" in view.summary
+    assert view.summary.text().startswith("Complete. 1 branch ")
+    assert "relative to the fundamental of p" in view.summary.text()
     first, _ = view.picture.plots(Parameter.FREQUENCY)
     (drawn,) = lines(first)
     assert drawn.getOriginalDataset()[0][0] == pytest.approx(60.0)
@@ -115,7 +115,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
     assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
-    assert "2 chaotic; sums of exponents differ from the damping rate" in view.summary
+    assert "2 chaotic; sums of exponents differ from the damping rate" in view.summary.text()
     assert not view._compare.isEnabled()
 
 
@@ -126,8 +126,8 @@ def test_a_chain_is_simulated_and_drawn_over_frequency_cells_and_time(page, wait
     start_request(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
     wait_for(lambda: not view.simulator.is_busy, 280.0)
     page.refresh()
-    assert view.summary.startswith("Complete. Band gaps of the infinite chain: 96.07 to 110.4 Hz")
-    assert "1 run in" in view.summary
+    assert view.summary.text().startswith("Complete. Band gaps of the infinite chain: 96.07 to 110.4 Hz")
+    assert "1 run in" in view.summary.text()
     (run,) = view.answer.runs
     across, motion, energies = view.picture.plots
     assert len(lines(across)) == 9  # three cells: without contact, driven, and a dot at the frequency
@@ -170,8 +170,8 @@ def test_a_running_search_is_shown_as_running_without_a_result(page, name):
     """Branches showed "no periodic motion was found; 0.0 s" during the search."""
     view = getattr(page, name)
     view.begin()
-    assert view.summary.strip().startswith("Computing")
-    assert not re.search(r"[Nn]o |0\.0 s|not found", view.summary)
+    assert view.summary.text().strip().startswith("Computing")
+    assert not re.search(r"[Nn]o |0\.0 s|not found", view.summary.text())
     view.simulator.cancel()
 
 

@@ -305,19 +305,14 @@ class PairBox(QGroupBox):
     def __init__(self) -> None:
         super().__init__("Difference in dB")
         self._curves: dict[str, Curve] = {}
-        self._curve, self._reference, self._summary = Choice(), Choice(), SentenceLabel(rank="second")
+        self._curve, self._reference, self.summary = Choice(), Choice(), SentenceLabel(rank="second")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
             choice.setMinimumContentsLength(16)
             choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
             form.addRow(label_for(text, choice, f"Difference: {text.replace('&', '').lower()}"), choice)
-        form.addRow(self._summary)
-
-    @property
-    def summary(self) -> str:
-        """The difference of the two curves in words, or why there is none."""
-        return self._summary.text()
+        form.addRow(self.summary)
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Offer these curves for selection; keep the selected ones if possible."""
@@ -338,15 +333,15 @@ class PairBox(QGroupBox):
     def difference(self) -> CurveDifference | None:
         """Return the difference of the two curves and describe it; None if they cannot be compared."""
         pair = self.pair()
-        self._summary.setText("")
+        self.summary.setText("")
         if pair is None:
             return None
         try:
             found = curve_difference(*pair)
         except AnalysisError as error:
-            self._summary.setText(str(error))
+            self.summary.setText(str(error))
             return None
-        self._summary.setText(
+        self.summary.setText(
             f"Median {found.median_abs_db:.2g} dB, root mean square {found.rms_db:.2g} dB{_caution(*pair)}"
         )
         return found

@@ -195,8 +195,8 @@ class MapsPage(Page):
         self.form: ValidatedForm[MapRequest] = ValidatedForm(MapRequest, "map", frozenset({"described"}))
         self.map = MapPlot(context.theme)
         self.motion = MotionView(context.theme)
-        self._state = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
-        self.simulator = Simulator(self, context, self._grow, lambda: None, self._state.setText)
+        self.summary = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
+        self.simulator = Simulator(self, context, self._grow, lambda: None, self.summary.setText)
         self.picture: MapPicture | None = None
         self._request: MapRequest | None = None
         self._point: tuple[float, float] | None = None
@@ -215,11 +215,6 @@ class MapsPage(Page):
     def is_done(self) -> bool:
         """Whether there is a complete map."""
         return self.picture is not None and not self.simulator.is_busy
-
-    @property
-    def summary(self) -> str:
-        """Text below the map about the state of its computation."""
-        return self._state.text()
 
     @property
     def displayed_results(self) -> tuple[DisplayedResult, ...]:
@@ -296,7 +291,7 @@ class MapsPage(Page):
             match part:
                 case MapPicture():
                     self.picture, self._is_stale = part, True
-                    self._state.setText(part.text)
+                    self.summary.setText(part.text)
                 case Trouble():
                     self.context.warn(part.sentence)
 
@@ -344,7 +339,7 @@ class MapsPage(Page):
         legend = QLabel(" ".join(_legend_entry(*each) for each in MOTION_CLASSES))
         legend.setWordWrap(True)
         legend.setAccessibleName("Colours of the kinds of motion")
-        below = row(self.quantity, (self._state, 1), self._open)
+        below = row(self.quantity, (self.summary, 1), self._open)
         shares = (MAP_SHARE, 1000 - MAP_SHARE)
         answer = splitter("Map and motion", column(legend, (self.map, 1), below), self.motion, shares)
         answer.setChildrenCollapsible(False)

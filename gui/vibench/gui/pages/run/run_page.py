@@ -240,14 +240,14 @@ class ArmCard(QGroupBox):
 
     def __init__(self, actions: UserActions) -> None:
         super().__init__("What will happen")
-        self._words = SentenceLabel(name="What will happen")
+        self.words = SentenceLabel(name="What will happen")
         self.arm_button = push_button(
             "A&rm…  (Ctrl+Return)", "Arm, and describe what will be played", actions.arm_test, "first"
         )
         self.cancel_button = push_button("Cancel", "Disarm; nothing was played", actions.disarm)
         self.start_button = push_button("▶ Start  (F5)", "Start the drive", actions.start, "first")
         self.hold_button = push_button("Hold", "Hold the run; the drive stays on", actions.hold_or_resume)
-        fill_box(QVBoxLayout(self), self._words)
+        fill_box(QVBoxLayout(self), self.words)
         self.buttons = column(
             self.arm_button, row(self.cancel_button, (self.start_button, 1)), self.hold_button
         )
@@ -260,17 +260,12 @@ class ArmCard(QGroupBox):
     @property
     def is_read(self) -> bool:
         """Whether the user has scrolled to the description's end; only then can the run be started."""
-        words = self._words
+        words = self.words
         end = QPoint(0, words.height() - 1)
         is_whole = words.height() >= words.heightForWidth(words.width())
         if self._armed and is_whole and words.visibleRegion().contains(end):
             self._read = self._armed
         return self._read == self._armed
-
-    @property
-    def words(self) -> str:
-        """Description that is displayed."""
-        return self._words.text()
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
         """Show the possible commands; ``reason`` says why the test cannot be armed, empty if it can."""
@@ -302,8 +297,8 @@ class ArmCard(QGroupBox):
         self.start_button.setText("▶ Start  (F5)" if self.is_read else UNREAD)
 
     def _show_words(self, text: str) -> None:
-        if self._words.sentence != text:
-            self._words.setText(text)
+        if self.words.sentence != text:
+            self.words.setText(text)
 
 
 LAYOUT_ROUNDS = 4

@@ -87,11 +87,6 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._validate()
 
     @property
-    def summary(self) -> str:
-        """Text below the plots: computing time and error."""
-        return self._state.text()
-
-    @property
     def displayed_results(self) -> DisplayedResult:
         """The plots, with the request as input."""
         request = None if self._course is None else self._course.request
@@ -136,7 +131,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     def _show_text(self, text: str) -> None:
         has_nothing = self.simulator.is_busy and (self._course is None or not self._course.parts)
         cost = "" if self.answer is None or has_nothing else self.answer.cost_sentence
-        self._state.setText(f"{text} {cost}")
+        self.summary.setText(f"{text} {cost}")
         self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))
 
     def _validate(self) -> None:
@@ -159,13 +154,13 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return row((self._begin, 1), self.simulator.cancel_button)
 
     def _right(self) -> QWidget:
-        self._state = SentenceLabel("Nothing has been computed yet.")
-        self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
+        self.summary = SentenceLabel("Nothing has been computed yet.")
+        self.summary.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
             "Overlay on recordings", "Show these curves on the Compare page", self._hand_to_compare
         )
         self._compare.setEnabled(False)
-        return column((self.picture.widget, 1), row((self._state, 1), self._compare))
+        return column((self.picture.widget, 1), row((self.summary, 1), self._compare))
 
 
 BRANCHES = DynamicsKind(
