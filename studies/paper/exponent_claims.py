@@ -139,8 +139,8 @@ def exponents_part(r: Reading) -> Values:
 @costly_claim(
     "4, Fig. 10(d)",
     "Mean |difference from the piece-wise model| at 5 µm: ratio of n = 5 to 3, and of n = 7 to 5.",
-    at_most("difference, n = 5 over 3", "", 1.0),
-    at_most("n = 7 over 5", "", 1.0),
+    at_most("difference ratio, n = 5 to 3", "", 1.0),
+    at_most("n = 7 to 5", "", 1.0),
     tried=(NARROWER_FIT,),
 )
 def exponents_near_with_order(r: Reading) -> Values:
