@@ -129,7 +129,7 @@ def test_the_like_option_refuses_a_recording_at_one_frequency_before_its_analysi
     with create_recording(tmp_path / "one.h5", header) as writer:  # without drive: no analysis is possible
         writer.append(Block(0, np.zeros((1, 9))))
     refused = run("branches", "--like", "one.h5")
-    assert "has no level over a range of frequencies" in str(refused.exception)
+    assert "does not contain levels for a range of frequencies" in str(refused.exception)
 
 
 def test_an_import_warns_if_the_plan_is_longer_than_the_file(run, h5_path):

@@ -391,7 +391,7 @@ def test_a_result_that_expands_beyond_the_size_limit_is_not_read(with_result, mo
     with open_recording(with_result) as recording:
         found = recording.check_result_seals()["spectrum"]
     assert found.state is SealState.DAMAGED
-    assert "/results/spectrum/H has 8e+04 bytes, more than any result" in found.sentence
+    assert "/results/spectrum/H (8e+04 bytes) is larger than any result" in found.sentence
 
 
 @pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])

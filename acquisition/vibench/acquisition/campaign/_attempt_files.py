@@ -112,7 +112,7 @@ def complete_attempt(
 
 
 def _attempt(folder: Path, name: str, number: int) -> Path:
-    # The name of a measurement contains no dot, so a second attempt never gets the file of another point.
+    # Attempts are numbered after a dot. Names contain no dot, so no other point can have the same file.
     return folder / (f"{name}{SUFFIX}" if number == 1 else f"{name}.{number}{SUFFIX}")
 
 

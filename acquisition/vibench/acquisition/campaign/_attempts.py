@@ -167,7 +167,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # A virtual rig may wait in simulated time, which passes faster: use the longer of the two.
+                # Simulated time of a virtual rig passes faster: use the longer of real and simulated time.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self.policy.reopen_for_s or self.switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

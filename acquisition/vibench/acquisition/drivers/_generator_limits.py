@@ -165,7 +165,7 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     memory_points=(8, 65_536),
     top_code=65_534,
     burst_cycles=(1, 100_000_000),
-    # The numbers of models with one or two channels, 20 or 30 MHz, are taken from public programs.
+    # The product numbers of models (one or two channels, 20 or 30 MHz) are taken from public programs.
     usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
     longest_sweep_s=500.0,  # linear sweeps may last longer, logarithmic sweeps may not
 )

@@ -150,7 +150,7 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
-    """Return, for each part of a fault's path, whether it is a key of the file; the others are types.
+    """Return, for each part of the path to a fault, True if it is a key of the file, False if it is a type.
 
     pydantic adds the type after a key with several types: ``frequency_hz``, ``Range``, ``step``. A key of the
     file may have the name of a type.

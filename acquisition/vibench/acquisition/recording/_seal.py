@@ -248,7 +248,7 @@ def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
         if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand beyond this
-            raise RecordingError(f"{dataset.name} has {dataset.nbytes:.2g} bytes, more than any result")
+            raise RecordingError(f"{dataset.name} ({dataset.nbytes:.2g} bytes) is larger than any result")
         yield np.asarray(dataset[()])
         return
     for begin in range(0, len(dataset), PIECE_ITEMS):

@@ -162,9 +162,9 @@ class GeneratorDrive:
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands; in any case, then turn the output off.
 
-        Used when the run ends without sampling, or when the drive was still measured after switching it off.
+        Used when the run ends without sampling, or if a drive signal is still measured after switching off.
         The ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output
-        was off already, or the ramp failed, the amplitude is lowered last: a stuck relay reads back as off.
+        was off already or the ramp failed, the amplitude is lowered, too: a stuck relay is read back as off.
         """
         was_off = not self._is_on
         try:
@@ -254,7 +254,7 @@ class GeneratorDrive:
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Set the level before the command, so that the output counts as on if the command fails half-way.
+        # Note this before the command: if the command fails half-way, the output must be regarded as on.
         self._is_on = True
         self._generator.start()
 

@@ -241,7 +241,7 @@ class StreamDrive:
             return
         self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
-        # Each write waits for space, so the fade has been played once the last silence has been written.
+        # Each write waits for space, so when the last silence is written, the fade has already been played.
         left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead
         while left > 0:
             count = min(left, ahead // 2)

@@ -108,7 +108,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
         if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
-            # Only columns of times, each followed by its channels, show which times belong to a channel.
+            # It is clear which times belong to a channel only if its channels follow each time column.
             order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
             is_clear = order[0] and not any(one and two for one, two in pairwise(order))
             if not (source.are_in_order and is_clear):

@@ -408,6 +408,6 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         why = "statistics of the motion give no narrower bounds than the description" if flat else ""
         # The value is the centre of the bounds, because results are written with a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
-    nan, why = float("nan"), "not varied: all compared simulations have the described exponent and loss"
+    nan, why = float("nan"), "not varied: all simulations have the exponent and loss of the description"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):
         yield FoundParameter(untold, nan, nan, nan, value_of(described, untold), why)

@@ -25,7 +25,7 @@ _LEAD_PERIODS = 2.0
 _REMAINDER = 1e-3
 """Largest rms of the windowed response in the last part of a segment, relative to the strongest part."""
 _PARTS = 20
-"""Number of equal parts of a segment whose rms values show the decay."""
+"""Number of equal parts into which a segment is divided; the rms values of the parts show the decay."""
 _NOTHING = 1e-300
 EXPONENTIAL = "exponential"
 _ASSUMED_SD = 0.01

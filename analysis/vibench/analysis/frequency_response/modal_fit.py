@@ -229,7 +229,7 @@ _STEADY_AVERAGES = 49.0
 """Equivalent number of averages of a scatter that is smoothed over neighbouring spectral lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
-"""Distance [half-power bandwidths] below which two modes' bounds are widened for a third between them."""
+"""If two modes are closer than this [half-power bandwidths], their bounds are widened for a third mode."""
 _EDGE = 1e-3
 """Distance from a bound, relative to the search reach, below which a fit has found no minimum."""
 

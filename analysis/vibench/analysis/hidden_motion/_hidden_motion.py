@@ -56,7 +56,7 @@ class MassCheck:
     unexplained: float
     """Part of the measured velocity that the track does not explain (relative rms)."""
     expected: float
-    """Unexplained part expected from noise, the track's uncertainty and the sensor's mounting."""
+    """Unexplained part that noise, uncertainty of the track and mounting of the sensor would cause."""
 
     @property
     def confirms(self) -> bool | None:

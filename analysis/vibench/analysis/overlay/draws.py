@@ -32,7 +32,7 @@ _FEWEST_LINES = 50
 """Minimum number of spectral lines in silence, which determine the noise level to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
-"""Number of blocks in which noise is estimated, in addition to the first and last second."""
+"""Number of blocks in which noise is estimated, in addition to the first 1 s and the last 1 s."""
 _BAND = (0.2, 0.4)
 """Frequency band, relative to the sample rate, that shows channel noise without modes."""
 _ALIKE = 6.0

@@ -297,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return, as text, result and age of the last bench check, and findings that are not ok."""
+    """Return the result and age of the last bench check and its findings that are not ok, as one text."""
     check = facts.bench_check
     if not check:
         return "none"

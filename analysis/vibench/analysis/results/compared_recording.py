@@ -80,7 +80,7 @@ def stored_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[Analysi
     return result, failures
 
 
-_NO_LEVEL = "{} has no level over a range of frequencies; choose a stepped sine or a sweep"
+_NO_LEVEL = "{} does not contain levels for a range of frequencies; choose a stepped sine or a sweep"
 
 
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:

@@ -64,7 +64,7 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
     A file contains the nodes as dataset 15, and one dataset 58 per node. With several scans, each file name
     ends with the name of the scan.
 
-    Raises NotEnoughData when no recording is noise at a point of a scan, AnalysisError when a recording
+    Raises NotEnoughData when no recording was made with noise at a scan point, AnalysisError when a recording
     cannot be analysed, and InvalidRequest when a file exists.
 
     Parameters
@@ -80,8 +80,8 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
     scans = list(scans_of([each for each in found if isinstance(each, NoiseAnalysis)]))
     if not scans:
         raise NotEnoughData(
-            "none of these recordings is noise at a point of a scan; measure a campaign with [[scan]], or "
-            "give one recording"
+            "none of these recordings was made with noise at a scan point; measure a campaign with [[scan]], "
+            "or give one recording"
         )
     names = [each.name for each in scans]
     for number, scan in enumerate(scans):

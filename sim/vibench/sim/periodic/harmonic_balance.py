@@ -241,7 +241,7 @@ class BalanceEnd(StrEnum):
 
     CONVERGED = "converged"
     TOO_FEW_HARMONICS = "the harmonics left out still matter: allow more, or loosen the tolerance"
-    NO_SOLUTION = "Newton's iteration found no solution: start nearer to one, or allow more harmonics"
+    NO_SOLUTION = "Newton's iteration found no solution: start nearer to a solution, or allow more harmonics"
 
 
 def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:

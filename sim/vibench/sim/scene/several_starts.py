@@ -348,7 +348,7 @@ ErrorOf = Callable[[ReachedMotion], float | None]
 def ensemble_of(
     several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
 ) -> Ensemble:
-    """Return the motions reached from all starts, with shares and errors.
+    """Return the motions reached from all starts, each with its share of the starts and its errors.
 
     Parameters
     ----------

@@ -317,7 +317,7 @@ class _StartedScene:
                     pace,
                     window_s,
                     min(longest_s, MOST_STATES / scene.drive.frequency_hz),
-                    # Continuing chaos uses a part of the budget; other starts use the rest.
+                    # Chaos is continued for a part of the budget; other starts use the rest.
                     alone_s=ALONE * scene.budget_s if is_answer else math.inf,
                     by_itself_s=math.inf if is_answer else 0.0,
                 )

@@ -77,8 +77,8 @@ def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext],
         except struct.error as error:
             context.set_code(grpc.StatusCode.INVALID_ARGUMENT)
             context.set_details(
-                f"{name} was called with {len(request)} bytes that are not its parameters ({error}); nothing "
-                "reached the device"
+                f"{name} was called with {len(request)} bytes that do not match its parameters ({error}); "
+                "nothing reached the device"
             )
             return b""
         except OSError as error:

@@ -249,7 +249,7 @@ class MotionSensor:
         return SensorParts(self._filter, noise, instead, self._full_scale, self._full_scale_v)
 
     def volts(self, values: FloatArray, first_step: int) -> FloatArray:
-        """Return the output for the means of a motion over the next steps, shape (steps,) [V]."""
+        """Return the output [V] for the mean motion in each of the next steps, shape (steps,)."""
         volts = np.empty(len(values))
         parts = self.parts(first_step, len(values))
         native_engine().call("show", parts.showing(np.ascontiguousarray(values), volts))
