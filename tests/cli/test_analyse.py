@@ -105,7 +105,7 @@ def test_a_bad_recording_analysed_alone_leaves_no_report(vibench_here, tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == ["nothing.h5"]
 
 
-def test_contradictory_options_are_refused_in_one_sentence(vibench_here, good, tmp_path):
+def test_contradictory_options_are_refused_with_a_readable_message(vibench_here, good, tmp_path):
     done = vibench_here("analyse", good, "--resolution", "1", "--averages", "9", cwd=tmp_path)
     assert done.returncode == 1
     assert "a resolution and a number of averages were given; give one" in done.stderr

@@ -113,5 +113,5 @@ def test_the_exponent_of_a_chain_is_reported():
         ),
     ],
 )
-def test_invalid_options_are_refused_in_one_sentence(arguments, said):
+def test_invalid_options_are_refused_with_a_readable_message(arguments, said):
     assert said in refusal_of("chain", *arguments)

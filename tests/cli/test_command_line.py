@@ -98,7 +98,7 @@ def test_a_stopped_campaign_reports_its_failed_points(tmp_path):
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )
-def test_a_wrong_campaign_is_refused_in_one_sentence_before_output(refusal, tmp_path, old, new, said):
+def test_a_wrong_campaign_is_refused_with_a_readable_message_before_output(refusal, tmp_path, old, new, said):
     assert said in refusal("measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings")
     assert not list(tmp_path.glob("recordings/*"))
 

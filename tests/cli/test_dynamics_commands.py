@@ -132,7 +132,7 @@ def test_a_zero_that_is_not_allowed_is_quoted_as_typed(command):
         (("spectrum", *POINT, "--duration", "0.1"), "request 32 or more"),
     ],
 )
-def test_invalid_options_are_refused_in_one_sentence(arguments, said):
+def test_invalid_options_are_refused_with_a_readable_message(arguments, said):
     assert said in refusal_of(*arguments)
 
 

@@ -109,7 +109,7 @@ def test_a_basin_map_explains_a_missing_boundary_exponent(output_of, tmp_path, t
         (MAP + "gap = 3\n", (), "gap"),
     ],
 )
-def test_an_invalid_map_is_refused_in_one_sentence_without_a_folder(refusal, tmp_path, text, more, said):
+def test_an_invalid_map_causes_a_readable_message_but_no_folder(refusal, tmp_path, text, more, said):
     sentence = refusal("map", plan(tmp_path, text), "--out", "a", *more)
     assert said in sentence
     assert "valid number" not in sentence

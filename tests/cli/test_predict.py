@@ -98,7 +98,7 @@ def test_a_failed_point_does_not_hide_the_results_of_other_points(vibench_here, 
         (("--amplitude", "nan", "--frequency", 100), "--amplitude"),
     ],
 )
-def test_invalid_predictions_are_refused_in_one_sentence(refusal, tmp_path, arguments, said):
+def test_invalid_predictions_are_refused_with_a_readable_message(refusal, tmp_path, arguments, said):
     assert said in refusal("predict", *arguments, "--json")
     assert list(tmp_path.iterdir()) == []
 
@@ -125,12 +125,12 @@ def test_a_start_dependent_prediction_lists_motions_with_their_shares(vibench_he
     assert "┃" not in told.stdout, "one table with a frame, one without"
 
 
-def test_a_non_numeric_budget_is_refused_in_a_sentence(refusal):
+def test_an_invalid_budget_is_refused_with_a_readable_message(refusal):
     for given, said in (("soon", "--budget was given as 'soon'"), ("-1", "--budget was given as -1")):
         assert said in refusal("predict", *FORGETFUL, f"--budget={given}")
 
 
-def test_a_requested_error_is_reached_and_stated(output_of):
+def test_a_requested_error_is_reached_and_reported(output_of):
     asked = ("predict", "--amplitude", 20e-6, "--frequency", 130, "--error", "1 %", "--time", "20 s")
     (point,) = output_of(*asked, "--json")["points"]
     assert point["error_estimate"] < 1e-6
@@ -165,5 +165,5 @@ def test_every_point_of_a_curve_reaches_the_requested_error(output_of):
         (("--error", "1%", "--observe", "response,lyapunov"), "A target is not allowed with lyapunov"),
     ],
 )
-def test_an_impossible_error_target_is_refused_in_one_sentence(refusal, arguments, said):
+def test_an_impossible_error_target_is_refused_with_a_readable_message(refusal, arguments, said):
     assert said in refusal("predict", "--amplitude", 1e-6, "--frequency", 100, *arguments, "--json")

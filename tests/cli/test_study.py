@@ -112,7 +112,7 @@ def has_results(path):
         ('starts = ["rest", "up"]', 'starts = ["left"]', "starts.0 = 'left': input should be 'rest', 'up'"),
     ],
 )
-def test_a_wrong_study_is_refused_in_one_sentence(refusal, tmp_path, old, new, said):
+def test_a_wrong_study_is_refused_with_a_readable_message(refusal, tmp_path, old, new, said):
     assert old in SMALL
     sentence = refusal("study", plan(tmp_path, SMALL.replace(old, new)), "--out", "a.h5")
     assert said in sentence

@@ -26,7 +26,7 @@ def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(output_o
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
 )
-def test_an_impossible_scene_is_refused_in_one_sentence(refusal, tmp_path, arguments, said):
+def test_an_impossible_scene_is_refused_with_a_readable_message(refusal, tmp_path, arguments, said):
     assert said in refusal("tradeoff", *arguments)
     assert list(tmp_path.iterdir()) == []
 

@@ -106,7 +106,7 @@ def test_every_option_accepts_its_own_example():
 
 @pytest.mark.parametrize("name", ["zeta", "gap", "fit", "compared", "sweep-amplitude", "sweep-falls"])
 @pytest.mark.parametrize("value", ["-1", "nan", "inf", "", "much"])
-def test_an_invalid_number_is_refused_in_one_sentence_that_quotes_it(name, value):
+def test_an_invalid_number_is_refused_with_a_readable_message_that_quotes_it(name, value):
     with pytest.raises(InvalidRequest) as refused:
         parse_option(f"{name}={value}")
     said = str(refused.value)

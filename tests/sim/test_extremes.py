@@ -315,6 +315,6 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("ask", "sentence"), REFUSED)
-def test_impossible_scenes_are_refused_in_one_sentence(ask, sentence):
+def test_impossible_scenes_are_refused_with_a_readable_message(ask, sentence):
     with pytest.raises(ValueError, match=sentence):
         ask()

@@ -169,7 +169,7 @@ def test_the_output_is_freed_if_it_would_change_the_requested_rate(digitizer):
         ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"not support a rate.*1000 to 96000"),
     ],
 )
-def test_an_unsupported_output_setting_is_refused_in_one_sentence(digitizer, physical, changes, kind, said):
+def test_an_unsupported_setting_is_refused_with_a_readable_message(digitizer, physical, changes, kind, said):
     with pytest.raises(kind, match=said) as failure:
         DaqmxOutput.open(physical, CONFIG.model_copy(update=changes), digitizer)
     assert "\n" not in str(failure.value)

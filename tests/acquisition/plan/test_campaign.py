@@ -128,7 +128,7 @@ class TestDefaults:
 
 
 class TestRefusals:
-    def test_a_bench_file_given_as_a_campaign_is_refused_in_one_sentence(self):
+    def test_a_bench_file_given_as_a_campaign_is_refused_with_a_readable_message(self):
         bench = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml"
         with pytest.raises(
             ConfigurationError, match="specimen, virtual are not known keys: check"

@@ -60,7 +60,7 @@ def test_the_shipped_scan_visits_all_three_masses():
         ([point("t" * 60)], r"would have 66 characters; at most 64 are allowed"),
     ],
 )
-def test_an_invalid_scan_point_is_refused_with_one_sentence(points, sentence):
+def test_an_invalid_scan_point_is_refused_with_a_readable_message(points, sentence):
     with pytest.raises(ConfigurationError, match=sentence):
         scan(*points)
 

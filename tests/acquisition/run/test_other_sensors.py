@@ -79,7 +79,7 @@ def amplitude(samples, rate_hz, frequency_hz):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("role", ["m0_displacement", "m0_acceleration"])
-def test_probe_and_accelerometer_measure_the_motion_of_the_vibrometer(tmp_path, role):
+def test_probe_and_accelerometer_measure_the_same_motion_as_the_vibrometer(tmp_path, role):
     path = record(rig_with(role), tmp_path, amplitude_vpp=0.5, frequency_hz=250.0, **DWELL)
     with open_recording(path) as recording:
         rate = recording.sample_rate_hz

@@ -166,7 +166,7 @@ def test_separate_modes_are_listed_as_peaks(modes_hz, damping):
     assert [each.frequency_hz for each in found] == pytest.approx(modes_hz, rel=0.01)
 
 
-def test_colour_marks_the_recording_and_line_style_the_kind_of_curve():
+def test_colour_shows_the_recording_and_line_style_shows_the_kind_of_curve():
     frequency_hz = np.arange(60.0, 400.0)
     curves = [
         replace(response_curve(frequency_hz, (95.0,)), source=source, origin=origin, response=response)

@@ -79,7 +79,7 @@ def test_alternating_cells_repeat_and_changed_values_apply_to_every_cell():
         ({"start_hz": 10.0, "stop_hz": 300.0, "step_hz": 1e-3}, "take a larger step"),
     ],
 )
-def test_an_invalid_chain_request_is_refused_in_one_sentence(options, said):
+def test_an_invalid_chain_request_is_refused_with_a_readable_message(options, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**options)
 

@@ -313,7 +313,7 @@ def test_a_motion_without_contact_determines_no_gap(world_recording):
     assert motion.free_gaps == (None, None)
 
 
-def test_requests_that_can_give_no_result_are_refused_in_one_sentence(world_recording):
+def test_requests_that_can_give_no_result_are_refused_with_a_readable_message(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):

@@ -85,7 +85,7 @@ def record_and_analyse(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_tracked_resonance_is_analysed_and_stated(record_and_analyse):
+def test_a_tracked_resonance_is_analysed_and_reported(record_and_analyse):
     tracked = ResonanceTracking(
         amplitude_vpp=0.2,
         start_hz=265,

@@ -76,7 +76,7 @@ def test_campaign_time_is_distributed_in_proportion_to_the_needed_times():
         (Until(resonance_hz=0.00001), 1e6, "give less time or wider bounds"),
     ],
 )
-def test_an_impossible_distribution_of_time_is_refused_in_one_sentence(until, time_s, said):
+def test_an_impossible_distribution_of_time_is_refused_with_a_readable_message(until, time_s, said):
     with pytest.raises(ConfigurationError, match=said):
         fit_to(Campaign(name="c", measurements=(plan(NOISE, until), plan(QUIET, None, "q"))), RIG, time_s)
 

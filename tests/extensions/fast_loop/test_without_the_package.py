@@ -91,7 +91,7 @@ def test_a_measurement_that_needs_the_missing_package_is_refused(run, given, tmp
 
 
 @pytest.mark.thorough
-def test_a_branch_recording_is_refused_in_one_sentence_without_its_package(run, recording, tmp_path):
+def test_a_branch_recording_is_refused_with_a_readable_message_without_its_package(run, recording, tmp_path):
     told = run("-m", "vibench.cli", "analyse", recording, "--json")
     assert told.returncode == 1
     assert SENTENCE in " ".join(told.stderr.split())

@@ -32,7 +32,7 @@ def test_a_chain_round_trips_through_serialisation():
 
 
 @pytest.mark.parametrize("cells", [0, -1, 10**6])
-def test_an_impossible_number_of_cells_is_refused_in_one_sentence(cells):
+def test_an_impossible_number_of_cells_is_refused_with_a_readable_message(cells):
     with pytest.raises(ValueError, match=rf"^A chain of {cells} cells is not allowed: give 1 to \d+\.$"):
         chain_of(gong2025(), cells)
 

@@ -143,6 +143,6 @@ def test_an_overflowing_motion_ends_as_not_finite():
         ({"duration_s": 1.0, "initial_state": np.full((2, 6), np.nan)}, r"is not allowed: give finite"),
     ],
 )
-def test_invalid_chain_runs_are_refused_in_one_sentence(options, sentence):
+def test_invalid_chain_runs_are_refused_with_a_readable_message(options, sentence):
     with pytest.raises(ValueError, match=sentence):
         integrate_chain(chain_of(gong2025(), 2), **{"drive": HARD, **options})

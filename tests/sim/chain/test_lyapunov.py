@@ -39,7 +39,7 @@ def test_a_chain_run_with_too_many_impacts_has_no_exponent():
 
 
 @pytest.mark.parametrize("duration_s", [0.01, math.inf])
-def test_a_duration_that_can_give_no_error_is_refused_in_one_sentence(duration_s):
+def test_a_duration_that_can_give_no_error_is_refused_with_a_readable_message(duration_s):
     with pytest.raises(
         ValueError, match=r"^Duration .* s is not allowed for an exponent at 260\.0 Hz: .*\.$"
     ):

@@ -47,7 +47,7 @@ def test_modes_of_equal_frequency_form_a_complete_set():
     np.testing.assert_allclose((modes.shapes.T @ modes.rows).real, np.eye(36), atol=1e-9)
 
 
-def test_critical_damping_is_refused_in_one_sentence():
+def test_critical_damping_is_refused_with_a_readable_message():
     specimen = gong2025(damping_time_s=0.0)
     omega = 2.0 * np.pi * chain_of(specimen, 2).natural_frequencies_hz[0]
     with pytest.raises(ValueError, match=r"^Two modes .* change a damping by 0\.1 per cent\.$"):

@@ -108,7 +108,7 @@ def test_a_chain_run_of_too_many_windows_is_refused(drive, duration_s):
         (PERIODIC, 1e-3, r"^Window 0\.001 s is not allowed at 130\.0 Hz: .*\.$"),
     ],
 )
-def test_impossible_observables_are_refused_in_one_sentence(drive, window_s, sentence):
+def test_impossible_observables_are_refused_with_a_readable_message(drive, window_s, sentence):
     with pytest.raises(ValueError, match=sentence):
         chain_response(chain_of(gong2025(), 2), drive, duration_s=2.0, window_s=window_s)
 

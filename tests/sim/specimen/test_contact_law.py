@@ -82,7 +82,7 @@ def test_a_contact_law_is_found_by_its_name(text, law):
         ("linear_gap:nan", "Stop stiffness nan N/m is not allowed"),
     ],
 )
-def test_the_name_of_an_unknown_contact_law_is_refused_in_one_sentence(text, sentence):
+def test_the_name_of_an_unknown_contact_law_is_refused_with_a_readable_message(text, sentence):
     with pytest.raises(ValueError, match=sentence):
         law_by_name(text, HERTZ.stiffness, GAP)
 

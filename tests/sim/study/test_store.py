@@ -218,7 +218,7 @@ def test_a_study_starts_even_while_its_file_is_briefly_read(small, tmp_path):
         *((each, "is not a readable HDF5") for each in (b"", b"text")),
     ],
 )
-def test_a_file_without_a_study_is_refused_in_one_sentence(tmp_path, content, said):
+def test_a_file_without_a_study_is_refused_with_a_readable_message(tmp_path, content, said):
     path = tmp_path / "a.h5"
     if content is not None:
         path.write_bytes(content)
@@ -273,7 +273,7 @@ def set_values(name, value):
         (set_values("sessions/n_sessions", 5000), "out of bounds"),
     ],
 )
-def test_a_changed_study_file_is_refused_in_one_sentence_and_kept(small, tmp_path, change, said):
+def test_a_changed_study_file_is_refused_with_a_readable_message_and_kept(small, tmp_path, change, said):
     path = tmp_path / "a.h5"
     solve_study(small, path)
     with h5py.File(path, "r+") as file:

@@ -180,7 +180,7 @@ def test_failed_analyses_and_exports_are_reported_and_keep_the_other_curves(work
     assert len(working.curves.curves) == known
 
 
-def test_colour_shows_the_recording_and_line_style_the_kind_of_curve(page):
+def test_colour_shows_the_recording_and_line_style_shows_the_kind_of_curve(page):
     frequency_hz = np.arange(100.0, 300.0)
     ones, none = np.ones_like(frequency_hz), np.full_like(frequency_hz, np.nan)
     curves = {
