@@ -8,7 +8,7 @@ LONGEST_CLAUSE = 400
 
 
 def printable(text: str) -> str:
-    r"""Return one line, with escapes for characters that move the cursor, reorder text or are invisible.
+    r"""Return ``text`` in one line, with escapes for characters that move the cursor or are not visible.
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb
