@@ -106,7 +106,8 @@ def test_the_stated_bias_and_scatter_by_noise_match_repeated_dwells():
     lifted = np.array([each.response_i for each in found]) - 0.02
     assert np.mean([each.noise_bias_i for each in found]) == pytest.approx(np.mean(lifted), rel=0.15)
     assert found[0].noise_density == pytest.approx(1e-6, rel=0.1)
-    stated = np.sqrt(np.mean([each.sd_response_ii**2 for each in found]))
+    # The median, because noise that resembles a trend widens one bound in seven.
+    stated = np.median([each.sd_response_ii for each in found])
     assert stated == pytest.approx(np.std([each.response_ii for each in found]), rel=0.4)
 
 
