@@ -34,7 +34,7 @@ from .progress_bars import analysis_bar
 
 LOOK_S = 1.0
 DRAWS = 8
-"""Number of simulation runs per test: half of the default of `vibench analyse`, to save a minute."""
+"""Number of simulation runs per test: half of the default of `vibench analyse`, to save time."""
 
 
 class Analyst:
