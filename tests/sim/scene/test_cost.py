@@ -94,7 +94,7 @@ def test_a_pilot_run_corrects_the_planned_cost():
         )
     )
     begun_s = time.monotonic()
-    assert pilot_cost_s(calm, 100) < 0.5 < pilot_cost_s(chaotic, 100) < 60.0
+    assert 10 * pilot_cost_s(calm, 100) < pilot_cost_s(chaotic, 100) < 60.0
     assert pilot_cost_s(timed, 100) == 20.0
     assert time.monotonic() - begun_s < 3.0 * 2.0
 
