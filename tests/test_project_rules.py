@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 27_970,
-    "analysis": 33_259,
+    "analysis": 33_271,
     "cli": 5_057,
     "extensions": 2_615,
     "gui": 11_963,
@@ -118,4 +118,4 @@ def test_a_package_stays_within_its_line_budget(folder):
     ]
     lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
     assert 0 < lines <= LINES_AT_MOST[folder]
-    assert sum(LINES_AT_MOST.values()) <= 118_100
+    assert sum(LINES_AT_MOST.values()) <= 118_112

@@ -17,9 +17,9 @@ from typing import TextIO
 import numpy as np
 
 from ..signals.arrays import Reals
-from ._alignment import UNITS, stated_times
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import Source, SourceChannel, own_facts, read_from, scale_among, unit_among
+from ._times import UNITS, stated_times
 
 _NAMES = (
     "jan feb mar apr may jun jul aug sep oct nov dec jan feb m\u00e4r apr mai jun jul aug sep okt nov dez"

@@ -16,8 +16,8 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, wal
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
-from ._alignment import stated_times
 from ._source_channel import Read, Source, SourceChannel, exact_step, own_facts, scale_among, unit_among
+from ._times import stated_times
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")

@@ -21,7 +21,6 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
-from ._alignment import stated_times
 from ._excerpt import Excerpt, TransferObserver, facts_document, ignore_progress
 from ._hdf5_source import FEWEST_SAMPLES, open_hdf5_source
 from ._source_channel import (
@@ -34,6 +33,7 @@ from ._source_channel import (
     scale_among,
     unit_among,
 )
+from ._times import stated_times
 
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #

@@ -15,13 +15,13 @@ from vibench.sim.hdf5_files.door import system_error
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import is_time_of, time_axis
 from ._csv import open_csv
 from ._hdf5_source import open_hdf5_source
 from ._mapping import unit_in_name
 from ._mat import open_mat
 from ._source_channel import NAME_SHOWN, Read, Source, SourceChannel
 from ._tdms_source import open_tdms
+from ._times import is_time_of, time_axis
 from ._uff import open_uff
 from ._wav import open_wav
 

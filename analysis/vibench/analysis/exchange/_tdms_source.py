@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
-from ._alignment import restarts, stated_start_s, stated_times
 from ._source_channel import Source, SourceChannel, exact_step, scale_among, unit_among
+from ._times import restarts, stated_start_s, stated_times
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""

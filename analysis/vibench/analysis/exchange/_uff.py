@@ -28,9 +28,9 @@ from vibench.acquisition.recording import ChannelHeader, Origin, Recording, Reco
 
 from ..errors import UnusableData
 from ..signals.arrays import Complexes, Reals
-from ._alignment import agrees
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SECONDS, Read, Source, SourceChannel, rate_bounds, text_of
+from ._times import agrees
 
 DELIMITER = "    -1"
 TIME_RESPONSE = 1
