@@ -1,4 +1,4 @@
-"""Check that installation and computer provide what a command needs; errors say what to do."""
+"""Check that the installed packages and the computer suffice for a command; errors say what to do."""
 
 import sys
 from collections.abc import Callable, Mapping

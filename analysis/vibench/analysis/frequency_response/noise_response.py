@@ -358,8 +358,8 @@ def _response_to_hits(
 def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
     """Return a remark if an estimate is biased; channel noise does not bias the drive-referenced one.
 
-    The median difference, over the band or about a resonance, counts as bias if it exceeds three of its own
-    standard deviations and half the standard deviation of a line.
+    The median difference of the two estimates, over the band or about a resonance, is a bias if it exceeds
+    both three times its standard deviation and half the standard deviation of a line.
     """
     sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
     known = np.isfinite(sd) & (chosen.magnitude > 0) & (referenced.magnitude > 0) & referenced.is_significant

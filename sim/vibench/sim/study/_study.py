@@ -314,7 +314,7 @@ class Study(GridPlan):
         return self.scene(place, Given(start.state, start.label) if isinstance(start, GivenStart) else Rest())
 
     def is_own(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bool:
-        """Return whether the stored digest of a point is that of its scene."""
+        """Return whether the digest stored for a point equals the digest of its scene."""
         before = int(arrays[CONTINUES][number])
         known = "" if before < 0 else bytes(arrays[IDENTITY][before]).decode()
         scene = self.first_scene(self.grid.place(number))
