@@ -48,7 +48,9 @@ def test_the_recorded_level_matches_every_frequency_step(level, stepped_file):
 
 def test_a_dwell_has_no_level_over_frequency(dwell_file):
     path = dwell_file()
-    with pytest.raises(NotEnoughData, match=rf"^{path.name} has no level .* choose a stepped sine"):
+    with pytest.raises(
+        NotEnoughData, match=rf"^{path.name} does not contain levels .* choose a stepped sine"
+    ):
         level_of_drive(comparison(path))
 
 

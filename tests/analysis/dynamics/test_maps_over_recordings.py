@@ -47,5 +47,5 @@ def test_a_report_overlays_recordings_only_on_frequency_amplitude_maps(small_map
 
 
 def test_a_recording_without_level_over_frequency_is_refused_before_it_is_analysed(noise_file):
-    with pytest.raises(NotEnoughData, match="no level over a range of frequencies"):
+    with pytest.raises(NotEnoughData, match="does not contain levels for a range of frequencies"):
         recorded_response(noise_file(samples=100))  # too short for an analysis
