@@ -122,10 +122,22 @@ def test_every_demo_measurement_agrees_with_its_ensemble_of_simulations(results)
     """One quantity in a hundred is outside its limit by chance, and some 15 quantities are compared."""
     for name, found in results.items():
         assert found["simulated"]["drive"] == "recorded amplifier voltage", name
-    compared = [
-        each for found in results.values() for each in found["simulated"]["ensemble"] if each["compared"]
-    ]
-    assert len(compared) >= 13
+    quantities = {
+        name: [each for each in found["simulated"]["ensemble"] if each["compared"]]
+        for name, found in results.items()
+    }
+    counts = {name: len(compared) for name, compared in quantities.items()}
+    # Whether the strong dwell becomes periodic during the record is a matter of chance.
+    assert counts.pop("dwell_strong") >= 4 or results["dwell_strong"]["simulated"]["escape"] is not None
+    assert counts == {
+        "noise_weak": 1,
+        "noise_moderate": 1,
+        "noise_strong": 1,
+        "sweep_moderate": 2,
+        "dwell_weak": 2,
+        "dwell_moderate": 4,
+    }
+    compared = [each for found in quantities.values() for each in found]
     assert sum(not each["agrees"] for each in compared) <= 1
     limit_z = norm.ppf(1.0 - 0.5 * 0.01 / sum(each["compared"] for each in compared))
     assert max(abs(each["largest_z"]) for each in compared) < limit_z

@@ -4,6 +4,7 @@ import json
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -35,31 +36,33 @@ from .progress_bars import analysis_bar
 LOOK_S = 1.0
 DRAWS = 8
 """Number of simulation runs per test: half of the default of `vibench analyse`, to save time."""
+PROCESSES = 2
+"""Number of analysis processes; with the measurement, each needs up to 0.5 GB."""
 
 
 class Analyst:
-    """Analyser of recordings in another process; it returns results in the order of submission."""
+    """Analyser of recordings in other processes; it returns results in the order of submission."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
         self._draws = draws
         self._name = name
         self._folder = Path()
-        self._parts: list[CampaignResults | BaseException] = []
+        self._parts: dict[int, CampaignResults | BaseException] = {}
         self.submitted = 0
 
     def take(self, recording: Path) -> None:
         """Submit a recording for analysis."""
+        take = partial(self._parts.__setitem__, self.submitted)
         self.submitted += 1
         self._folder = recording.parent
-        take = self._parts.append
         self._pool.ask(analyse_files, take, take, [recording], self._name, draws=self._draws)
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for each; raise AnalysisError if the process died."""
+        """Yield the results in order, waiting for each; raise AnalysisError if its process died."""
         for number in range(self.submitted):
-            while number == len(self._parts):
+            while number not in self._parts:
                 self._pool.poll(LOOK_S)
             match self._parts[number]:
                 case ChildProcessError() as error:
@@ -74,9 +77,9 @@ class Analyst:
 
 
 @contextmanager
-def second_process(name: str, draws: int) -> Iterator[Analyst]:
-    """Yield an analyser in a new process; after an error, drop the unfinished analyses."""
-    pool = Pool(1)
+def analysis_processes(name: str, draws: int) -> Iterator[Analyst]:
+    """Yield an analyser in new processes; after an error, drop the unfinished analyses."""
+    pool = Pool(PROCESSES)
     try:
         yield Analyst(pool, name, draws)
     finally:
@@ -97,10 +100,10 @@ def demo(
     if as_json:
         leave_output_to_json()
     folder = free_path(Path("vibench_demo")) if out is None else out
-    campaign = load_campaign(shipped("campaigns/paper.toml"))
+    campaign = load_campaign(shipped("campaigns/demo.toml"))
     console.print("The experiment of Gong et al. (2025), section 5, on a virtual rig.")
     console.print()
-    with second_process(campaign.name, draws) as analyst:
+    with analysis_processes(campaign.name, draws) as analyst:
 
         def take_recording(point_result: PointResult) -> None:
             if point_result.outcome is PointOutcome.RECORDED:
