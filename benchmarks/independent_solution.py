@@ -7,6 +7,8 @@ m/s), and takes seconds per second of motion.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from enum import IntEnum
 from itertools import pairwise
 
 import numpy as np
@@ -14,8 +16,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from vibench.cli.paper.textbook_methods import Law, Place, law_of, numbers_of, rates
-from vibench.sim import Harmonic, Specimen
+from vibench.cli.paper.textbook_methods import numbers_of, rates
+from vibench.sim import Harmonic, NoContact, Specimen, spring_of
 from vibench.sim.specimen.state import Floats
 
 Rates = Callable[[float, Floats], Floats]
@@ -23,24 +25,36 @@ Rates = Callable[[float, Floats], Floats]
 Y, Z, VY, VZ = 1, 2, 4, 5
 
 
-def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
+class Place(IntEnum):
+    """Position of m1 relative to the stops."""
+
+    ON_LOWER = -1
+    FLIGHT = 0
+    ON_UPPER = 1
+    ANYWHERE = 2
+    """The force is smooth in p."""
+
+
+def rates_at(place: Place, specimen: Specimen, drive: Harmonic) -> Rates:
     """Return the rates of the state while m1 stays at one place."""
-    return lambda time_s, state: rates(time_s, state, place, law, numbers)
+    shown = replace(specimen, contact=NoContact()) if place is Place.FLIGHT else specimen
+    spring, numbers = spring_of(shown), numbers_of(specimen, drive)
+    return lambda time_s, state: rates(time_s, state, spring, numbers)
 
 
-def place_of(state: Floats, law: Law) -> Place:
+def place_of(state: Floats, specimen: Specimen) -> Place:
     """Return whether m1 is in flight or at which stop."""
-    if law.terms:
+    if not spring_of(specimen).kinks:
         return Place.ANYWHERE
-    below, above = _depths(state, law)
+    below, above = _depths(state, specimen)
     if above > 0.0:
         return Place.ON_UPPER
     return Place.ON_LOWER if below > 0.0 else Place.FLIGHT
 
 
-def clearances_at(place: Place, state: Floats, law: Law) -> tuple[float, ...]:
+def clearances_at(place: Place, state: Floats, specimen: Specimen) -> tuple[float, ...]:
     """Return the distance to each possible end of a phase; positive during the phase."""
-    below, above = _depths(state, law)
+    below, above = _depths(state, specimen)
     match place:
         case Place.FLIGHT:
             return -below, -above
@@ -52,9 +66,10 @@ def clearances_at(place: Place, state: Floats, law: Law) -> tuple[float, ...]:
             return ()
 
 
-def _depths(state: Floats, law: Law) -> tuple[float, float]:
+def _depths(state: Floats, specimen: Specimen) -> tuple[float, float]:
+    lower, upper = specimen.gaps_m
     p = float(state[Y] - state[Z])
-    return -p - law.lower, p - law.upper
+    return -p - lower, p - upper
 
 
 TOLERANCE = 1e-13
@@ -96,12 +111,11 @@ def independent_state(
     tolerance
         Relative error of a step; compare two tolerances to estimate the error of the result.
     """
-    law, numbers = law_of(specimen), numbers_of(specimen, drive)
     time_s, state = 0.0, np.array(initial_state, dtype=np.float64)
-    place = place_of(state, law)
+    place = place_of(state, specimen)
     for _ in range(1 + round(MOST_PHASES_PER_S * duration_s)):
-        rates = rates_at(place, law, numbers)
-        time_s, state, end = _phase(rates, place, law, time_s, state, duration_s, tolerance)
+        rates = rates_at(place, specimen, drive)
+        time_s, state, end = _phase(rates, place, specimen, time_s, state, duration_s, tolerance)
         if end is None:
             return state
         place = Place.FLIGHT if place is not Place.FLIGHT else (Place.ON_LOWER, Place.ON_UPPER)[end]
@@ -110,7 +124,13 @@ def independent_state(
 
 
 def _phase(
-    rates: Rates, place: Place, law: Law, time_s: float, state: Floats, until_s: float, tolerance: float
+    rates: Rates,
+    place: Place,
+    specimen: Specimen,
+    time_s: float,
+    state: Floats,
+    until_s: float,
+    tolerance: float,
 ) -> tuple[float, Floats, int | None]:
     """Integrate until a phase ends; return time, state, and which end it is (None at the end of the run)."""
     solver = _solver(rates, time_s, state, until_s, tolerance)
@@ -120,7 +140,7 @@ def _phase(
         if failure is not None:
             msg = f"The independent solution gave up at {before_s} s: {failure}"
             raise ArithmeticError(msg)
-        found = _first_end(solver, before_s, before, lambda state: clearances_at(place, state, law))
+        found = _first_end(solver, before_s, before, lambda state: clearances_at(place, state, specimen))
         if found is not None:
             end_s, which = found
             return end_s, _state_at(rates, before_s, before, end_s, tolerance), which

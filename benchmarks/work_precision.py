@@ -22,14 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from accuracy_motions import MOTIONS, Regime, settled_state
-from independent_solution import (
-    Place,
-    independent_state,
-    law_of,
-    numbers_of,
-    rates_at,
-    state_error,
-)
+from independent_solution import Place, independent_state, rates_at, state_error
 from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
@@ -169,7 +162,7 @@ def run_vibench(motion, tolerance, start, span_s):
 
 def with_scipy(motion, method, tolerance, start, span_s):
     """Prepare a run of scipy's solve_ivp; return the job."""
-    rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
+    rates = rates_at(Place.ANYWHERE, motion.specimen, motion.drive)
     rates(0.0, start)
 
     def job():
@@ -220,16 +213,17 @@ def plain_function():
 
 def constants_of(motion):
     """Return masses, stiffnesses, dampings, A0, omega, gap, stiffness, exponent, n, force and p_ref."""
-    specimen, drive, law = motion.specimen, motion.drive, law_of(motion.specimen)
+    specimen, drive = motion.specimen, motion.drive
+    stiffness, exponent = 0.0, 1.0
     power, force, reference = 0.0, 0.0, 1.0
     if isinstance(specimen.contact, PowerLaw):
         ((power, force),) = specimen.contact.terms
         reference = specimen.contact.reference
+    else:
+        stiffness, exponent = specimen.contact.stops.term
     linear = [*specimen.masses, *specimen.stiffnesses, *specimen.dampings]
     driven = [drive.amplitude_m, 2.0 * math.pi * drive.frequency_hz]
-    return np.array(
-        [*linear, *driven, min(specimen.gaps_m), law.stiffness, law.exponent, power, force, reference]
-    )
+    return np.array([*linear, *driven, min(specimen.gaps_m), stiffness, exponent, power, force, reference])
 
 
 def with_numbalsoda(motion, method, tolerance, start, span_s):

@@ -10,13 +10,12 @@ MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import RK45
 
-from vibench.sim import Harmonic, NoContact, PowerLaw, RigidStops, Specimen
+from vibench.sim import Harmonic, RestoringForce, Specimen, spring_of
 
 from .responses import Reals
 
@@ -30,58 +29,14 @@ SLOWEST_PER_S = 1e-9
 """Smallest relative rate of change for the first step, needed for a state at rest [1/s]."""
 
 
-class Place(IntEnum):
-    """Position of m1 relative to the stops."""
-
-    ON_LOWER = -1
-    FLIGHT = 0
-    ON_UPPER = 1
-    ANYWHERE = 2
-    """The position is determined by p."""
-
-
-class Law(NamedTuple):
-    """Contact law: (k d^exponent + beside d) (1 + loss dd/dt) at a depth d, plus powers of p at every p."""
-
-    lower: float
-    upper: float
-    """Clearances; infinite where there is no stop."""
-    stiffness: float = 0.0
-    exponent: float = 1.0
-    loss: float = 0.0
-    reference: float = 1.0
-    terms: tuple[tuple[int, float], ...] = ()
-    """Exponent of each term, and its force at the reference [N]."""
-    beside: float = 0.0
-    """Stiffness of a linear spring parallel to the stop [N/m]."""
-
-
-def law_of(specimen: Specimen) -> Law:
-    """Return a specimen's contact law as numbers."""
-    lower, upper = specimen.gaps_m
-    match specimen.contact:
-        case NoContact():
-            return Law(np.inf, np.inf)
-        case PowerLaw(reference=reference, terms=terms):
-            return Law(np.inf, np.inf, reference=reference, terms=terms)
-        case RigidStops():
-            raise ValueError("Rigid stops have no finite contact force: give another law, such as hertz.")
-        case law:
-            return Law(lower, upper, *law.stops.term, law.stops.loss, beside=law.stops.spring_beside)
-
-
 def numbers_of(specimen: Specimen, drive: Harmonic) -> Reals:
     """Return masses, stiffnesses, dampings, and drive amplitude, angular frequency and phase, shape (12,)."""
     of_drive = (drive.amplitude_m, 2.0 * np.pi * drive.frequency_hz, drive.phase_rad)
     return np.array([*specimen.masses, *specimen.stiffnesses, *specimen.dampings, *of_drive])
 
 
-def _stop_force(depth: Reals, rate: Reals, law: Law) -> Reals:
-    return (law.stiffness * depth**law.exponent + law.beside * depth) * (1.0 + law.loss * rate)
-
-
-def rates(time_s: float | Reals, state: Reals, place: Place, law: Law, numbers: Reals) -> Reals:
-    """Return d/dt of x, y, z, vx, vy, vz; stops act only at depths above 0, and not at all in FLIGHT.
+def rates(time_s: float | Reals, state: Reals, spring: RestoringForce, numbers: Reals) -> Reals:
+    """Return d/dt of x, y, z, vx, vy, vz, with ``spring`` between m1 and m2.
 
     ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
     """
@@ -90,14 +45,9 @@ def rates(time_s: float | Reals, state: Reals, place: Place, law: Law, numbers: 
     angle = omega * time_s + phase
     base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
     p, rate = y - z, vy - vz
-    inner = k1 * p + c1 * rate
     # A trial step of an implicit method may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
-        if place is not Place.FLIGHT and law.stiffness > 0.0:
-            inner = inner + _stop_force(np.maximum(p - law.upper, 0.0), rate, law)
-            inner = inner - _stop_force(np.maximum(-p - law.lower, 0.0), -rate, law)
-        for power, force in law.terms:
-            inner = inner + force * (p / law.reference) ** power
+        inner = k1 * p + c1 * rate + spring.force(p, rate)
         outer = k2 * (z - x) + c2 * (vz - vx)
         ahead = (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0
         return np.array([vx, vy, vz, ahead, -inner / m1, (inner - outer) / m2])
@@ -199,7 +149,7 @@ def march(
 
     ``states`` has shape (6, 1 or 2, motions); the second entry is a neighbouring state of the first.
     """
-    tableau, law, scales = method.tableau, law_of(specimen), _scales(drives)
+    tableau, spring, scales = method.tableau, spring_of(specimen), _scales(drives)
     numbers = np.array([numbers_of(specimen, drive) for drive in drives]).reshape(-1, 12).T
     has_neighbour, count = states.shape[1] > 1, len(drives)
     floor = method.absolute / method.relative if method.relative < math.inf else 1.0
@@ -207,14 +157,14 @@ def march(
     rows = slopes.reshape(len(slopes), -1)
     time_s, read_s, growth, failures = np.zeros((4, count))
     since_s = np.full(count, until_s if settle_s > 0.0 else 0.0)
-    first = rates(time_s, states[:, 0], Place.ANYWHERE, law, numbers)
+    first = rates(time_s, states[:, 0], spring, numbers)
     fastest = np.maximum(_largest(first, states[:, 0], states[:, 0], floor), SLOWEST_PER_S)
     step_s = np.minimum(method.longest_s, 0.8 * method.relative**0.2 / fastest)
     while np.any(running := time_s < until_s):
         step_s = np.minimum(step_s, np.where(running, until_s - time_s, 0.0))
         for number, node in enumerate(tableau.nodes):
             at = states + step_s * (tableau.stages[number, :number] @ rows[:number]).reshape(states.shape)
-            slopes[number] = rates(time_s + node * step_s, at, Place.ANYWHERE, law, numbers)
+            slopes[number] = rates(time_s + node * step_s, at, spring, numbers)
         after = states + step_s * (tableau.result @ rows).reshape(states.shape)
         change = step_s * (tableau.error @ rows).reshape(states.shape)[:, 0]
         error = _largest(change, states[:, 0], after[:, 0], floor)

@@ -42,5 +42,5 @@ def test_an_initial_state_beyond_the_gap_is_in_contact():
 
 
 def test_rigid_stops_are_refused_by_the_independent_solution():
-    with pytest.raises(ValueError, match=r"Rigid stops .* give another law"):
+    with pytest.raises(ValueError, match="Rigid stops have no finite contact force"):
         independent_state(replace(gong2025(), contact=RigidStops(0.8)), STILL, 0.01, MOVING)
