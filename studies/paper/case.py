@@ -141,8 +141,11 @@ class Option:
     about: str
     example: str
     field: str
-    read: Callable[[str], Any]
-    label: Callable[[Any], str]
+    label: str
+    """Format of the name of a case in which this setting is changed."""
+    read: Callable[[str], Any] = float
+    scale: float | None = None
+    """Factor from the value to the number in the label; None for the value itself."""
 
 
 OPTIONS: Mapping[str, Option] = {
@@ -150,48 +153,38 @@ OPTIONS: Mapping[str, Option] = {
         "the damping ratio in c_i = 2 zeta m_i w_i, each mass on its own spring",
         "0.0165",
         "damping_ratio",
-        float,
-        lambda ratio: f"c_i = 2 · {ratio:g} · m_i ω_i",
+        "c_i = 2 · {:g} · m_i ω_i",
     ),
-    "gap": Option("clearance [m]", "45e-6", "gap_m", float, lambda gap_m: f"gap {1e6 * gap_m:g} µm"),
+    "gap": Option("clearance [m]", "45e-6", "gap_m", "gap {:g} µm", scale=1e6),
     "fit": Option(
         "indentation at which models are fitted [m]",
         "0.45e-6",
         "fit_m",
-        float,
-        lambda fit_m: f"models fitted at {1e6 * fit_m:g} µm",
+        "models fitted at {:g} µm",
+        scale=1e6,
     ),
-    "sum": Option(
-        "shares of 3+5+7", "3@0.05+5@0.15+7@0.8", "sum_model", "power:{}".format, "the sum as {}".format
-    ),
+    "sum": Option("shares of 3+5+7", "3@0.05+5@0.15+7@0.8", "sum_model", "the sum as {}", "power:{}".format),
     "compared": Option(
         "highest frequency at which models are compared [Hz]",
         "400",
         "similarity_highest_hz",
-        float,
-        "models compared up to {:g} Hz".format,
+        "models compared up to {:g} Hz",
     ),
     "log": Option(
         f"log10 of eq. 6 in {', '.join(LogarithmOf)}",
         "mm",
         "logarithm_of",
+        "log10 of the response [{}]",
         LogarithmOf,
-        "log10 of the response [{}]".format,
     ),
-    "exponents": Option(
-        " or ".join(ExponentsBy), "ode45", "exponents_by", ExponentsBy, "exponents by {}".format
-    ),
+    "exponents": Option(" or ".join(ExponentsBy), "ode45", "exponents_by", "exponents by {}", ExponentsBy),
     "sweep-amplitude": Option(
-        "base amplitude of the sweep [m]",
-        "5e-6",
-        "sweep_amplitude_m",
-        float,
-        lambda amplitude_m: f"sweep of {1e6 * amplitude_m:g} µm",
+        "base amplitude of the sweep [m]", "5e-6", "sweep_amplitude_m", "sweep of {:g} µm", scale=1e6
     ),
     "sweep-falls": Option(
-        "exponent k of A0 ~ f^-k in the sweep", "2", "sweep_falls", float, "sweep with A0 ~ f^-{:g}".format
+        "exponent k of A0 ~ f^-k in the sweep", "2", "sweep_falls", "sweep with A0 ~ f^-{:g}"
     ),
-    "sweep": Option(" or ".join(Direction), "down", "sweep_goes", Direction, "a {}ward sweep".format),
+    "sweep": Option(" or ".join(Direction), "down", "sweep_goes", "a {}ward sweep", Direction),
 }
 """Settings for `vibench reproduce --with`."""
 
@@ -199,7 +192,8 @@ OPTIONS: Mapping[str, Option] = {
 def change(name: str, value: Any) -> Alternative:
     """Return the alternative that changes a setting."""
     option = OPTIONS[name]
-    return Alternative(option.label(value), {option.field: value})
+    shown = value if option.scale is None else option.scale * value
+    return Alternative(option.label.format(shown), {option.field: value})
 
 
 def case_with(options: FigureOptions, given: Sequence[str]) -> Case:
