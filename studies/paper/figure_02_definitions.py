@@ -30,7 +30,6 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         draw_linear(curves, curve.frequency_hz, specimen)
         draw_responses(curves, curve)
         curves.axvline(_SHOWN_HZ, color="#9a9a9a", linestyle="--", linewidth=0.8)
-        curves.set_xlabel("drive frequency [Hz]")
         report.legend_above(figure, [curves])
     return report.DrawnFigure(
         name="figure_2",

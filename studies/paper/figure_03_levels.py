@@ -51,12 +51,9 @@ def four_levels(
             curve = responses(results, amplitude=amplitude_m)
             background(axes, curve, amplitude_m)
             draw_responses(axes, curve)
+            axes.label_outer()
             axes.set_title(f"Case {number}: A0 = {1e6 * amplitude_m:g} µm")
             columns = curve.columns("response_i", "response_ii", "collides")
             tables.append(report.table(f"{name}_{1e6 * amplitude_m:g}um", **columns))
-        for axes in panels[1]:
-            axes.set_xlabel("drive frequency [Hz]")
-        for axes in panels[:, 1]:
-            axes.set_ylabel("")
         report.legend_above(figure, list(panels.ravel()))
     return report.DrawnFigure(name, title, caption, figure, tuple(tables))

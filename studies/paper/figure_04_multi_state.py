@@ -37,6 +37,8 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
             options.gap_m / _AMPLITUDE_M, color=report.TERMINAL, linestyle=":", label="the gap over A0"
         )
         finish(relative, f, "p over A0")
+        for axes in (first, relative):
+            axes.set_xlabel("")
         exponent.plot(f, curve.exponent_per_s, color=report.SIMULATED, label="largest exponent")
         exponent.axhline(0.0, color="#9a9a9a", linewidth=0.8)
         report.frequency_axis(exponent, max(float(f[0]), 10.0), float(f[-1]))

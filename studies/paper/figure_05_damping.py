@@ -37,12 +37,9 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
         for row, curves in zip(panels, rows, strict=True):
             for axes, what in zip(row, _WHAT, strict=True):
                 _compare(axes, curves, what)
+                axes.label_outer()
         panels[0, 0].set_title("Response I")
         panels[0, 1].set_title("Response II")
-        for axes in panels[1]:
-            axes.set_xlabel("drive frequency [Hz]")
-        for axes in panels[:, 1]:
-            axes.set_ylabel("")
         for axes in panels[:, 0]:
             axes.legend(loc="center left")
     shares = [f"{np.mean(each.collides):.0%}" for each in (damped, undamped, higher)]

@@ -35,13 +35,10 @@ def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
                     values = getattr(responses(results, model=model, amplitude=amplitude_m), what)
                     axes.plot(found.frequency_hz, values, color=colour, linestyle=line, label=label)
                 finish(axes, found.frequency_hz, "x of m0 / A0")
+                axes.label_outer()
                 rate = f"{found.rate:.0%} ({found.low:.0%} to {found.high:.0%})"
                 axes.set_title(f"Case {number}, {1e6 * amplitude_m:g} µm, {heading}: R = {rate}")
                 columns[f"difference_{what}_{1e6 * amplitude_m:g}um"] = found.difference
-        for axes in panels[-1]:
-            axes.set_xlabel("drive frequency [Hz]")
-        for axes in panels[:, 1]:
-            axes.set_ylabel("")
         report.legend_above(figure, [panels[0, 0]])
     return report.DrawnFigure(
         name="figure_7",

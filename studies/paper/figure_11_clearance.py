@@ -33,7 +33,7 @@ def draw(options: FigureOptions, *results: StudyResults) -> report.DrawnFigure:
                 name = f"gap = A0 = {1e6 * gap_m:g} µm"
                 axes.plot(f, getattr(curve, what), linewidth=1.0, label=name)
             finish(axes, f, label)
-        panels[1].set_xlabel("drive frequency [Hz]")
+            axes.label_outer()
         report.legend_above(figure, [panels[0]])
     for gap_m, curve in curves.items():
         columns[f"response_i_{1e6 * gap_m:g}um"] = curve.response_i
