@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 import pytest
-from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType
+from nidaqmx.constants import READ_ALL_AVAILABLE
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqReadError
 
@@ -13,63 +13,55 @@ from vibench.virtual_rig.daqmx.rig import WallPace
 
 
 class HandClock:
-    """A clock that the test advances."""
+    """The clock of a rig, which the test advances."""
 
-    def __init__(self) -> None:
+    def __init__(self, connect):
         self.now_s = 100.0
+        self.pace = WallPace(clock=lambda: self.now_s)
+        self.daq = connect(self.pace)
 
-    def __call__(self) -> float:
-        return self.now_s
+    def advance(self, by_s, *, until=None):
+        """Advance, and wait until the server has acquired all samples, or until an acquisition is so."""
+        self.now_s += by_s
+        rig, wanted = self.daq.server._rig, round(1000 * self.pace.speed * (self.now_s - 100.0))
+        is_there = until or (lambda acquisition: acquisition.transferred >= wanted)
+        with rig.changed:
+            assert rig.changed.wait_for(lambda: is_there(rig._acquisitions[0]), 10.0)
 
 
 @pytest.fixture
-def clock():
-    return HandClock()
+def clock(connect):
+    return HandClock(connect)
 
 
-def continuous(daq, rate_hz=1000.0, samples=1000):
-    task = daq.inputs("Dev1/ai1")
-    task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=samples)
+@pytest.fixture
+def task(clock):
+    """A running task of 1000 samples per second."""
+    task = clock.daq.inputs("Dev1/ai1", 1000)
+    task.start()
     return task
 
 
-def wait_for(daq, samples, task):
-    """Wait until the server has produced this number of samples."""
-    rig = daq.server._rig
-    with rig.changed:
-        assert rig.changed.wait_for(lambda: rig._acquisitions[0].transferred >= samples, 10.0)
-
-
-def test_samples_become_available_only_after_their_time(connect, clock):
-    daq = connect(WallPace(clock=clock))
-    task = continuous(daq)
-    task.start()
+def test_samples_become_available_only_after_their_time(task, clock):
     assert task.in_stream.avail_samp_per_chan == 0
     with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError):
         task.read(1, timeout=0.0)
-    clock.now_s += 0.25
-    wait_for(daq, 250, task)
+    clock.advance(0.25)
     assert task.in_stream.avail_samp_per_chan == 250
 
 
-def test_a_timeout_returns_the_samples_so_far(connect, clock):
-    daq = connect(WallPace(clock=clock))
-    task = continuous(daq)
-    task.start()
-    clock.now_s += 0.1
-    wait_for(daq, 100, task)
+def test_a_timeout_returns_the_samples_so_far(task, clock):
+    clock.advance(0.1)
     with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(150, timeout=0.02)
     assert caught.value.samps_per_chan_read == 100
     assert task.in_stream.avail_samp_per_chan == 0
 
 
-def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(connect, clock):
-    daq = connect(WallPace(clock=clock))
-    task = daq.inputs("Dev1/ai1:2", 1000)
+def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(clock):
+    task = clock.daq.inputs("Dev1/ai1:2", 1000)
     task.start()
-    clock.now_s += 0.05
-    wait_for(daq, 50, task)
+    clock.advance(0.05)
     block = np.full((2, 80), np.nan)
     with pytest.raises(DaqReadError):
         task._interpreter.read_analog_f64(task._handle, 80, 0.01, 0, block)
@@ -78,27 +70,17 @@ def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(connect, 
     np.testing.assert_allclose(block[1, :50], 0.5 + 3 * np.sin(2 * np.pi * 120 * time_s), atol=1e-9)
 
 
-def test_a_reader_that_is_too_late_gets_a_lost_samples_error(connect, clock):
-    daq = connect(WallPace(clock=clock))
-    task = continuous(daq)
-    task.start()
-    clock.now_s += 0.5
-    wait_for(daq, 500, task)
+def test_a_reader_that_is_too_late_gets_a_lost_samples_error(task, clock):
+    clock.advance(0.5)
     assert len(task.read(READ_ALL_AVAILABLE)) == 500
-    clock.now_s += 10.5  # the buffer holds ten seconds
-    rig = daq.server._rig
-    with rig.changed:
-        assert rig.changed.wait_for(lambda: rig._acquisitions[0].failure is not None, 10.0)
+    clock.advance(10.5, until=lambda acquisition: acquisition.failure is not None)  # the buffer holds 10 s
     with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, kind=DaqReadError):
         task.read(10)
     with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
         task.is_task_done()
 
 
-def test_a_reader_waits_for_samples_in_real_time(connect, clock):
-    daq = connect(WallPace(clock=clock))
-    task = continuous(daq)
-    task.start()
+def test_a_reader_waits_for_samples_in_real_time(task, clock):
     brought = []
     reader = threading.Thread(target=lambda: brought.append(task.read(100, timeout=20.0)))
     reader.start()
@@ -107,20 +89,17 @@ def test_a_reader_waits_for_samples_in_real_time(connect, clock):
     assert len(brought[0]) == 100
 
 
-def test_a_reader_that_waits_gets_an_error_when_its_task_is_stopped(connect, clock, monkeypatch):
-    pace, asked, ended = WallPace(clock=clock), threading.Event(), []
-    daq = connect(pace)
-    task = continuous(daq)
-    task.start()
+def test_a_reader_that_waits_gets_an_error_when_its_task_is_stopped(task, clock, monkeypatch):
+    asked, ended = threading.Event(), []
 
     def read():
         with daq_error(DAQmxErrors.RUNTIME_ABORTED_ROUTING):
             task.read(100, timeout=20.0)
         ended.append(True)
 
-    reader, ask = threading.Thread(target=read), pace.ask
+    reader, ask = threading.Thread(target=read), clock.pace.ask
     # The reader holds the rig's lock from here until it waits, so that the stop comes during the wait.
-    monkeypatch.setattr(pace, "ask", lambda *given: (asked.set(), ask(*given))[1])
+    monkeypatch.setattr(clock.pace, "ask", lambda *given: (asked.set(), ask(*given))[1])
     reader.start()
     assert asked.wait(20.0)
     task.stop()
@@ -128,18 +107,15 @@ def test_a_reader_that_waits_gets_an_error_when_its_task_is_stopped(connect, clo
     assert ended == [True]
 
 
-def test_the_speed_setting_makes_simulated_time_pass_faster(connect, clock):
-    daq = connect(WallPace(speed=20.0, clock=clock))
-    task = continuous(daq, samples=10000)
-    task.start()
-    clock.now_s += 0.1
-    wait_for(daq, 2000, task)
+def test_the_speed_setting_makes_simulated_time_pass_faster(task, clock):
+    clock.pace.speed = 20.0
+    clock.advance(0.1)
     assert task.in_stream.avail_samp_per_chan == 2000
 
 
 def test_real_time_samples_have_no_gap(connect):
     daq = connect(WallPace(speed=2.0))
-    task = continuous(daq, rate_hz=51200.0)
+    task = daq.inputs("Dev1/ai1", 51200.0)
     read = np.concatenate([task.read(5120, timeout=10.0) for _ in range(10)])
     first_s = np.asarray(daq.world.conversions[0].start_s)
     time_s = first_s + np.arange(read.size) / 51200

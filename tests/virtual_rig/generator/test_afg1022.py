@@ -15,8 +15,12 @@ PLAIN = Quirks(
 )
 
 
-def generator(quirks=PLAIN):
-    return AFG1022(lambda: 0.0, quirks=quirks)
+def generator(*messages, **quirks):
+    """Return a generator after these messages, with no quirks except the given ones."""
+    device = AFG1022(lambda: 0.0, quirks=replace(PLAIN, **quirks))
+    for message in messages:
+        device.execute(message)
+    return device
 
 
 def ask(device, message):
@@ -124,8 +128,7 @@ def test_a_refused_command_queues_its_error_number_and_changes_nothing(command, 
 
 
 def test_the_peak_limit_is_10_v_into_an_open_circuit_and_5_v_into_50_ohm():
-    device = generator()
-    device.execute(b"VOLT 8;VOLT:OFFS 1")
+    device = generator(b"VOLT 8;VOLT:OFFS 1")
     assert errors(device) == []
     device.execute(b":VOLT:OFFS 1.001")
     assert errors(device) == [-221]
@@ -136,30 +139,26 @@ def test_the_peak_limit_is_10_v_into_an_open_circuit_and_5_v_into_50_ohm():
 
 
 def test_declaring_another_load_changes_the_displayed_voltage_and_not_the_output():
-    device = generator()
-    device.execute(b"VOLT 2;:OUTP:IMP INF")
+    device = generator(b"VOLT 2;:OUTP:IMP INF")
     assert ask(device, "VOLT?") == "4.0E+00"
     device.execute(b"OUTP:IMP 150")
     assert float(ask(device, "VOLT?")) == pytest.approx(3.0)
 
 
 def test_phase_is_given_in_radians_and_kept_in_whole_degrees():
-    device = generator()
-    device.execute(b"PHAS:ADJ 31.9DEG")
+    device = generator(b"PHAS:ADJ 31.9DEG")
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
     device.execute(f"PHAS:ADJ {math.radians(31):.12g}".encode())
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
 
 
 def test_a_shape_with_a_lower_frequency_limit_reduces_the_frequency():
-    device = generator()
-    device.execute(b"FREQ 20MHz;:FUNC SQU")
+    device = generator(b"FREQ 20MHz;:FUNC SQU")
     assert ask(device, "FREQ?") == "1.25E+07"
 
 
 def test_channels_with_locked_frequency_share_one_frequency():
-    device = generator()
-    device.execute(b"SOUR1:FREQ 100;:SOUR1:FREQ:CONC ON")
+    device = generator(b"SOUR1:FREQ 100;:SOUR1:FREQ:CONC ON")
     assert ask(device, "SOUR2:FREQ?") == "1.0E+02"
     device.execute(b"SOUR2:FREQ 333")
     assert ask(device, "SOUR1:FREQ?") == "3.33E+02"
@@ -170,9 +169,7 @@ def test_several_queries_in_one_message_answer_in_one_line():
 
 
 def test_reset_selects_a_sine_of_1_mhz_and_1_v_with_the_output_off():
-    device = generator()
-    device.execute(b"OUTP ON;:FUNC RAMP;:FREQ 5;:VOLT 3;:VOLT:OFFS 1;:OUTP2 ON")
-    device.execute(b"*RST")
+    device = generator(b"OUTP ON;:FUNC RAMP;:FREQ 5;:VOLT 3;:VOLT:OFFS 1;:OUTP2 ON", b"*RST")
     assert ask(device, "OUTP?;:OUTP2?;:FUNC?;:FREQ?;:VOLT?;:VOLT:OFFS?") == "0;0;SIN;1.0E+06;1.0E+00;0.0E+00"
 
 
@@ -186,32 +183,28 @@ def test_the_event_register_distinguishes_kinds_of_error_and_clears_when_read():
 
 
 def test_the_error_queue_overflows_at_its_end_and_clears_with_cls():
-    device = generator()
-    for _ in range(30):
-        device.execute(b"NONSENSE")
-    found = errors(device)
-    assert found == [-113] * 19 + [-350]
+    device = generator(*[b"NONSENSE"] * 30)
+    assert errors(device) == [-113] * 19 + [-350]
     device.execute(b"NONSENSE;*CLS")
     assert errors(device) == []
 
 
 class TestQuirks:
     def test_the_identity_is_empty_at_the_first_query_after_a_clear_and_correct_at_the_second(self):
-        device = generator(replace(PLAIN, first_identity_after_clear_is_empty=True))
+        device = generator(first_identity_after_clear_is_empty=True)
         identity = ask(device, "*IDN?")
         assert identity.split(",")[:3] == ["TEKTRONIX", "AFG1022", "C010101"]
         device.execute(b"*CLS")
         assert [ask(device, "*IDN?"), ask(device, "*IDN?")] == ["", identity]
 
     def test_high_impedance_is_answered_with_an_ohm_sign_in_gbk(self):
-        device = generator(replace(PLAIN, high_impedance_has_ohm_sign=True))
-        device.execute(b"OUTP:IMP INF")
+        device = generator(b"OUTP:IMP INF", high_impedance_has_ohm_sign=True)
         reply = device.execute(b"OUTP:IMP?").data
         assert reply == b"9.9E+37\xa6\xb8\n"
         assert reply.decode("gbk").strip() == "9.9E+37Ω"
 
     def test_an_unknown_query_answers_an_empty_line_and_queues_minus_102(self):
-        device = generator(replace(PLAIN, unknown_is_syntax_error=True))
+        device = generator(unknown_is_syntax_error=True)
         assert device.execute(b"VOLT:LIM?").data == b"\n"
         assert errors(device) == [-102]
 
@@ -221,14 +214,12 @@ class TestQuirks:
         assert errors(device) == [-113]
 
     def test_a_value_out_of_range_is_silently_replaced_by_the_default(self):
-        device = generator(replace(PLAIN, out_of_range_becomes_default=True))
-        device.execute(b"VOLT 0.2;VOLT 11;:FREQ 30MHz")
+        device = generator(b"VOLT 0.2;VOLT 11;:FREQ 30MHz", out_of_range_becomes_default=True)
         assert ask(device, "VOLT?;:FREQ?") == "1.0E+00;1.0E+06"
         assert errors(device) == []
 
     def test_with_the_panel_quirk_the_load_can_be_set_only_at_the_panel(self):
-        device = generator(replace(PLAIN, panel_load_ohm=50.0))
-        device.execute(b"OUTP:IMP INF")
+        device = generator(b"OUTP:IMP INF", panel_load_ohm=50.0)
         assert errors(device) == [-113]
         device.execute(b"OUTP ON")
         assert ask(device, "OUTP?") == "1"
@@ -245,8 +236,7 @@ def test_a_corrupted_reply_is_followed_by_a_correct_reply():
 
 
 def test_setting_the_duty_cycle_succeeds_but_queues_error_minus_102():
-    device = generator()
-    device.execute(b"PULS:DCYC 20")
+    device = generator(b"PULS:DCYC 20")
     assert ask(device, "PULS:DCYC?") == "2.0E+01"
     assert errors(device) == [-102]
 

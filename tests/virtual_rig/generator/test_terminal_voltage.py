@@ -24,10 +24,11 @@ OPEN = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0.0)
 class Rig:
     """A generator whose clock is the time rendered so far, as in the virtual rig."""
 
-    def __init__(self, terminal=OPEN):
+    def __init__(self, message="", terminal=OPEN):
         self.time_s = 0.0
         self.generator = AFG1022(lambda: self.time_s, terminal=terminal)
         self.send("OUTP1:IMP INF")
+        self.send(message)
 
     def send(self, message):
         self.generator.execute(message.encode())
@@ -50,15 +51,13 @@ def sine_means(amplitude_v, frequency_hz, start_s, count, interval_s=INTERVAL_S,
 
 
 def test_a_rendered_sine_has_the_set_amplitude_and_phase():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 0.5;:PHAS 30DEG;:PHAS:INIT;:OUTP ON")
+    rig = Rig("FREQ 100;:VOLT 3;:VOLT:OFFS 0.5;:PHAS 30DEG;:PHAS:INIT;:OUTP ON")
     expected = 0.5 + sine_means(1.5, 100.0, 0.0, 2000, phase=math.radians(30))
     assert rig.render(2000) == pytest.approx(expected, abs=1e-11)
 
 
 def test_an_output_that_is_off_is_exactly_silent_for_any_setting():
-    rig = Rig(Terminal(noise_v_per_rt_hz=1e-3))
-    rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 2")
+    rig = Rig("FREQ 100;:VOLT 3;:VOLT:OFFS 2", Terminal(noise_v_per_rt_hz=1e-3))
     assert not rig.render(1000).any()
     rig.send("OUTP ON")
     assert rig.render(1000).any()
@@ -73,14 +72,13 @@ def test_an_output_that_is_off_is_exactly_silent_for_any_setting():
 def test_the_terminal_voltage_doubles_if_50_ohm_are_declared_without_a_50_ohm_load(
     declared, load_ohm, factor
 ):
-    rig = Rig(Terminal(load_ohm=load_ohm, noise_v_per_rt_hz=0.0))
-    rig.send(f"OUTP:IMP {declared};:FREQ 100;:VOLT 1;:OUTP ON")
+    terminal = Terminal(load_ohm=load_ohm, noise_v_per_rt_hz=0.0)
+    rig = Rig(f"OUTP:IMP {declared};:FREQ 100;:VOLT 1;:OUTP ON", terminal)
     assert rig.render(512).max() == pytest.approx(0.5 * factor, rel=1e-4)
 
 
 def test_the_phase_does_not_jump_when_the_frequency_changes():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    rig = Rig("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON")
     first = rig.render(777)
     rig.send("FREQ 133.7")
     second = rig.render(777)
@@ -90,10 +88,16 @@ def test_the_phase_does_not_jump_when_the_frequency_changes():
     assert second == pytest.approx(sine_means(1.0, 133.7, change_s, 777, phase=phase), abs=1e-10)
 
 
-def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
+def flat_rig():
+    """Return a rig that plays 1 V."""
     rig = Rig()
     rig.upload([0, 0])
     rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")
+    return rig
+
+
+def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
+    rig = flat_rig()
     rig.time_s = 2.25 * INTERVAL_S
     rig.send("VOLT:OFFS 3.001")
     rig.time_s = 0.0
@@ -101,9 +105,7 @@ def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
 
 
 def test_samples_already_rendered_do_not_change():
-    rig = Rig()
-    rig.upload([0, 0])
-    rig.send("FUNC EMEM;:VOLT 0.002;:VOLT:OFFS 1.001;:OUTP ON")
+    rig = flat_rig()
     rig.render(4)
     rig.time_s = INTERVAL_S  # the clock lags behind the rendered samples
     rig.send("VOLT:OFFS 3.001")
@@ -131,7 +133,7 @@ MODES = {
 @pytest.mark.parametrize("mode", MODES.values(), ids=MODES)
 def test_rendered_samples_do_not_depend_on_the_block_size(mode):
     def render_in(sizes):
-        rig = Rig(Terminal(seed=3, clock_error_ppm=20))
+        rig = Rig(terminal=Terminal(seed=3, clock_error_ppm=20))
         rig.upload(np.random.default_rng(3).integers(0, 16384, 500))
         rig.send(mode)
         rig.send("OUTP ON")
@@ -144,31 +146,28 @@ def test_rendered_samples_do_not_depend_on_the_block_size(mode):
 
 @given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))
 def test_the_rms_of_the_terminal_noise_is_that_of_its_density_up_to_nyquist(seed, density):
-    rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed))
-    rig.send("FUNC DC;:OUTP ON")
-    noise = rig.render(20_000)
+    terminal = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed)
+    noise = Rig("FUNC DC;:OUTP ON", terminal).render(20_000)
     expected = density * math.sqrt(1 / (2 * INTERVAL_S))
     # The rms of 20,000 normal samples has a standard deviation of 0.5 %; 3 % is six times that.
     assert noise.std() == pytest.approx(expected, rel=0.03)
 
 
 def test_a_fast_generator_clock_raises_every_frequency():
-    rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0))
-    rig.send("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    terminal = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0)
+    rig = Rig("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON", terminal)
     assert rig.render(5000) == pytest.approx(sine_means(1.0, 1000.1, 0.0, 5000), abs=1e-9)
 
 
 def test_the_phase_has_not_drifted_after_ten_hours():
-    rig = Rig()
-    rig.send("FREQ 333.333333;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    rig = Rig("FREQ 333.333333;:VOLT 2;:PHAS:INIT;:OUTP ON")
     rig.time_s = 36_000.0
     expected = sine_means(1.0, 333.333333, 0.0, 500, phase=2 * np.pi * ((333.333333 * 36_000) % 1.0))
     assert rig.render(500) == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_burst_plays_its_cycles_once_per_trigger_and_then_stays_silent():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 2;:BURS:NCYC 3;:BURS ON;:OUTP ON")
+    rig = Rig("FREQ 100;:VOLT 2;:BURS:NCYC 3;:BURS ON;:OUTP ON")
     assert not rig.render(1000).any()
     start_s = rig.time_s
     rig.send("*TRG")
@@ -182,21 +181,18 @@ def test_a_burst_plays_its_cycles_once_per_trigger_and_then_stays_silent():
 
 
 def test_a_gated_burst_without_a_gate_signal_stays_silent():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 2;:BURS:MODE GAT;:BURS ON;:OUTP ON;*TRG")
+    rig = Rig("FREQ 100;:VOLT 2;:BURS:MODE GAT;:BURS ON;:OUTP ON;*TRG")
     assert rig.render(2000) == pytest.approx(np.zeros(2000), abs=1e-12)
 
 
 def test_selecting_noise_is_accepted_but_the_previous_shape_keeps_playing():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON;:FUNC PRN")
+    rig = Rig("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON;:FUNC PRN")
     assert rig.generator.execute(b"FUNC?").data == b"PRN\n"
     assert rig.render(1000) == pytest.approx(sine_means(1.0, 100.0, 0.0, 1000), abs=1e-10)
 
 
 def test_the_built_in_dc_shape_ignores_the_offset_but_a_flat_waveform_does_not():
-    rig = Rig()
-    rig.send("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
+    rig = Rig("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
     assert not rig.render(5).any()
     rig.upload([8191, 8191])
     rig.send("FUNC EMEM;:VOLT 0.002")
@@ -204,8 +200,7 @@ def test_the_built_in_dc_shape_ignores_the_offset_but_a_flat_waveform_does_not()
 
 
 def test_a_welded_relay_keeps_the_output_playing_although_it_reports_off():
-    rig = Rig()
-    rig.send("FREQ 100;:VOLT 2;:OUTP ON")
+    rig = Rig("FREQ 100;:VOLT 2;:OUTP ON")
     rig.generator.stick_output_relay(is_stuck=True)
     rig.send("OUTP OFF")
     assert rig.generator.execute(b"OUTP?").data == b"0\n"

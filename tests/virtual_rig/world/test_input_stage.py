@@ -24,28 +24,19 @@ STEP_S = USUAL_GRID.step_s
 SINE = 0.5 * np.sin(2 * np.pi * 400 * STEP_S * np.arange(20_480))
 
 
-def test_an_iepe_sensor_without_excitation_gives_no_signal():
-    volts, clips = stage(SENSOR).pass_on(signals(SINE))
-    assert np.all(volts == 0)
-    assert not clips
-
-
-def test_an_excited_iepe_sensor_on_ac_coupling_shows_its_signal_without_its_bias():
-    volts, clips = stage(SENSOR, Coupling.AC, 0.002).pass_on(signals(SINE))
-    assert volts == pytest.approx(SINE, abs=0.01)
-    assert not clips
-
-
-def test_the_bias_of_an_excited_iepe_sensor_overloads_a_five_volt_input_on_dc_coupling():
-    volts, clips = stage(SENSOR, Coupling.DC, 0.002).pass_on(signals(SINE))
-    assert np.all(volts == 5.0 * OVER_RANGE)
-    assert clips
-
-
-def test_a_12_v_input_shows_sensor_bias_and_signal():
-    volts, clips = stage(SENSOR, Coupling.DC, 0.002, range_v=12.0).pass_on(signals(SINE))
-    assert volts == pytest.approx(IEPE_BIAS_V + SINE)
-    assert not clips
+@pytest.mark.parametrize(
+    ("configured", "expected", "overloads"),
+    [
+        pytest.param((), 0.0, False, id="no signal without excitation"),
+        pytest.param((Coupling.AC, 0.002), SINE, False, id="AC: the signal without the bias"),
+        pytest.param((Coupling.DC, 0.002), 5.0 * OVER_RANGE, True, id="DC: the bias overloads 5 V"),
+        pytest.param((Coupling.DC, 0.002, 12.0), IEPE_BIAS_V + SINE, False, id="12 V: bias and signal"),
+    ],
+)
+def test_an_iepe_sensor_shows_signal_and_bias_only_with_excitation(configured, expected, overloads):
+    volts, clips = stage(SENSOR, *configured).pass_on(signals(SINE))
+    assert np.max(np.abs(volts - expected)) < (0.01 if Coupling.AC in configured else 1e-9)
+    assert clips is overloads
 
 
 def test_an_open_input_reads_zero_unless_excitation_is_on():
