@@ -153,42 +153,9 @@ def header(measurement, samples, delay_s, started_utc, response=VELOCITY):
     )
 
 
-def write_recording(
-    folder: Path,
-    excitation,
-    motion,
-    velocity,
-    parts,
-    *,
-    name="run",
-    state=RecordingState.COMPLETE,
-    reason="the plan was carried out",
-    hole=None,
-    samples=None,
-    delay_s=0.0,
-    started_utc=PROVENANCE.started_utc,
-    overloads=(),
-    response=VELOCITY,
-):
-    """Write a recording; ``hole`` is a range of lost samples, ``samples`` shortens the record.
-
-    ``velocity`` holds the samples of the channel ``response``.
-    """
-    writer = start_recording(
-        folder,
-        excitation,
-        motion,
-        velocity,
-        parts,
-        name=name,
-        hole=hole,
-        samples=samples,
-        delay_s=delay_s,
-        started_utc=started_utc,
-        overloads=overloads,
-        response=response,
-    )
-    return writer.finish(state, reason)
+def write_recording(*recorded, state=RecordingState.COMPLETE, reason="the plan was carried out", **how):
+    """Write a recording of the arguments of `start_recording`."""
+    return start_recording(*recorded, **how).finish(state, reason)
 
 
 def start_recording(
@@ -206,7 +173,11 @@ def start_recording(
     overloads=(),
     response=VELOCITY,
 ):
-    """Begin a recording and append its samples; return the writer, not yet finished."""
+    """Begin a recording and append its samples; return the writer, not yet finished.
+
+    ``velocity`` holds the samples of the channel ``response``; ``hole`` is a range of lost samples, and
+    ``samples`` shortens the record.
+    """
     planned = velocity.size
     kept = planned if samples is None else samples
     measurement = Measurement(name=name, excitation=excitation)

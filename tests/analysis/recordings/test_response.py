@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.analysis.conftest import A0_STRONG, DWELL_PART, NOISE, dwell_plan, synthetic
+from tests.analysis.conftest import A0_STRONG, A0_WEAK, DWELL_PART, NOISE, dwell_plan, synthetic
 from vibench.acquisition import Overload, open_recording
 from vibench.acquisition.plan import WhiteNoise
 from vibench.analysis import Simulation, analyse_files
@@ -22,19 +22,30 @@ ACCELERATION = ("m0_acceleration", "acceleration", "m s-2", 100.0)
 DISPLACEMENT = ("m0_displacement", "displacement", "m", 1e-4)
 
 
-def accelerations(velocity):
+def derivative(velocity, order=1):
     """Differentiate by FFT; the velocity is mirrored to avoid a jump at its ends."""
     whole = np.concatenate((velocity, velocity[::-1]))
     lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
-    return np.fft.irfft(lines * np.fft.rfft(whole), whole.size)[: velocity.size]
+    lines[0] = 0.0 if order > 0 else np.inf
+    return np.fft.irfft(lines**order * np.fft.rfft(whole), whole.size)[: velocity.size]
 
 
-def displacements(velocity):
-    """Integrate by FFT without the mean velocity."""
-    whole = np.concatenate((velocity, velocity[::-1]))
-    lines = 2j * np.pi * np.fft.rfftfreq(whole.size, 1 / RATE)
-    lines[0] = np.inf
-    return np.fft.irfft(np.fft.rfft(whole) / lines, whole.size)[: velocity.size]
+def sensor_values(velocity, response):
+    """Return the samples of a sensor on m0; a displacement has no mean."""
+    return derivative(velocity, 1 if response is ACCELERATION else -1)
+
+
+@pytest.fixture
+def sensor_file(dwell_motions, tmp_path):
+    """Return a function that writes a dwell recorded by another sensor on m0."""
+
+    def write(level, response=ACCELERATION, parts=(DWELL_PART,), **how):
+        motion, velocity, _ = dwell_motions[level]
+        plan = dwell_plan({"weak": A0_WEAK, "strong": A0_STRONG}[level])
+        values = sensor_values(velocity, response)
+        return synthetic.write_recording(tmp_path, plan, motion, values, parts, response=response, **how)
+
+    return write
 
 
 def analysis_of(path):
@@ -52,22 +63,15 @@ def test_integral_and_derivative_kernels_are_exact_from_5_hz_to_0_4_of_rate(kern
     assert np.abs(gain / ideal - 1).max() < 3e-5
 
 
-SENSORS = pytest.mark.parametrize(
-    ("response", "made"), [(ACCELERATION, accelerations), (DISPLACEMENT, displacements)]
-)
+SENSORS = pytest.mark.parametrize("response", [ACCELERATION, DISPLACEMENT])
 
 
 @pytest.mark.thorough
 @SENSORS
 @pytest.mark.parametrize("level", ["weak", "strong"])
-def test_dwell_responses_are_equal_for_any_sensor(dwell_file, dwell_motions, tmp_path, level, response, made):
-    motion, velocity, _ = dwell_motions[level]
-    plan = dwell_plan({"weak": 0.5e-6, "strong": A0_STRONG}[level])
-    path = synthetic.write_recording(
-        tmp_path, plan, motion, made(velocity), [DWELL_PART], delay_s=1 / RATE, response=response
-    )
+def test_dwell_responses_are_equal_for_any_sensor(dwell_file, sensor_file, level, response):
     expected = analysis_of(dwell_file(level))
-    found = analysis_of(path)
+    found = analysis_of(sensor_file(level, response, delay_s=1 / RATE))
     assert found.response.response_i == pytest.approx(expected.response.response_i, rel=1e-4)
     assert found.response.response_ii == pytest.approx(expected.response.response_ii, rel=1e-4)
     assert found.motion.verdict.kind is expected.motion.verdict.kind
@@ -75,10 +79,11 @@ def test_dwell_responses_are_equal_for_any_sensor(dwell_file, dwell_motions, tmp
 
 @pytest.mark.thorough
 @SENSORS
-def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp_path, response, made):
+def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp_path, response):
     base, velocity, parts = noise_motion
     plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
-    path = synthetic.write_recording(tmp_path, plan, base, made(velocity), parts, response=response)
+    values = sensor_values(velocity, response)
+    path = synthetic.write_recording(tmp_path, plan, base, values, parts, response=response)
     expected, found = (analysis_of(each).response for each in (noise_file(), path))
     np.testing.assert_allclose(
         found.frequency_response.value, expected.frequency_response.value, rtol=1e-3, atol=1e-3
@@ -88,12 +93,9 @@ def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp
 
 
 @SENSORS
-def test_converted_samples_do_not_depend_on_where_reading_starts(dwell_motions, tmp_path, response, made):
-    motion, velocity, _ = dwell_motions["strong"]
-    path = synthetic.write_recording(
-        tmp_path, dwell_plan(A0_STRONG), motion, made(velocity), [DWELL_PART], response=response
-    )
-    with open_recording(path) as recording:
+def test_converted_samples_do_not_depend_on_where_reading_starts(dwell_motions, sensor_file, response):
+    _, velocity, _ = dwell_motions["strong"]
+    with open_recording(sensor_file("strong", response)) as recording:
         whole = ResponseChannel(recording).read(0, recording.samples)
         part = ResponseChannel(recording).read(10_001, 23_456)
     np.testing.assert_array_equal(part, whole[10_001:23_456])
@@ -101,61 +103,29 @@ def test_converted_samples_do_not_depend_on_where_reading_starts(dwell_motions, 
     assert np.abs(whole - velocity)[round(RATE) : -64].max() < 2e-3 * np.abs(velocity).max()
 
 
-def test_a_clipped_acceleration_marks_all_affected_samples(dwell_motions, tmp_path):
-    motion, velocity, _ = dwell_motions["strong"]
-    path = synthetic.write_recording(
-        tmp_path,
-        dwell_plan(A0_STRONG),
-        motion,
-        accelerations(velocity),
-        [DWELL_PART],
-        response=ACCELERATION,
-        overloads=(Overload("m0_acceleration", 16_000, 16_002),),
-    )
+def test_a_clipped_acceleration_marks_all_affected_samples(sensor_file):
+    path = sensor_file("strong", overloads=(Overload("m0_acceleration", 16_000, 16_002),))
     with open_recording(path) as recording:
         marks = RecordedChannels(recording).overload_flags(0, recording.samples)
     assert np.flatnonzero(marks)[[0, -1]].tolist() == [16_000 - RATE, 16_002 + RATE]
 
 
-def test_an_acceleration_record_of_0_5_s_is_refused(dwell_motions, tmp_path):
-    motion, velocity, _ = dwell_motions["weak"]
-    path = synthetic.write_recording(
-        tmp_path,
-        dwell_plan(0.5e-6),
-        motion,
-        accelerations(velocity),
-        [],
-        response=ACCELERATION,
-        samples=round(RATE / 2),
-    )
+def test_an_acceleration_record_of_0_5_s_is_refused(sensor_file):
     with (
-        open_recording(path) as recording,
+        open_recording(sensor_file("weak", parts=(), samples=round(RATE / 2))) as recording,
         pytest.raises(UnusableData, match=r"0\.5 s of m0_acceleration are too short .* record more than 1 s"),
     ):
         ResponseChannel(recording)
 
 
-def test_samples_near_a_gap_are_excluded(dwell_motions, tmp_path):
-    motion, velocity, _ = dwell_motions["weak"]
-    path = synthetic.write_recording(
-        tmp_path,
-        dwell_plan(0.5e-6),
-        motion,
-        accelerations(velocity),
-        [DWELL_PART],
-        response=ACCELERATION,
-        hole=(16_000, 16_010),
-    )
-    with open_recording(path) as recording:
+def test_samples_near_a_gap_are_excluded(sensor_file):
+    with open_recording(sensor_file("weak", hole=(16_000, 16_010))) as recording:
         lost = np.isnan(ResponseChannel(recording).read(0, recording.samples))
     assert np.flatnonzero(lost)[[0, -1]].tolist() == [16_000 - RATE, 16_009 + RATE]
 
 
-def test_the_level_of_a_channel_is_computed_only_from_samples_that_were_not_lost(dwell_motions, tmp_path):
-    motion, velocity, _ = dwell_motions["weak"]
-    hole = (16_000, 32_000)
-    path = synthetic.write_recording(tmp_path, dwell_plan(0.5e-6), motion, velocity, [DWELL_PART], hole=hole)
-    with open_recording(path) as recording:
+def test_the_level_of_a_channel_is_computed_only_from_samples_that_were_not_lost(dwell_file):
+    with open_recording(dwell_file("weak", hole=(16_000, 32_000))) as recording:
         levels = channel_levels(recording)
         rows = [recording.read(each.header.role) for each in levels]
     assert [each.rms for each in levels] == pytest.approx([np.sqrt(np.nanmean(row**2)) for row in rows])

@@ -80,27 +80,32 @@ def test_continuous_collisions_give_a_region_over_the_whole_sweep():
     assert region.reaches_stop
 
 
-def test_ten_times_the_noise_does_not_move_the_collision_edges():
-    def spoil(velocity, rng):
-        return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
-
-    result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
-    assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
-    assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
+def ten_times_the_noise(velocity, rng):
+    return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
 
 
-def test_laser_drop_outs_do_not_change_the_region():
-    def spoil(velocity, rng):
-        spoilt = velocity.copy()
-        for place in rng.integers(0, velocity.size - 20, 12):
-            spoilt[place : place + 20] = 0.2
-        return spoilt
+def laser_drop_outs(velocity, rng):
+    spoilt = velocity.copy()
+    for place in rng.integers(0, velocity.size - 20, 12):
+        spoilt[place : place + 20] = 0.2
+    return spoilt
 
+
+@pytest.mark.parametrize("spoil", [ten_times_the_noise, laser_drop_outs])
+def test_noise_and_laser_drop_outs_do_not_move_the_collision_edges(spoil):
     result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
     assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
     quiet, _ = find_collisions(2e-7, 225.0, 385.0, spoil)
     assert quiet.regions == ()
+
+
+def fast_sweep_on_the_rig(folder, plan):
+    """Return the analysis of a sweep on the virtual rig."""
+    with open_bench(load_rig("virtual_rig")) as bench:
+        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), folder / "fast.h5")
+    (result,) = analyse_files([folder / "fast.h5"], "fast", Simulation.LEFT_OUT).results
+    return result.analysis
 
 
 @pytest.mark.thorough
@@ -116,13 +121,11 @@ def test_ringing_after_steps_of_a_fast_sweep_is_not_a_collision(tmp_path, start_
         duration_s=duration_s,
         settle_s=1,
     )
-    with open_bench(load_rig("virtual_rig")) as bench:
-        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
-    (result,) = analyse_files([tmp_path / "fast.h5"], "fast", Simulation.LEFT_OUT).results
-    assert result.analysis.collisions.regions == ()
+    found = fast_sweep_on_the_rig(tmp_path, plan)
+    assert found.collisions.regions == ()
     if (start_hz, stop_hz) == (150, 330):
-        sweep, found = result.analysis.response, result.analysis.collisions
-        left = np.sqrt(np.maximum(found.residual_rms**2 - (4 * found.noise_rms) ** 2, 0))
+        sweep, seen = found.response, found.collisions
+        left = np.sqrt(np.maximum(seen.residual_rms**2 - (4 * seen.noise_rms) ** 2, 0))
         share = left[1:-1] / np.abs(sweep.velocity.order(1.0))[1:-1]
         assert np.max(share) == pytest.approx(0.0023 * sweep.sweep_rate_hz_per_s, rel=0.15)
         # A collision is reported from twice the residual of the linear specimen.
@@ -133,10 +136,8 @@ def test_ringing_after_steps_of_a_fast_sweep_is_not_a_collision(tmp_path, start_
 @pytest.mark.parametrize("duration_s", [6, 2])
 def test_collisions_in_a_fast_sweep_are_reported(tmp_path, duration_s):
     plan = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=duration_s, settle_s=1)
-    with open_bench(load_rig("virtual_rig")) as bench:
-        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
-    (result,) = analyse_files([tmp_path / "fast.h5"], "fast", Simulation.LEFT_OUT).results
-    assert sum(each.high_hz - each.low_hz for each in result.analysis.collisions.regions) > 80
+    regions = fast_sweep_on_the_rig(tmp_path, plan).collisions.regions
+    assert sum(each.high_hz - each.low_hz for each in regions) > 80
 
 
 @pytest.mark.thorough
@@ -177,19 +178,12 @@ def test_impacts_in_a_single_interval_are_not_called_free_of_collisions(monkeypa
     assert any(low <= impacts_hz[0] + 0.5 and impacts_hz[0] - 0.5 <= high for high, low in said.too_fast_hz)
 
 
-def test_bounds_of_an_end_include_the_ringing_after_the_last_impact(monkeypatch):
-    """Collisions up to 761 Hz were once reported; the last impact was at 593 Hz."""
-    impacts_hz, said = impacts_and_collisions(10, monkeypatch)
+@pytest.mark.parametrize(("number", "least_hz"), [(10, 560.0), (4, 0.0)])
+def test_bounds_of_an_end_include_the_ringing_after_the_last_impact(number, least_hz, monkeypatch):
+    """Sweep 10 once collided up to 761 Hz instead of 593 Hz; sweep 4 had a second region, 207 to 186 Hz."""
+    impacts_hz, said = impacts_and_collisions(number, monkeypatch)
     (region,) = said.regions
-    assert region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
-    assert region.stop.lower_hz > 560
-
-
-def test_ringing_after_collisions_is_not_a_second_region(monkeypatch):
-    """Collisions from 207 to 186 Hz were once reported; the last impact was at 236 Hz."""
-    impacts_hz, said = impacts_and_collisions(4, monkeypatch)
-    (region,) = said.regions
-    assert region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
+    assert least_hz < region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
 
 
 @pytest.mark.parametrize("number", [29, 44])

@@ -30,6 +30,12 @@ def sweep(duration_s, start_hz=150.0, stop_hz=350.0, clock_ppm=0.0, rate_hz=RATE
     return time, 2 * np.pi * (start_hz * own + 0.5 * (stop_hz - start_hz) / duration_s * own**2)
 
 
+def of_unit_displacement(time, phase):
+    """Return drive, base acceleration and response velocity of a displacement of 1 m."""
+    speed = np.gradient(phase, time)
+    return np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
+
+
 @dataclass
 class RecordedSweep:
     """Channels of a recording that contains a sweep."""
@@ -66,9 +72,7 @@ class RecordedSweep:
 
 @pytest.mark.parametrize("lost", [(), (8000,), (57_500,), (8000, 57_500)], ids=str)
 def test_lost_samples_outside_a_sweep_do_not_affect_its_results(lost):
-    time, phase = sweep(8.0, 140, 360)
-    speed = np.gradient(phase, time)
-    data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
+    data = of_unit_displacement(*sweep(8.0, 140, 360))
     data[:, list(lost)] = np.nan
     start, stop = round(1.0 * RATE), round(7.0 * RATE)
     plan = SineSweep(amplitude_vpp=1, start_hz=167.5, stop_hz=332.5, duration_s=6.0)
@@ -83,7 +87,7 @@ def bridged_sweep(per_s, seed=1):
     """Return a sweep of 1 m displacement whose bridged samples have 3 times its peak velocity."""
     time, phase = sweep(8.0, 140, 360)
     speed = np.gradient(phase, time)
-    data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
+    data = of_unit_displacement(time, phase)
     rng = np.random.default_rng(seed)
     first = rng.integers(round(RATE), round(7 * RATE), round(6 * per_s))
     bridges = (first[:, np.newaxis] + np.arange(12)).ravel()
@@ -115,8 +119,7 @@ def test_a_sweep_with_drop_outs_everywhere_is_refused():
 def test_the_first_and_last_intervals_of_a_sweep_also_use_neighbouring_samples():
     """A displacement of constant amplitude is recorded for longer than the analysed sweep."""
     time, phase = sweep(6.0)
-    rows = np.stack((np.cos(phase), -np.cos(phase) * np.gradient(phase, time) ** 2, np.zeros(time.size)))
-    rows[2] = -np.sin(phase) * np.gradient(phase, time)
+    rows = of_unit_displacement(time, phase)
     sums = SweepSums(RATE, low_hz=160, high_hz=340)
     reach = sums.neighbour_samples
     sums.add_neighbour(rows[:, :reach])
@@ -214,21 +217,12 @@ def test_a_swept_linear_motion_has_equal_responses_and_its_exact_envelope(direct
 
 def test_the_vibrometer_delay_is_removed_from_the_phase():
     time, phase = sweep(20)
-    late = sweep(20)[1]
     omega = np.gradient(phase) * RATE
     delay = 400e-6
     late = np.interp(time - delay, time, phase)
-    result = sweep_response(
-        np.sin(phase), -(omega**2) * np.sin(phase), omega * np.cos(late), RATE, low_hz=150, high_hz=350
-    )
-    straight = sweep_response(
-        np.sin(phase),
-        -(omega**2) * np.sin(phase),
-        omega * np.cos(late),
-        RATE,
-        low_hz=150,
-        high_hz=350,
-        delay_s=delay,
+    rows = (np.sin(phase), -(omega**2) * np.sin(phase), omega * np.cos(late))
+    result, straight = (
+        sweep_response(*rows, RATE, low_hz=150, high_hz=350, delay_s=each) for each in (0.0, delay)
     )
     inner = slice(5, -5)
     assert np.all(np.abs(result.phase_rad[inner]) > 0.3)
