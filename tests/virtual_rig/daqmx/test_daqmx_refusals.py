@@ -11,7 +11,6 @@ from nidaqmx.errors import DaqReadError, RpcError
 from session_pb2 import Session
 
 from tests.virtual_rig.conftest import daq_error
-from vibench.virtual_rig.daqmx.errors import Fault, ServerGone
 
 
 @pytest.fixture
@@ -141,22 +140,20 @@ def test_the_text_of_an_error_code_can_be_looked_up(daq, task):
 
 @pytest.mark.parametrize("code", [-200361, -201003, -200279, -88710])
 def test_an_injected_fault_reaches_the_reader_with_its_code(daq, task, code):
-    fault = Fault("ReadAnalogF64", code)
     task.read(10)
-    daq.server.faults.add(fault)
+    end = daq.server.faults.add(code, "ReadAnalogF64")
     with daq_error(code, kind=DaqReadError):
         task.read(10)
-    daq.server.faults.remove(fault)
+    end()
     task.read(10)
 
 
 def test_a_restarted_server_has_no_tasks(daq, task):
-    gone = ServerGone()
-    daq.server.faults.add(gone)
+    end = daq.server.faults.add(None)
     with pytest.raises(RpcError) as caught:
         task.read(1)
     assert caught.value.rpc_code is grpc.StatusCode.UNAVAILABLE
-    daq.server.faults.remove(gone)
+    end()
     with daq_error(DAQmxErrors.INVALID_TASK):
         task.read(1)
     task._close_on_exit, task._handle = False, None

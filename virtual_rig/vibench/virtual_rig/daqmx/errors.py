@@ -1,6 +1,6 @@
 """Errors of the simulated DAQmx driver: code, explanation, and number of transferred samples."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from enum import Enum
 from typing import TypeVar
 
@@ -51,53 +51,43 @@ def unsupported_value(property_name: str, requested: object, allowed: str) -> Da
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Fault:
-    """A rule by which all calls of one name fail with a code."""
-
-    rpc: str
-    """Name of the call, such as ``"ReadAnalogF64"``."""
-    code: int
-    """A DAQmx status, such as -200361 (nidaqmx.error_codes.DAQmxErrors)."""
-
-
-@dataclass(frozen=True, eq=False)
-class ServerGone:
-    """A rule that leaves all calls unanswered (the client sees UNAVAILABLE), as if the computer were off."""
-
-
 class Unavailable(Exception):
     """The server does not answer this call."""
 
 
 class Faults:
-    """The active rules on failing calls; they can be changed at any time."""
+    """The faults in force; they can be changed at any time."""
 
     def __init__(self) -> None:
-        self._rules: tuple[Fault | ServerGone, ...] = ()
+        self._in_force: tuple[tuple[int | None, tuple[str, ...]], ...] = ()
         self._restart_is_due = False
 
-    def add(self, rule: Fault | ServerGone) -> None:
-        """Add a rule to the active rules."""
-        self._rules += (rule,)
+    def add(self, code: int | None, *calls: str) -> Callable[[], None]:
+        """Make all calls of these names fail with a DAQmx code; return the function that ends the fault.
 
-    def remove(self, rule: Fault | ServerGone) -> None:
-        """Remove a rule. If the server answers again as a result, it has lost its tasks."""
-        self._restart_is_due |= rule in self._rules and isinstance(rule, ServerGone)
-        self._rules = tuple(other for other in self._rules if other is not rule)
+        With None, no call at all is answered, as if the computer were off; afterwards, all tasks are lost.
+        """
+        fault = (code, calls)
+        self._in_force += (fault,)
+
+        def end() -> None:
+            others = tuple(other for other in self._in_force if other is not fault)
+            self._restart_is_due |= code is None and others != self._in_force
+            self._in_force = others
+
+        return end
 
     def take_restart(self) -> bool:
         """Return whether the server has restarted, and so lost its tasks, since the last call."""
         is_due, self._restart_is_due = self._restart_is_due, False
         return is_due
 
-    def check(self, rpc: str) -> None:
-        """Raise DaqmxRefusal or Unavailable if a rule applies to the call."""
-        for rule in self._rules:
-            match rule:
-                case ServerGone():
-                    raise Unavailable("server gone")
-                case Fault() if rule.rpc == rpc:
-                    reads = 0 if rpc.startswith("Read") else None
-                    writes = 0 if rpc.startswith("Write") else None
-                    raise DaqmxRefusal(rule.code, f"Injected into {rpc}.", reads, writes)
+    def check(self, call: str) -> None:
+        """Raise DaqmxRefusal or Unavailable if a fault applies to the call."""
+        for code, calls in self._in_force:
+            if code is None:
+                raise Unavailable("server gone")
+            if call in calls:
+                reads = 0 if call.startswith("Read") else None
+                writes = 0 if call.startswith("Write") else None
+                raise DaqmxRefusal(code, f"Injected into {call}.", reads, writes)

@@ -23,7 +23,6 @@ from vibench.acquisition import file_path, load_toml
 from vibench.acquisition.recording import DiskTrouble
 from vibench.sim import FrozenModel
 
-from ..daqmx.errors import Fault, ServerGone
 from ..daqmx.server import DaqServer
 from ..generator.afg1022 import AFG1022
 from ..usb.usbtmc import UsbTmcInstrument
@@ -149,12 +148,12 @@ class RigFaults:
     def overrun(self) -> Heal:
         """Make reads fail as if samples in the buffer had been overwritten before they were read."""
         code = DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE.value
-        return self._in_force(*(Fault(call, code) for call in _READS))
+        return self._until(self._daq.faults.add(code, *_READS))
 
     def reserve_device(self) -> Heal:
         """Reserve the converter for another program: running tasks continue, new tasks are refused."""
         code = DAQmxErrors.PAL_RESOURCE_RESERVED.value
-        return self._in_force(*(Fault(call, code) for call in _RESERVING))
+        return self._until(self._daq.faults.add(code, *_RESERVING))
 
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
@@ -162,11 +161,11 @@ class RigFaults:
         A fault of one call that reads samples applies to all such calls, because a driver may use any one.
         """
         calls = _READS if call in _READS else (call,)
-        return self._in_force(*(Fault(each, code) for each in calls))
+        return self._until(self._daq.faults.add(code, *calls))
 
     def lose_daq_server(self) -> Heal:
         """Stop the DAQ server from answering."""
-        return self._in_force(ServerGone())
+        return self._until(self._daq.faults.add(None))
 
     def fill_disk(self, refusals: PositiveInt | None = None) -> Heal:
         """Make writes of recordings fail as on a full disk: ``refusals`` times, or until the fault ends."""
@@ -175,16 +174,6 @@ class RigFaults:
     def slow_disk(self, delay_s: PositiveFloat) -> Heal:
         """Delay every write of recordings of this process, in wall-clock time [s]."""
         return self._until(self._disk.slow_down(delay_s))
-
-    def _in_force(self, *rules: Fault | ServerGone) -> Heal:
-        for rule in rules:
-            self._daq.faults.add(rule)
-
-        def heal() -> None:
-            for rule in rules:
-                self._daq.faults.remove(rule)
-
-        return self._until(heal)
 
 
 class ScriptedFault(FrozenModel):
