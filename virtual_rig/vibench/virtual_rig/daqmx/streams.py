@@ -2,16 +2,18 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from nidaqmx.constants import AcquisitionType, AOIdleOutputBehavior, RegenerationMode, SampleTimingType
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ..world.conversion import Conversion, SampleQueue
-from ..world.world import World
-from .devices import AnalogOutputs
+from ..world.conversion import SampleQueue
 from .errors import DaqmxRefusal
+
+if TYPE_CHECKING:
+    from .tasks import Task
 
 MOST_SAMPLES = 1 << 27
 """Largest number of values in a buffer or a read: 1 GiB."""
@@ -49,13 +51,12 @@ _ROUNDING_SAMPLES = 1e-5
 
 
 class Stream:
-    """A running acquisition or generation; samples are counted per channel from the start of the task."""
+    """A running acquisition or generation of a task, which begins now; samples are counted per channel."""
 
-    def __init__(self, rate_hz: float, began_s: float, total: float) -> None:
-        """Start at rig time ``began_s`` [s]; ``total`` is the number of samples per channel, or infinity."""
-        self.rate_hz = rate_hz
-        self.began_s = began_s
-        self.total = total
+    def __init__(self, task: "Task") -> None:
+        self.rate_hz = task.rate_hz
+        self.began_s = task.rig.now_s
+        self.total = task.timing.total
         self.transferred = 0
         """Number of samples per channel acquired or generated so far."""
         self.failure: DaqmxRefusal | None = None
@@ -81,27 +82,19 @@ class Stream:
 class Acquisition(Stream):
     """A running acquisition, with the samples that the program has not read yet [V]."""
 
-    def __init__(
-        self,
-        sampler: Conversion,
-        channels: int,
-        rate_hz: float,
-        began_s: float,
-        total: float,
-        buffer_size: int,
-        *,
-        loses_samples: bool,
-    ) -> None:
-        """``loses_samples``: whether new samples overwrite the oldest in a full buffer, which else grows."""
-        super().__init__(rate_hz, began_s, total)
+    def __init__(self, task: "Task") -> None:
+        super().__init__(task)
+        channels = len(task.inputs)
         self.position = 0
         """Number of samples per channel that the program has read."""
         self.queried_at = -1
         """Read position at the last query of available samples."""
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
-        self._sampler = sampler
+        wiring = tuple(channel.wiring() for channel in task.inputs)
+        self._sampler = task.rig.world.sample(wiring, self.rate_hz)
         self._unread = SampleQueue(channels)
-        self.buffer_size = max(1, buffer_size)
+        self.buffer_size = max(1, task.buffer_size)
+        loses_samples = task.rig.pace.loses_samples  # else a full buffer grows
         self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
         self._is_open = True
 
@@ -187,30 +180,21 @@ class OutputBuffer:
 class Generation(Stream):
     """A running generation: samples played, and samples that wait in the buffer and in the device."""
 
-    def __init__(
-        self,
-        world: World,
-        outputs: tuple[str, ...],
-        rate_hz: float,
-        began_s: float,
-        total: float,
-        buffer: OutputBuffer,
-        regeneration: RegenerationMode,
-        device: AnalogOutputs,
-    ) -> None:
-        super().__init__(rate_hz, began_s, total)
-        self.buffer = buffer
+    def __init__(self, task: "Task") -> None:
+        super().__init__(task)
+        device = task.outputs[0].side
+        self.buffer = task.output_buffer
         self.delivered = 0
-        self._world = world
-        self._outputs = outputs
-        self.repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
+        self._world = task.rig.world
+        self._outputs = tuple(channel.physical for channel in task.outputs)
+        self.repeats = task.regeneration is RegenerationMode.ALLOW_REGENERATION
         """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
         self._idle = device.idle
-        self._memory = np.empty((len(outputs), 0))
+        self._memory = np.empty((len(self._outputs), 0))
         """Number of samples in the device's memory; a repeated buffer is not transferred in advance."""
         self._most_in_memory = 0 if self.repeats else device.memory
         self._fetched = 0
-        self._recent = np.empty((len(outputs), 0))
+        self._recent = np.empty((len(self._outputs), 0))
         self._is_open = True
 
     def has_room(self, samples: int) -> bool:

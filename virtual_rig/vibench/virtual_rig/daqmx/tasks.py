@@ -276,24 +276,15 @@ class Task:
         return self.buffer
 
     def _begin(self) -> None:
-        rig, timing = self.rig, self.timing
         if self.inputs:
             if self.log is not None:
                 self.log.begin()
-            sampler = rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
-            self.acquisition = Acquisition(
-                sampler, len(self.inputs), self.rate_hz, rig.now_s, timing.total,
-                self.buffer_size, loses_samples=rig.pace.loses_samples,
-            )  # fmt: skip
-            rig.run(self.acquisition)
+            self.acquisition = Acquisition(self)
+            self.rig.run(self.acquisition)
         else:
-            physical = tuple(channel.physical for channel in self.outputs)
-            self.generation = Generation(
-                rig.world, physical, self.rate_hz, rig.now_s, timing.total,
-                self.output_buffer, self.regeneration, self.outputs[0].side,
-            )  # fmt: skip
-            rig.run(self.generation)
-        rig.edge(self.start_terminal)
+            self.generation = Generation(self)
+            self.rig.run(self.generation)
+        self.rig.edge(self.start_terminal)
 
     def is_done(self) -> bool:
         """Return whether the task is finished; raise the error that ended it."""
