@@ -845,18 +845,3 @@ def test_a_text_file_with_fewer_numbers_than_declared_is_refused(known, tmp_path
     refused = pytest.raises(UnusableData, match=r"states 2508876 numbers, but contains at most \d+")
     with refused, open_source(path):
         pass
-
-
-def test_a_text_frequency_response_in_a_universal_file_is_ignored(known, tmp_path):
-    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
-    before = path.read_bytes()
-    lines = before.split(b"\n")
-    place = next(n for n, line in enumerate(lines) if line.startswith(b"    58b"))
-    response = [b"    58", *lines[place + 1 : place + 12]]
-    response[6] = b"%5d" % 4 + response[6][5:]
-    response[7] = b"%10d%10d" % (6, 3) + response[7][20:]
-    response[8] = b"%10d" % 18 + response[8][10:]
-    numbers = [b"".join(b"%20.11E" % each for each in row) for row in ((1, 0, 2, 0), (3, 0))]
-    path.write_bytes(before + b"\n".join([b"    -1", *response, *numbers, b"    -1", b""]))
-    with open_source(path) as source:
-        assert [each.name for each in source.channels] == ["1"]

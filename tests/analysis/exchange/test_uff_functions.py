@@ -172,9 +172,11 @@ def test_an_import_ignores_spectra(known, tmp_path):
     hz = np.arange(1.0, 5.0)
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     mixed, _ = export_samples(excerpt(known), Format.UFF, tmp_path / "b.uff")
-    mixed.write_bytes(path.read_bytes() + mixed.read_bytes())
-    with open_source(mixed) as source:
-        assert [each.label for each in source.channels] == ["drive_voltage", "m0_velocity"]
+    spectrum, samples = path.read_bytes(), mixed.read_bytes()
+    for content in (spectrum + samples, samples + spectrum):
+        mixed.write_bytes(content)
+        with open_source(mixed) as source:
+            assert [each.label for each in source.channels] == ["drive_voltage", "m0_velocity"]
 
 
 def velocity_of_m0(hz):

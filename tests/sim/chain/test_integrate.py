@@ -10,7 +10,6 @@ from tests.sim.as_written import distance
 from vibench.sim import (
     Accuracy,
     Harmonic,
-    Hertz,
     HuntCrossley,
     LinearGap,
     LinearSweep,
@@ -18,6 +17,7 @@ from vibench.sim import (
     PowerLaw,
     Sampled,
     gong2025,
+    spring_of,
 )
 from vibench.sim.chain import Chain, chain_of, integrate_chain
 
@@ -31,32 +31,19 @@ def state_of(cells, seed=1):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (cells, 6)) * np.repeat([2e-5, 0.15], 3)
 
 
-def law_force(cell, p, rate):
-    deep, side = max(abs(p) - cell.gap_m, 0.0), np.sign(p)
-    match cell.contact:
-        case Hertz(stiffness=k):
-            return side * k * deep**1.5
-        case LinearGap(stiffness=k):
-            return side * k * deep
-        case HuntCrossley(stiffness=k, loss=loss):
-            return side * k * deep**1.5 * (1.0 + loss * side * rate)
-        case PowerLaw(reference=reference, terms=terms):
-            return sum(force * (p / reference) ** n for n, force in terms)
-
-
 def reference_state(chain, drive, duration_s, state):
     """Return the final state by scipy's DOP853, restarted at every begin and end of a contact."""
     size, first = 3 * chain.size, chain.cells[0]
     mass, stiffness, damping = chain.masses, chain.stiffness_matrix, chain.damping_matrix
-    omega = 2.0 * np.pi * drive.frequency_hz
+    omega, springs = 2.0 * np.pi * drive.frequency_hz, [spring_of(cell) for cell in chain.cells]
 
     def rates(t, s):
         force = -stiffness @ s[:size] - damping @ s[size:]
         base = drive.amplitude_m * np.sin(omega * t), drive.amplitude_m * omega * np.cos(omega * t)
         force[0] += first.stiffnesses[0] * base[0] + first.dampings[0] * base[1]
-        for i, cell in enumerate(chain.cells):
+        for i, spring in enumerate(springs):
             y, z = 3 * i + 1, 3 * i + 2
-            contact = law_force(cell, s[y] - s[z], s[size + y] - s[size + z])
+            contact = spring.force(s[y] - s[z], s[size + y] - s[size + z])
             force[y] -= contact
             force[z] += contact
         return np.concatenate([s[size:], force / mass])

@@ -218,11 +218,6 @@ def test_booleans_and_texts_are_not_accepted_as_numbers(tmp_path, given, instead
             load_specimen(each)
 
 
-def test_an_infinite_gap_is_read_back_from_json(tmp_path):
-    one_sided = load_specimen(write_file(tmp_path, WHOLE))
-    assert SpecimenDescription.model_validate_json(one_sided.model_dump_json()) == one_sided
-
-
 SPRINGS = "stiffnesses_n_per_m = [23741, 829.047, 12046.3]"
 FREQUENCIES = "single_frequencies_hz = [322.0, 100.0, 390.6]"
 DAMPERS = "dampings_ns_per_m = [0.474821, 0.0165809, 0.240926]"
