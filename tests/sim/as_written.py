@@ -29,6 +29,14 @@ def free_state_matrix(specimen):
     return np.block([[np.zeros((3, 3)), np.eye(3)], rows])
 
 
+def stored_energy(specimen, states):
+    """Return kinetic plus elastic energy [J] without that of a contact, with the base at rest."""
+    x, y, z, vx, vy, vz = states.T
+    (m0, m1, m2), (k0, k1, k2) = specimen.masses, specimen.stiffnesses
+    elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
+    return 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2 + elastic)
+
+
 def distance(first, second):
     """Return the largest difference of two states in units of 100 um and 0.1 m/s."""
     return np.max(np.abs(first - second) / UNITS)

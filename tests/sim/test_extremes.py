@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.sim.as_written import as_written, distance, paper
+from tests.sim.as_written import as_written, distance, paper, stored_energy
 from vibench.sim import (
     Accuracy,
     Harmonic,
@@ -216,14 +216,6 @@ def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceler
         assert run.impacts.count == 0
     else:
         assert np.all(p[3:] > -specimen.gap_m)
-
-
-def stored_energy(specimen, states):
-    """Return kinetic plus elastic energy [J] with the base at rest, between impacts."""
-    x, y, z, vx, vy, vz = states.T
-    (m0, m1, m2), (k0, k1, k2) = specimen.masses, specimen.stiffnesses
-    elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
-    return 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2 + elastic)
 
 
 @pytest.mark.parametrize("duration_s", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])

@@ -3,20 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.sim.engine import native_calls
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.engine.run import NativeRun, RunRecord, Watch
 
-LAWS = (
-    "hertz",
-    "hunt_crossley:0.5",
-    "linear_gap",
-    "rigid:0.8",
-    "rigid:0",
-    "linear",
-    "power:5",
-    "power:3+5+7",
-    "power:47",
-)
+LAWS = (*native_calls.LAWS, "power:47")
 PERIODS, SAMPLES = 6, 120_000
 
 
