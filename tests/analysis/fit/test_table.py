@@ -1,13 +1,11 @@
 """The table mass is identified from the notches that the specimen's resonances cause in the base motion."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Measurement, WhiteNoise
-from vibench.acquisition.rig import load_rig
+from tests.analysis.virtual_measurements import RIG, record, weak_noise as noise_of
+from vibench.acquisition import open_recording
 from vibench.analysis import Simulation, analyse, analyse_files, update_model
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.fit.suspects import Assumption
@@ -16,26 +14,13 @@ from vibench.sim import gong2025
 
 pytestmark = pytest.mark.thorough
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
 
 
 @pytest.fixture(scope="module")
 def weak_noise(tmp_path_factory):
     """Record weak noise on the virtual rig."""
-    plan = WhiteNoise(
-        amplitude_vpp=0.05,
-        band_start_hz=50,
-        band_stop_hz=600,
-        repetition_hz=2,
-        realisations=6,
-        periods=2,
-        settle_s=1.5,
-    )
-    path = tmp_path_factory.mktemp("table") / "weak.h5"
-    with open_bench(RIG) as bench:
-        run_measurement(bench, Measurement(name="weak", excitation=plan, ramp_s=0.3), path)
-    return path
+    return record(tmp_path_factory.mktemp("table") / "weak.h5", noise_of(realisations=6, settle_s=1.5))
 
 
 @pytest.fixture(scope="module")

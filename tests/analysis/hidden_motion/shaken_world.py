@@ -19,7 +19,7 @@ from vibench.sim import Specimen
 from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig("virtual_rig")
 GRID_HZ = 102_400.0
 GROUP_DELAY = 39
 """Samples by which the world's converter shows late what its grid had."""

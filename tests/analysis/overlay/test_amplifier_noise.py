@@ -1,17 +1,17 @@
 """The draws of a twin include the noise of an amplifier whose output is not recorded."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement
+from tests.analysis.virtual_measurements import record, sampled_at
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import Dwell
 from vibench.acquisition.rig import load_rig, specimen_of
 from vibench.analysis.overlay.draws import voltage_source
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_accelerometers.toml")
+RIG = load_rig("virtual_rig_accelerometers")
 WEAK = Dwell(amplitude_vpp=0.02, frequency_hz=180, settle_s=1.0, duration_s=1.0)
 BETWEEN_HZ = (300.0, 900.0)
 
@@ -19,11 +19,8 @@ BETWEEN_HZ = (300.0, 900.0)
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     """Recording of a weak dwell at 25.6 kS/s, without a channel for the amplifier's output."""
-    rig = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"sample_rate_hz": 25_600.0})})
     path = tmp_path_factory.mktemp("unseen") / "dwell.h5"
-    with open_bench(rig) as bench:
-        run_measurement(bench, Measurement(name="dwell", excitation=WEAK, ramp_s=0.3), path)
-    with open_recording(path) as opened:
+    with open_recording(record(path, WEAK, sampled_at(25_600.0, RIG))) as opened:
         yield opened
 
 

@@ -2,14 +2,13 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
-from vibench.acquisition.rig import load_rig
+from tests.analysis.virtual_measurements import record, sampled_at, weak_noise
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import Dwell
 from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures.dwells import dwells_figure
 from vibench.analysis.kinds.analysis_kind import Result
@@ -18,16 +17,7 @@ from vibench.analysis.overlay.shaker_fit import fit_shaker
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-NOISE = WhiteNoise(
-    amplitude_vpp=0.05,
-    band_start_hz=50,
-    band_stop_hz=600,
-    repetition_hz=2,
-    realisations=3,
-    periods=2,
-    settle_s=1.0,
-)
+NOISE = weak_noise(realisations=3, settle_s=1.0)
 DWELL = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.0, duration_s=2.5)
 
 pytestmark = pytest.mark.thorough
@@ -37,11 +27,8 @@ pytestmark = pytest.mark.thorough
 def recordings(tmp_path_factory):
     """Folder with recordings of weak noise and a chaotic dwell at 25.6 kS/s."""
     folder = tmp_path_factory.mktemp("twin")
-    rig = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"sample_rate_hz": 25_600.0})})
-    with open_bench(rig) as bench:
-        for name, excitation in (("noise", NOISE), ("dwell", DWELL)):
-            plan = Measurement(name=name, excitation=excitation, ramp_s=0.3)
-            run_measurement(bench, plan, folder / f"{name}.h5")
+    for name, excitation in (("noise", NOISE), ("dwell", DWELL)):
+        record(folder / f"{name}.h5", excitation, sampled_at(25_600.0))
     return folder
 
 

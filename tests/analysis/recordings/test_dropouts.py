@@ -7,10 +7,11 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
+from tests.analysis.virtual_measurements import RIG, record, simulated_with
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import Dwell, SineSweep, WhiteNoise
 from vibench.acquisition.recording import BridgedChannel, Dropout, bridge, find_dropouts
-from vibench.acquisition.rig import Rig, load_rig
+from vibench.acquisition.rig import Rig
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.recordings.checks import Verdict, measurement_checks
 from vibench.analysis.recordings.facts import recording_facts
@@ -137,24 +138,16 @@ def test_drop_outs_are_not_searched_below_20_khz():
 
 
 def measure(rig, plan, path, dropouts_per_s, seed=5, **how):
-    virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": dropouts_per_s, "seed": seed})
-    with open_bench(rig.model_copy(update={"virtual": virtual})) as bench:
-        run_measurement(bench, Measurement(name="m", excitation=plan, ramp_s=0.3), path, **how)
-    return path
-
-
-@pytest.fixture(scope="module")
-def rig():
-    return load_rig("virtual_rig")
+    return record(path, plan, simulated_with(rig, vibrometer_dropouts_per_s=dropouts_per_s, seed=seed), **how)
 
 
 @pytest.mark.thorough
-def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(rig, tmp_path):
+def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(tmp_path):
     """Response I was once 91, called a lower bound; 1.63 is true."""
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
     results = []
     for dropouts_per_s in (0.0, 4.0):
-        path = measure(rig, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
+        path = measure(RIG, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
         results.append(analyse_files([path], "d", Simulation.LEFT_OUT).results[0].analysis)
     light, dark = (each.response for each in results)
     assert dark.response_i == pytest.approx(light.response_i, rel=2e-3)
@@ -166,9 +159,9 @@ def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(rig, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("dropouts_per_s", "seed"), [(20.0, 2), (20.0, 13), (60.0, 1)])
-def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(rig, tmp_path, dropouts_per_s, seed):
+def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(tmp_path, dropouts_per_s, seed):
     """Response I was once 58 +- 16, and 48 +- 51 with 60 drop-outs per second; 3.21 is true."""
-    document = rig.model_dump(mode="json")
+    document = RIG.model_dump(mode="json")
     document["specimen"]["contact"] = "linear"
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=230, settle_s=1, duration_s=6)
     path = measure(Rig.model_validate(document), plan, tmp_path / "d.h5", dropouts_per_s, seed)
@@ -192,12 +185,12 @@ def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(rig, tmp_path,
     ],
     ids=["chaos", "strong", "sweep", "noise"],
 )
-def test_drop_outs_and_collisions_are_distinguished(rig, tmp_path, plan):
+def test_drop_outs_and_collisions_are_distinguished(tmp_path, plan):
     """Bridged samples differ from those of a run without drop-outs by at most 2 % of the motion."""
-    with open_recording(measure(rig, plan, tmp_path / "light.h5", 0.0)) as recording:
+    with open_recording(measure(RIG, plan, tmp_path / "light.h5", 0.0)) as recording:
         light = recording.read(ROLE)
         assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
-    with open_recording(measure(rig, plan, tmp_path / "dark.h5", 3.0)) as recording:
+    with open_recording(measure(RIG, plan, tmp_path / "dark.h5", 3.0)) as recording:
         dark, mended = recording.read(ROLE), BridgedChannel(recording, ROLE).read(0, recording.samples)
         facts = recording_facts(recording)
     assert facts.dropouts > 5
@@ -207,14 +200,14 @@ def test_drop_outs_and_collisions_are_distinguished(rig, tmp_path, plan):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [7, 9])
-def test_drop_outs_a_few_milliseconds_apart_are_bridged_with_errors_below_2_percent(rig, tmp_path, seed):
+def test_drop_outs_a_few_milliseconds_apart_are_bridged_with_errors_below_2_percent(tmp_path, seed):
     """Ringing joined such drop-outs beyond the longest bridge: Response I was 617; 22.6 is true."""
     plan = Dwell(amplitude_vpp=0.02, frequency_hz=266, settle_s=1, duration_s=4)
     read = []
     for dropouts_per_s in (0.0, 20.0):
         path = tmp_path / f"{dropouts_per_s:g}.h5"
         how = {"bench_check": "recently passed", "seed": seed}
-        with open_recording(measure(rig, plan, path, dropouts_per_s, **how)) as recording:
+        with open_recording(measure(RIG, plan, path, dropouts_per_s, **how)) as recording:
             read.append(BridgedChannel(recording, ROLE).read(0, recording.samples - 1_000))
     light, mended = read
     assert np.max(np.abs(mended - light)) < 0.02 * np.max(np.abs(light))
@@ -222,9 +215,9 @@ def test_drop_outs_a_few_milliseconds_apart_are_bridged_with_errors_below_2_perc
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", [each for each in shipped_specimens() if each != "two_masses"])
-def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(rig, tmp_path, name):
+def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(tmp_path, name):
     """The shipped specimens include one-sided stops, rigid stops and a heavy m1."""
-    document = rig.model_dump(mode="json")
+    document = RIG.model_dump(mode="json")
     document["specimen"] = {
         "model": name,
         "amplitude_limit_m": document["specimen"]["amplitude_limit_m"] | {"value": 1.0},
@@ -242,9 +235,9 @@ def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(rig, tmp_p
 
 
 @pytest.mark.thorough
-def test_a_part_of_a_recording_is_bridged_like_the_whole(rig, tmp_path):
+def test_a_part_of_a_recording_is_bridged_like_the_whole(tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
-    with open_recording(measure(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
+    with open_recording(measure(RIG, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)
         dropouts = BridgedChannel(recording, ROLE).between(0, recording.samples)
         assert len(dropouts) > 5
@@ -257,9 +250,9 @@ def test_a_part_of_a_recording_is_bridged_like_the_whole(rig, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
-def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
+def test_an_unusual_sampling_rate_is_accepted(tmp_path, rate_hz):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
-    path = measure(rig, plan, tmp_path / "d.h5", 0.0)
+    path = measure(RIG, plan, tmp_path / "d.h5", 0.0)
     with h5py.File(path, "r+") as file:
         file.attrs["sample_rate_hz"] = rate_hz
     with open_recording(path) as recording:
@@ -267,9 +260,9 @@ def test_an_unusual_sampling_rate_is_accepted(rig, tmp_path, rate_hz):
 
 
 @pytest.mark.thorough
-def test_many_drop_outs_give_a_warning(rig, tmp_path):
+def test_many_drop_outs_give_a_warning(tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
-    with open_recording(measure(rig, plan, tmp_path / "d.h5", 1.0)) as recording:
+    with open_recording(measure(RIG, plan, tmp_path / "d.h5", 1.0)) as recording:
         facts = recording_facts(recording)
     (note,) = (each for each in measurement_checks(facts) if each.what == "Drop-outs")
     (warning,) = (

@@ -9,9 +9,8 @@ import pytest
 from benchmarks import fast_sweeps
 from benchmarks.fast_sweeps import FastSweep, fast_sweep, simulate_and_analyse
 from tests.analysis.sine.sweep_in_memory import sweep_response
-from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Measurement, SineSweep
-from vibench.acquisition.rig import load_rig
+from tests.analysis.virtual_measurements import record
+from vibench.acquisition.plan import SineSweep
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.sine.collision_region import collisions
 from vibench.sim import LinearSweep, base_transmissibility, gong2025, integrate
@@ -102,9 +101,7 @@ def test_noise_and_laser_drop_outs_do_not_move_the_collision_edges(spoil):
 
 def fast_sweep_on_the_rig(folder, plan):
     """Return the analysis of a sweep on the virtual rig."""
-    with open_bench(load_rig("virtual_rig")) as bench:
-        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), folder / "fast.h5")
-    (result,) = analyse_files([folder / "fast.h5"], "fast", Simulation.LEFT_OUT).results
+    (result,) = analyse_files([record(folder / "fast.h5", plan)], "fast", Simulation.LEFT_OUT).results
     return result.analysis
 
 

@@ -1,39 +1,28 @@
 """Jumps in a stepped level: found at two levels on the virtual rig, and none in a constant response."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.analysis import synthetic_recordings as synthetic
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Measurement, SteppedLevel
-from vibench.acquisition.rig import load_rig
+from tests.analysis.virtual_measurements import record, sampled_at, simulated_with
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import SteppedLevel
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine.jumps import hysteresis_vpp, level_jumps
 from vibench.analysis.sine.stepped_response import SteppedResponse
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-
 
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory):
     """Steps at 195 Hz from 0.1 to 0.8 Vpp and back; collisions at 0.2 Vpp end at a random time."""
-    rig = RIG.model_copy(
-        update={
-            "daq": RIG.daq.model_copy(update={"sample_rate_hz": 5120.0}),
-            "virtual": RIG.virtual.model_copy(update={"grid_rate_hz": 25_600.0, "seed": 2}),
-        }
-    )
+    rig = sampled_at(5120.0, simulated_with(grid_rate_hz=25_600.0, seed=2))
     plan = SteppedLevel(
         frequency_hz=195, amplitude_vpp=0.8, lowest_vpp=0.1, step_vpp=0.1, settle_s=1.5, record_s=0.7
     )
     path = tmp_path_factory.mktemp("level") / "level.h5"
-    with open_bench(rig) as bench:
-        run_measurement(bench, Measurement(name="level", excitation=plan, ramp_s=0.3), path)
-    with open_recording(path) as recording:
+    with open_recording(record(path, plan, rig)) as recording:
         return analyse(recording)
 
 

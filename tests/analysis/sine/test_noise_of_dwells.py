@@ -3,21 +3,18 @@
 import json
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement
-from vibench.acquisition.rig import load_rig
+from tests.analysis.virtual_measurements import RIG, record, simulated_with
+from vibench.acquisition.plan import Dwell
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.report._result_tables import dwell_table
 from vibench.analysis.uncertainty.budget import Cause
 from vibench.sim import base_transmissibility
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 WEAK_VPP = 0.01
 AMPLIFIER_NOISE_V = (0.0, 0.02)
 """That of the generator alone, which is white and fills resonances; and a floor that outdoes the drive."""
@@ -25,10 +22,7 @@ AMPLIFIER_NOISE_V = (0.0, 0.02)
 
 def measure(folder, excitation, **virtual):
     """Record with a bench check on a changed virtual rig, and return the result."""
-    rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update=virtual)})
-    path = folder / "weak.h5"
-    with open_bench(rig) as bench:
-        run_measurement(bench, Measurement(name="weak", excitation=excitation, ramp_s=0.5), path)
+    path = record(folder / "weak.h5", excitation, simulated_with(**virtual), ramp_s=0.5)
     return analyse_files([path], "weak", Simulation.LEFT_OUT).results[0]
 
 
@@ -123,11 +117,8 @@ def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
 @pytest.mark.thorough
 def test_large_noise_is_not_determined_without_a_silent_part(tmp_path):
     """The recording has no bench check, so it has no part without drive."""
-    rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"amplifier_noise_v": 0.02})})
-    path = tmp_path / "weak.h5"
-    plan = Measurement(name="weak", excitation=dwell(180.0), ramp_s=0.5)
-    with open_bench(rig) as bench:
-        run_measurement(bench, plan, path, bench_check="recently passed")
+    path, rig = tmp_path / "weak.h5", simulated_with(amplifier_noise_v=0.02)
+    record(path, dwell(180.0), rig, ramp_s=0.5, bench_check="recently passed")
     found = analyse_files([path], "weak", Simulation.LEFT_OUT)
     (result,) = found.results
     first = budgets_of(result)[1]

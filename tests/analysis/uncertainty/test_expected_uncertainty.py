@@ -1,38 +1,26 @@
 """The uncertainty predicted from a plan matches the uncertainty of its recording."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, SineSweep, WhiteNoise, base_motion
-from vibench.acquisition.rig import Rig, load_rig
+from tests.analysis.virtual_measurements import RIG, record, weak_noise
+from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, SineSweep, base_motion
+from vibench.acquisition.rig import Rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
 from vibench.analysis.uncertainty.budget import Cause
 from vibench.sim import shipped_specimens
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
-RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-NOISE = WhiteNoise(
-    amplitude_vpp=0.05,
-    band_start_hz=50,
-    band_stop_hz=600,
-    repetition_hz=2,
-    realisations=8,
-    periods=2,
-    settle_s=1.5,
-)
+NOISE = weak_noise(realisations=8, settle_s=1.5)
 
 
 @pytest.mark.thorough
 def test_the_uncertainty_of_noise_matches_its_prediction(tmp_path):
     plan = Measurement(name="weak", excitation=NOISE, ramp_s=0.3)
     expected = expected_uncertainty(plan, RIG)
-    path = tmp_path / "weak.h5"
-    with open_bench(RIG) as bench:
-        run_measurement(bench, plan, path)
+    path = record(tmp_path / "weak.h5", NOISE)
     budgets = budgets_of(analyse_files([path], "weak", Simulation.LEFT_OUT).results[0])
     assert len(budgets) == len(expected) == 9
     for said, found in zip(expected, budgets, strict=True):
@@ -134,8 +122,7 @@ def test_the_uncertainty_of_a_colliding_dwell_matches_its_prediction(tmp_path, a
     """One run with a prescribed base motion once predicted up to 3.4 times too small values."""
     plan = dwell(at_hz, level_vpp)
     said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
-    with open_bench(RIG) as bench:
-        run_measurement(bench, plan, tmp_path / "dwell.h5")
+    record(tmp_path / "dwell.h5", plan.excitation, ramp_s=plan.ramp_s)
     (result,) = analyse_files([tmp_path / "dwell.h5"], "dwell", Simulation.LEFT_OUT).results
     told = {each.quantity: each.expanded / each.value for each in budgets_of(result)}
     for name in ("Response I", "Response II"):
