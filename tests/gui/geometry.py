@@ -165,5 +165,10 @@ def main(cases):
     print(json.dumps(found))  # noqa: T201 - output for the test
 
 
+def wrongly_enabled(result):
+    """Return the widgets that show an outdated result as if it were current."""
+    return [each for each in result.widgets if result.is_outdated and each.isEnabled()]
+
+
 if __name__ == "__main__":
     main(json.loads(sys.argv[1]))

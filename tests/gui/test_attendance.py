@@ -90,10 +90,11 @@ def test_the_plots_of_a_new_engine_do_not_show_data_of_a_killed_engine(window, q
     notice = next(each for each in notices if each.what == "The engine was killed.")
     assert notice.next_step.startswith("The generator may still be driving: switch the amplifier off")
     assert not bridge.is_ordering
+    (result,) = page.displayed_results
     for _ in run():
         window.tick()
-        assert not any(each.widget.isEnabled() for each in page.displayed_results), "pictures of another run"
+        assert not any(each.isEnabled() for each in result.widgets), "pictures of another run"
     window.tick()
     assert bridge.view is not first
-    assert page.displayed_results
-    assert all(each.inputs is bridge.view and each.widget.isEnabled() for each in page.displayed_results)
+    assert result.inputs is bridge.view
+    assert all(each.isEnabled() for each in result.widgets)

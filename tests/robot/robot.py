@@ -43,6 +43,7 @@ from vibench.gui.window.open_window import application
 from vibench.gui.window.window import PAGES, Window
 
 from ..gui.forms.bad_values import BAD
+from ..gui.geometry import wrongly_enabled
 
 NASTY = (
     *BAD,
@@ -140,10 +141,10 @@ class Robot:
         """Report results that belong to other inputs."""
         for name, page in self.window.pages.items():
             for shown in page.displayed_results:
-                if not shown.is_current:
+                for widget in wrongly_enabled(shown):
                     self.find(
-                        f"{name}: {shown.widget.accessibleName() or type(shown.widget).__name__} shows "
-                        f"{str(shown.inputs)[:300]} while {str(shown.current)[:300]} is asked for"
+                        f"{name}: {widget.accessibleName() or type(widget).__name__} shows "
+                        f"{str(shown.inputs)[:300]} while {str(shown.wanted())[:300]} is asked for"
                     )
 
     def find(self, what):

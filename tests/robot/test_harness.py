@@ -20,14 +20,15 @@ def robot(qtbot):
     qtbot.addWidget(label)
     made = object.__new__(Robot)
     made.findings, made.recent = [], deque(["type_value"])
-    made.page = SimpleNamespace(displayed_results=(DisplayedResult(label, "amplitude 2", "amplitude 1"),))
+    shown = DisplayedResult(lambda: "amplitude 1", label)
+    shown.show("amplitude 2")
+    made.page = SimpleNamespace(displayed_results=(shown,))
     made.window = SimpleNamespace(pages={"Test": made.page})
     made.label = label
     return made
 
 
 def test_the_robot_finds_numbers_that_do_not_match_the_inputs(robot):
-    robot.label.setEnabled(False)
     robot.look()
     assert robot.findings == []
     robot.label.setEnabled(True)

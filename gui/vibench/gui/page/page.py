@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
@@ -62,22 +61,28 @@ def file_kind(path: Path) -> FileKind:
     return found
 
 
-@dataclass(frozen=True)
 class DisplayedResult:
-    """Displayed result, with the inputs from which it was computed.
+    """Result in widgets, which are disabled while it is outdated: its inputs differ from those wanted."""
 
-    ``inputs`` are None if nothing is shown. If they differ from ``wanted``, the widget must be disabled,
-    which marks the result as outdated.
-    """
-
-    widget: QWidget
-    inputs: object
-    current: object
+    def __init__(self, wanted: Callable[[], object], *widgets: QWidget) -> None:
+        self.wanted, self.widgets = wanted, widgets
+        self.inputs: object = None
+        """Inputs from which the result was computed; None if nothing is shown."""
 
     @property
-    def is_current(self) -> bool:
-        """Whether the page is consistent: the result is up to date, absent, or marked as outdated."""
-        return self.inputs is None or self.inputs == self.current or not self.widget.isEnabled()
+    def is_outdated(self) -> bool:
+        """Whether a result of other inputs is shown."""
+        return self.inputs is not None and self.inputs != self.wanted()
+
+    def show(self, inputs: object) -> None:
+        """Note that the widgets now show the result of these inputs; None if they show nothing."""
+        self.inputs = inputs
+        self.mark()
+
+    def mark(self) -> None:
+        """Disable the widgets if the result is outdated; otherwise enable them."""
+        for widget in self.widgets:
+            widget.setEnabled(not self.is_outdated)
 
 
 class ThemedPart(Protocol):
@@ -95,6 +100,7 @@ class Page(QWidget):
         self.context = context
         self.edits: History[Any] = History(lambda _plan: None)
         """Undo history of the plan; empty on pages without a plan."""
+        self.displayed_results: tuple[DisplayedResult, ...] = ()
 
     @property
     def is_done(self) -> bool:
@@ -108,11 +114,6 @@ class Page(QWidget):
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Functions that open files on this page, by kind."""
         return {}
-
-    @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Results that the page displays, each with the inputs from which it was computed."""
-        return ()
 
     @property
     def styled_parts(self) -> tuple[QWidget, ...]:

@@ -146,9 +146,7 @@ def _fill(window: Window) -> None:
     window.context.comparison_requested.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
     queue.open_file(shipped(CAMPAIGN))
     maps.pick(*MOTION)
-    _wait(
-        lambda: maps.displayed_results[1].inputs == maps.displayed_results[1].current and not compare.is_busy
-    )
+    _wait(lambda: maps.displayed_results[1].inputs is not None and not compare.is_busy)
     for path in window.context.folder.glob("sweep*.h5"):
         window.context.recording_requested.emit(path)
     if simulation.progress is not None:

@@ -5,6 +5,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
+from tests.gui.geometry import wrongly_enabled
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
 from vibench.analysis.prediction.progress import MapRequest
 from vibench.gui.pages.maps.maps_page import MapsPage
@@ -103,16 +104,16 @@ def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
 def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
     compute_map(page, wait_for)
     page.pick(120.0, 1e-5)
-    wait_for(lambda: page._motion_of is not None and page.motion.isEnabled(), 100.0)
+    wait_for(lambda: page.displayed_results[1].inputs is not None and page.motion.isEnabled(), 100.0)
     assert page.map.isEnabled()
     before = page.form.form.content()
     page.form.form.show_content({**before, "gap_m": 60e-6})
-    assert [each.widget.isEnabled() for each in page.displayed_results] == [False, False]
+    assert [page.map.isEnabled(), page.motion.isEnabled()] == [False, False]
     page.form.form.show_content(before)
-    assert [each.widget.isEnabled() for each in page.displayed_results] == [True, True]
+    assert [page.map.isEnabled(), page.motion.isEnabled()] == [True, True]
     page.pick(130.0, 1e-5)
     assert not page.motion.isEnabled()
-    assert all(each.is_current for each in page.displayed_results)
+    assert not any(map(wrongly_enabled, page.displayed_results))
     page.begin()
     assert page.map.image.image is None
     page.simulator.cancel()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.gui.geometry import wrongly_enabled
 from vibench.analysis.prediction.accuracy_cost import MEASURED
 from vibench.analysis.prediction.progress import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
@@ -177,12 +178,12 @@ def test_an_empty_signal_field_means_no_signal(page):
 
 
 def test_curves_that_differ_from_the_form_are_greyed_out(page):
-    page._request = SimulationRequest(**LINEAR)
+    page.displayed_results[0].inputs = SimulationRequest(**LINEAR)
     page.form.show_value(SimulationRequest(**LINEAR))
     assert page.plots.isEnabled()
     page.form.show_value(SimulationRequest(**{**LINEAR, "amplitude_m": 9e-6}))
     assert not page.plots.isEnabled()
-    assert all(each.is_current for each in page.displayed_results)
+    assert not any(map(wrongly_enabled, page.displayed_results))
     page.leave()
     again = SimulatePage(page.context)
     assert again.form.value.amplitude_m == 9e-6

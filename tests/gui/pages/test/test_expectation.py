@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.gui.geometry import wrongly_enabled
 from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import Dwell, Measurement, Until
 from vibench.acquisition.rig import load_rig
@@ -80,7 +81,7 @@ def test_renaming_a_test_does_not_repeat_the_prediction(page, qtbot):
     assert asked == []
     assert page.context.selection.measurement.name == "after"
     page._show_preview(preview.preview_test(preview.TestPreview(page._inputs[0], RIG)))
-    assert all(each.is_current for each in page.displayed_results)
+    assert not any(map(wrongly_enabled, page.displayed_results))
     assert page.is_done
     page.form.show_value(Measurement(name="after", excitation=plan.model_copy(update={"duration_s": 7.0})))
     assert len(asked) == 2

@@ -56,8 +56,9 @@ class FilesPage(Page):
         self.campaigns = CampaignChoice()
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
-        self._pictured_path: Path | None = None
-        """Path of the recording that the plots show."""
+        self._pictured = DisplayedResult(lambda: self._opened and self._opened.path, self.pictures)
+        views = self.pictures.spectrogram, self.pictures.hidden_motion
+        self.displayed_results = (self._pictured, *(view.result for view in views))
         self._listing: Job | None = None
         self._making: Job | None = None
         self._check = LatestRequest(
@@ -76,13 +77,6 @@ class FilesPage(Page):
     def is_done(self) -> bool:
         """Whether a recording is open."""
         return self._opened is not None
-
-    @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The plots; their input is the recording named above them."""
-        wanted = None if self._opened is None else self._opened.path
-        inside = self.pictures.spectrogram.displayed_results, self.pictures.hidden_motion.displayed_results
-        return DisplayedResult(self.pictures, self._pictured_path, wanted), *inside
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
@@ -204,7 +198,7 @@ class FilesPage(Page):
             self._check.ask(self._opened.path)
         hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
         self.pictures.show_recording(RecordingOverview(self._opened, levels), hint)
-        self._pictured_path = self._opened.path
+        self._pictured.show(self._opened.path)
         self._say_view()
 
     def _show_facts(self, found: VerifiedRecording | None = None) -> None:
@@ -214,7 +208,7 @@ class FilesPage(Page):
     def _close(self) -> None:
         self._check.drop()
         self.pictures.show_recording(None, "Reading the recording…")
-        self._pictured_path = None
+        self._pictured.show(None)
         if self._opened is not None:
             self._opened.close()
             self._opened = None

@@ -51,14 +51,15 @@ class _RangePicture(QWidget, Generic[Request, Found]):
     plot: Plot
     caption: QLabel
 
-    def __init__(self, name: str, background: Background, compute: Callable[[Request], Found]) -> None:
+    def __init__(
+        self, name: str, background: Background, compute: Callable[[Request], Found], *plots: Plot
+    ) -> None:
         super().__init__()
         self.setAccessibleName(name)
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
         self._request: object = None
-        self._of: object = None
-        """Inputs of the displayed plot; None without a plot."""
+        self.result = DisplayedResult(lambda: self._request, *plots)
         self._latest_request: LatestRequest[Request, Found] = LatestRequest(
             background, compute, self._show, lambda error: self._clear(str(error)), _WAIT_MS, self
         )
@@ -67,11 +68,6 @@ class _RangePicture(QWidget, Generic[Request, Found]):
     def is_busy(self) -> bool:
         """Whether a plot is being computed."""
         return self._latest_request.is_busy
-
-    @property
-    def displayed_results(self) -> DisplayedResult:
-        """The plot, with the visible range and the options as its inputs."""
-        return DisplayedResult(self.plot, self._of, self._request)
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
         """Show another recording, or none; ``hint`` is shown until there is a plot."""
@@ -99,18 +95,16 @@ class _RangePicture(QWidget, Generic[Request, Found]):
             self._clear(request)
             return
         self._request = request
-        self.plot.setEnabled(self._of in (None, request))
+        self.result.mark()
         self.caption.setText("working it out…")
         self._latest_request.ask(request)
 
     def _show(self, found: Found) -> None:
-        self._of = found.request
-        self.plot.setEnabled(self._of == self._request)
+        self.result.show(found.request)
         self._draw(found)
 
     def _clear(self, hint: str) -> None:
-        self._of = None
-        self.plot.setEnabled(True)
+        self.result.show(None)
         self.caption.setText("")
         self._erase(hint)
 
@@ -135,8 +129,9 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
     """Estimated motion p of m1 between its stops, with and without a contact model."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
-        super().__init__("Hidden motion", background, hidden_view)
-        self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
+        plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
+        super().__init__("Hidden motion", background, hidden_view, plot)
+        self.plot = plot
         self.tracked = self.plot.curve(curve_style(0), "tracked")
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
@@ -209,7 +204,12 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
     """Emitted with the time range [s] after a zoom with the mouse."""
 
     def __init__(self, theme: Theme, background: Background) -> None:
-        super().__init__("Spectrogram", background, recording_spectrogram)
+        plots = {
+            RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
+            RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
+        }
+        super().__init__("Spectrogram", background, recording_spectrogram, *plots.values())
+        self._plots = plots
         self.channel, self.spacing = Choice(), Choice(items=RowSpacing)
         self.highest = Choice(items=(f"{highest_hz:g} Hz" for highest_hz in _HIGHEST_HZ))
         self.highest.setCurrentIndex(_USUAL)
@@ -217,10 +217,6 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         for width_hz in _WIDTHS_HZ:
             self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
         self.caption = ElidedLabel(rank="second")
-        self._plots = {
-            RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
-            RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
-        }
         self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
         for plot in self._plots.values():
             plot.getViewBox().sigRangeChangedManually.connect(self._zoom)

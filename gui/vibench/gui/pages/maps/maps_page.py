@@ -198,11 +198,12 @@ class MapsPage(Page):
         self.summary = SentenceLabel("Nothing has been computed yet.", name="Progress of the map")
         self.simulator = Simulator(self, context, self._grow, lambda: None, self.summary.setText)
         self.picture: MapPicture | None = None
-        self._request: MapRequest | None = None
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
-        self._motion_of: MotionRequest | None = None
         self._is_stale = False
+        self._mapped = DisplayedResult(lambda: self.form.value, self.map)
+        self._moved = DisplayedResult(lambda: self._motion_request, self.motion)
+        self.displayed_results = (self._mapped, self._moved)
         side = titled_box("Map", self.form)
         parts = SideAndPicture(context, MAPS, side, self._answer(), self._buttons())
         fill_box(QVBoxLayout(self), parts)
@@ -215,14 +216,6 @@ class MapsPage(Page):
     def is_done(self) -> bool:
         """Whether there is a complete map."""
         return self.picture is not None and not self.simulator.is_busy
-
-    @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The map and the motion, each with its request as input."""
-        return (
-            DisplayedResult(self.map, self._request, self.form.value),
-            DisplayedResult(self.motion, self._motion_of, self._motion_request),
-        )
 
     @property
     def _motion_request(self) -> MotionRequest | None:
@@ -248,8 +241,9 @@ class MapsPage(Page):
         request = self.form.value
         if request is None:
             return
-        self._request, self.picture = request, None
+        self.picture = None
         self.map.clear()
+        self._mapped.show(request)
         self._validate()
         self.simulator.begin(request)
 
@@ -296,14 +290,12 @@ class MapsPage(Page):
                     self.context.warn(part.sentence)
 
     def _show_motion(self, request: MotionRequest, motion: SettledMotion) -> None:
-        self._motion_of = request
         self.motion.show_motion(motion)
-        self._validate()
+        self._moved.show(request)
 
     def _fail(self, error: BaseException) -> None:
-        self._motion_of = None
         self.motion.show_nothing(str(error))
-        self._validate()
+        self._moved.show(None)
 
     def _validate(self) -> None:
         wanted = self.form.value
@@ -311,8 +303,8 @@ class MapsPage(Page):
             button.setEnabled(wanted is not None)
         if wanted is not None and self.picture is None:
             self.map.show_range((wanted.start_hz, wanted.stop_hz), (wanted.lowest_m, wanted.highest_m))
-        self.map.setEnabled(self._request in (None, wanted))
-        self.motion.setEnabled(self._motion_of in (None, self._motion_request))
+        for result in self.displayed_results:
+            result.mark()
 
     def _recolour(self, *_: object) -> None:
         self._is_stale = True

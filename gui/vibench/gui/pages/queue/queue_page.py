@@ -132,8 +132,6 @@ class QueuePage(Page):
         self._actions = UserActions(context, self)
         self.edits = History(context.selection.choose_campaign)
         self._preview: CampaignPreview | None = None
-        self._of: tuple[Campaign, Rig | None] | None = None
-        """Campaign and rig of the displayed summary; None without a summary."""
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -150,6 +148,10 @@ class QueuePage(Page):
         )
         self.sweep = SweepForm()
         self.summary = SentenceLabel(name="Summary of the campaign")
+        self._summed, self._listed = self.displayed_results = (
+            DisplayedResult(lambda: self._inputs, self.summary),
+            DisplayedResult(lambda: self._inputs, self.entries),
+        )
         self.progress = ProgressBar("Progress of the campaign", "not running")
         self.arm_button = push_button(
             "Arm the ca&mpaign…",
@@ -205,10 +207,8 @@ class QueuePage(Page):
         return {FileKind.CAMPAIGN: self.open_file}
 
     @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Summary and table of the campaign, with the campaign and the rig as their inputs."""
-        wanted = (self.context.selection.campaign, self.context.selection.rig)
-        return tuple(DisplayedResult(each, self._of, wanted) for each in (self.summary, self.entries))
+    def _inputs(self) -> tuple[Campaign | None, Rig | None]:
+        return self.context.selection.campaign, self.context.selection.rig
 
     def leave(self) -> None:
         """Store the edited campaign in the settings."""
@@ -236,25 +236,29 @@ class QueuePage(Page):
         )
 
     def _show_campaign(self) -> None:
-        campaign, rig = self.context.selection.campaign, self.context.selection.rig
+        campaign, rig = self._inputs
         if campaign is None:
             self._looking.drop()
-            self._preview = self._of = None
+            self._preview = None
             self.entries.show_rows(())
+            for result in self.displayed_results:
+                result.show(None)
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
         self.edits.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
-        self._preview = self._of = None
-        self.entries.setEnabled(False)
+        self._preview = None
+        self._summed.show(None)
+        self._listed.mark()
         self._looking.ask((campaign, rig, self.context.folder / campaign.name))
 
     def _show_preview(self, preview: CampaignPreview) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
             return
-        self._preview, self._of = preview, (campaign, self.context.selection.rig)
-        self.entries.setEnabled(True)
+        self._preview = preview
+        for result in self.displayed_results:
+            result.show(self._inputs)
         row = self.entries.currentRow()
         self.entries.show_rows(preview.rows)
         self.entries.selectRow(min(row, len(preview.rows) - 1))

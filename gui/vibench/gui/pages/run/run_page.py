@@ -331,6 +331,11 @@ class RunPage(Page):
             "Look at the recording", "Show the last recording on the Files page", self._look
         )
         self.summary = SentenceLabel(name="How the last run ended")
+        card = self.watch_card
+        self._result = DisplayedResult(
+            lambda: self._wanted_view, self.time_histories, card.impacts, card.meters, *self._pictures
+        )
+        self.displayed_results = (self._result,)
         self._lay_out()
         self._connect()
         self._show_channels()
@@ -358,8 +363,7 @@ class RunPage(Page):
         if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
             self.hidden_motion.show_status(status)
         view = self.context.bridge.view
-        for part in self._of_the_run:
-            part.setEnabled(view is not None or self._view is None)
+        self._result.mark()
         if view is None or self.watch_card.freeze.isChecked():
             return
         if view is not self._view:
@@ -377,16 +381,11 @@ class RunPage(Page):
                 shown.show_view(view)
 
     @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Plots and numbers, with the displayed run as input; empty while the plots are frozen or hidden."""
-        if self.watch_card.freeze.isChecked() or not self.isVisible():
-            return ()
-        return tuple(DisplayedResult(each, self._view, self.context.bridge.view) for each in self._of_the_run)
-
-    @property
-    def _of_the_run(self) -> tuple[QWidget, ...]:
-        card = self.watch_card
-        return (self.time_histories, card.impacts, card.meters, *self._pictures)
+    def _wanted_view(self) -> LiveView | None:
+        """The newest run; the displayed one while the plots are frozen or hidden."""
+        view = self.context.bridge.view
+        is_frozen = view is not None and self.watch_card.freeze.isChecked()
+        return self._view if is_frozen or not self.isVisible() else view
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Freeze with Space, mark with M, scroll with PgDn, unless the focused widget uses the key."""
@@ -409,6 +408,7 @@ class RunPage(Page):
     def _begin(self, view: LiveView) -> None:
         """Clear the plots, show the run's prediction, and select the plots for its excitation."""
         self._view = view
+        self._result.show(view)
         measurement = self._measurement
         prediction = self.context.selection.prediction
         if prediction is not None and (

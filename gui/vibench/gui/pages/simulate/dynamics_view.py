@@ -78,6 +78,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self.form: ValidatedForm[Request] = ValidatedForm(kind.request, kind.name, kind.hidden)
         self.simulator = Simulator(self, context, self._grow, self._end, self._show_text)
         self.answer: Answer | None = None
+        self.result = DisplayedResult(lambda: self.form.value, picture.widget)
         self._course: _Course | None = None
         self._is_stale = False
         name = kind.name.capitalize()
@@ -85,12 +86,6 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         fill_box(QVBoxLayout(self), parts)
         self.form.changed.connect(self._validate)
         self._validate()
-
-    @property
-    def displayed_results(self) -> DisplayedResult:
-        """The plots, with the request as input."""
-        request = None if self._course is None else self._course.request
-        return DisplayedResult(self.picture.widget, request, self.form.value)
 
     def refresh(self) -> None:
         """Draw the partial results that arrived since the last tick."""
@@ -104,7 +99,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if request is None:
             return
         self._course = _Course(request, time.perf_counter())
-        self._validate()
+        self.result.show(request)
         self._take(())
         self.simulator.begin(request)
 
@@ -136,8 +131,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _validate(self) -> None:
         self._begin.setEnabled(self.form.value is not None)
-        request = None if self._course is None else self._course.request
-        self.picture.widget.setEnabled(self.form.value is not None and request in (None, self.form.value))
+        self.result.mark()
 
     def _hand_to_compare(self) -> None:
         if self.answer is not None:

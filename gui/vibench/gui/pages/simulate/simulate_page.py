@@ -42,13 +42,14 @@ class SimulatePage(Page):
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self, context, self._grow, self._end, self._say_progress)
         self.progress: SimulationProgress | None = None
-        self._request: SimulationRequest | None = None
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
         self.spectrum = DynamicsView(context, SPECTRUM, SpectrumPicture(context.theme))
         self.chain = DynamicsView(context, CHAIN, ChainPicture(context.theme))
         self._views = (self.branches, self.spectrum, self.chain)
+        self._result = DisplayedResult(lambda: self.form.value, self.plots)
+        self.displayed_results = (self._result, *(view.result for view in self._views))
         self._build()
         self.form.changed.connect(self._say_cost)
         context.scene_requested.connect(self.show_scene)
@@ -83,14 +84,6 @@ class SimulatePage(Page):
         self.context.settings.keep_text(SettingKey.SCENES, json.dumps(self.form.form.content()))
 
     @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """The curves, with their request as input."""
-        return (
-            DisplayedResult(self.plots, self._request, self.form.value),
-            *(view.displayed_results for view in self._views),
-        )
-
-    @property
     def styled_parts(self) -> tuple[QWidget, ...]:
         """The tabs, which are restyled one by one because each has as many widgets as a page."""
         return (self._parts, *self._views)
@@ -106,8 +99,7 @@ class SimulatePage(Page):
         )
         self.progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
-        self._request = request
-        self.plots.setEnabled(True)
+        self._result.show(request)
         self._bar.begin()
         self.simulator.begin(request)
 
@@ -139,7 +131,7 @@ class SimulatePage(Page):
     def _say_cost(self) -> None:
         request = self.form.value
         self._begin.setEnabled(request is not None)
-        self.plots.setEnabled(request is not None and self._request in (None, request))
+        self._result.mark()
         if request is None:
             self._cost.setText(f"✖ {self.form.complaint}")
             return

@@ -326,10 +326,7 @@ class TestPage(Page):
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
         self._refusal = ""
-        self._of: Asked = None
         self._requested_inputs: Asked = None
-        self._summary_of: Asked = None
-        self._predicted_of: Asked = None
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
@@ -340,6 +337,11 @@ class TestPage(Page):
         self.prediction = PredictionPlot(context.theme)
         self.prediction_note = SentenceLabel(rank="second")
         self.expectation = SentenceLabel(rank="second")
+        self._summed, self._previewed, self._predicted = self.displayed_results = (
+            DisplayedResult(lambda: self._inputs, self.summary),
+            DisplayedResult(lambda: self._inputs, self.plots, self.limits),
+            DisplayedResult(lambda: self._inputs, self.prediction, self.prediction_note),
+        )
         self.arm_button = push_button(
             "A&rm the test…  (Ctrl+Return)",
             "Arm, and describe what will be played; nothing plays before Start",
@@ -373,17 +375,6 @@ class TestPage(Page):
         return {FileKind.TEST: self.open_file}
 
     @property
-    def displayed_results(self) -> tuple[DisplayedResult, ...]:
-        """Table of loads, plots and prediction, each with the test and the rig as inputs."""
-        wanted = self._inputs
-        return (
-            DisplayedResult(self.summary, self._summary_of, wanted),
-            *(DisplayedResult(each, self._of, wanted) for each in (self.plots, self.limits)),
-            DisplayedResult(self.prediction, self._predicted_of, wanted),
-            DisplayedResult(self.prediction_note, self._predicted_of, wanted),
-        )
-
-    @property
     def _inputs(self) -> tuple[Measurement | None, Rig | None]:
         value = self.form.value
         nameless = None if value is None else value.model_copy(update=NAMELESS)
@@ -406,11 +397,11 @@ class TestPage(Page):
                 self.context.selection.prediction = seen
                 return
         self._preview, self._refusal = None, ""
-        # Mark the old prediction as outdated until the new one arrives.
-        self._requested_inputs = self._summary_of = inputs
+        self._requested_inputs = inputs
+        self._summed.show(inputs)
+        for result in (self._previewed, self._predicted):
+            result.mark()
         measurement, rig = inputs
-        for each in (self.limits, self.plots, self.prediction, self.prediction_note):
-            each.setEnabled(False)
         if measurement is None or rig is None:
             self._looking.drop()
             self._predicting.drop()
@@ -424,12 +415,10 @@ class TestPage(Page):
 
     def _show_preview(self, seen: MeasurementPreview) -> None:
         self._preview = seen
-        self._of = self._summary_of = self._requested_inputs
         self.summary.setText(summary_text(seen, self._refusal))
-        for each in (self.limits, self.plots):
-            each.setEnabled(True)
         self.plots.show_preview(seen)
         self.limits.show_checks(seen.checks)
+        self._previewed.show(self._requested_inputs)
 
     def _show_look_error(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
@@ -437,12 +426,10 @@ class TestPage(Page):
     def _on_result(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
         self.context.selection.prediction = seen
-        self._predicted_of = self._requested_inputs
+        self._predicted.show(self._requested_inputs)
         self._refusal = prediction.refusal
         if self._preview is not None:
             self.summary.setText(summary_text(self._preview, self._refusal))
-        self.prediction.setEnabled(True)
-        self.prediction_note.setEnabled(True)
         self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
         collides = f"Collides at {bands}." if bands else "No collision is predicted."
@@ -460,8 +447,7 @@ class TestPage(Page):
 
     def _on_failure(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
-        self.prediction_note.setEnabled(True)
-        self._predicted_of = self._requested_inputs
+        self._predicted.show(self._requested_inputs)
         self.prediction_note.setText(f"No prediction: {error}")
         self.expectation.setText("")
 
