@@ -148,15 +148,7 @@ class LimitMonitor:
     def note_change(self, text: str, sample: int) -> None:
         """Note a change of the specimen; if the plan requires it, the next block raises LimitExceeded."""
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
-            trip = LimitTrip(
-                channel=self._response.value,
-                quantity="change of the specimen",
-                value=1.0,
-                limit=0.0,
-                unit="1",
-                sample=sample,
-                time_s=sample / self._rate_hz,
-            )
+            trip = self._trip(self._response, "change of the specimen", 1.0, 0.0, "1", sample)
             self._change = LimitExceeded(
                 f"{text.rstrip('.')}. The run was ramped down and its recording kept, as on_changed_specimen "
                 "requires; check the specimen; if the change is intended, set a new baseline with "
@@ -181,51 +173,36 @@ class LimitMonitor:
         base = still if acceleration is None else self._base.follow(acceleration)
         is_settled = block.first_sample >= self._settled_sample
         if acceleration is not None:
-            yield self._acceleration(acceleration)
+            limit, what = self._rig.shaker.limits.acceleration_m_per_s2, "the base acceleration"
+            most = limit.value * self._limits.base_acceleration
+            yield _MonitoredQuantity(Role.BASE_ACCELERATION, what, acceleration, most, "m/s2", limit.source)
         if voltage is not None:
             yield from self._at_the_amplifier(voltage, base if is_settled else still)
-        integrated = (
-            [] if acceleration is None else [*self._at_the_base(base), self._table(acceleration, base)]
-        )
+        integrated = [] if acceleration is None else [*self._at_the_base(acceleration, base)]
         if self._response in rows:
             integrated.append(self._in_the_specimen(rows[self._response], base, block))
         if is_settled:
             yield from integrated
 
-    def _acceleration(self, acceleration: Samples) -> _MonitoredQuantity:
-        limit = self._rig.shaker.limits.acceleration_m_per_s2
-        allowed = limit.value * self._limits.base_acceleration
-        what = "the base acceleration"
-        return _MonitoredQuantity(Role.BASE_ACCELERATION, what, acceleration, allowed, "m/s2", limit.source)
-
-    def _at_the_base(self, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
-        shaker, share = self._rig.shaker.limits, self._limits
-        v, x = shaker.velocity_m_per_s, shaker.stroke_m
-        for what, values, limit, fraction, unit in (
-            ("the base velocity", base.velocity, v, share.base_velocity, "m/s"),
-            ("the stroke", base.displacement, x, share.stroke, "m"),
-        ):
-            yield _MonitoredQuantity(
-                Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source
-            )
-
-    def _table(self, acceleration: Samples, base: BaseMotion) -> _MonitoredQuantity:
-        """Return the force on the table: mass times acceleration plus the suspension's forces."""
-        shaker = self._rig.shaker
-        force = (
+    def _at_the_base(self, acceleration: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
+        """Yield motion of the base, and force on the table: of its mass and of the suspension."""
+        shaker, share, role = self._rig.shaker, self._limits, Role.BASE_ACCELERATION
+        velocity, stroke, force = (
+            shaker.limits.velocity_m_per_s,
+            shaker.limits.stroke_m,
+            shaker.limits.force_n,
+        )
+        most = velocity.value * share.base_velocity
+        yield _MonitoredQuantity(role, "the base velocity", base.velocity, most, "m/s", velocity.source)
+        most = stroke.value * share.stroke
+        yield _MonitoredQuantity(role, "the stroke", base.displacement, most, "m", stroke.source)
+        forces = (
             suspended_mass_kg(shaker) * acceleration
             + shaker.suspension_damping_ns_per_m * base.velocity
             + shaker.suspension_stiffness_n_per_m * base.displacement
         )
-        limit = shaker.limits.force_n
-        return _MonitoredQuantity(
-            Role.BASE_ACCELERATION,
-            "the force on the table",
-            force,
-            REACTION * limit.value * self._limits.force,
-            "N",
-            f"{REACTION:g} times: {limit.source}",
-        )
+        most, source = REACTION * force.value * share.force, f"{REACTION:g} times: {force.source}"
+        yield _MonitoredQuantity(role, "the force on the table", forces, most, "N", source)
 
     def _at_the_amplifier(self, voltage: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
         rig, share, role = self._rig, self._limits, Role.AMPLIFIER_VOLTAGE
@@ -271,15 +248,8 @@ class LimitMonitor:
         if peak <= monitored.limit:
             return
         sample = first_sample + int(np.argmax(np.abs(monitored.values) > monitored.limit))
-        trip = LimitTrip(
-            channel=monitored.role.value,
-            quantity=monitored.what.removeprefix("the "),
-            value=peak,
-            limit=monitored.limit,
-            unit=monitored.unit,
-            sample=sample,
-            time_s=sample / self._rate_hz,
-        )
+        quantity = monitored.what.removeprefix("the ")
+        trip = self._trip(monitored.role, quantity, peak, monitored.limit, monitored.unit, sample)
         raise LimitExceeded(
             f"{monitored.what} reached {peak:.4g} {monitored.unit}, above the limit of {monitored.limit:.4g} "
             f"{monitored.unit} ({monitored.source}), on {monitored.role.value} at {trip.time_s:.4f} s "
@@ -287,21 +257,20 @@ class LimitMonitor:
             trip,
         )
 
+    def _trip(
+        self, role: Role, quantity: str, value: float, limit: float, unit: str, sample: int
+    ) -> LimitTrip:
+        return LimitTrip(role.value, quantity, value, limit, unit, sample, sample / self._rate_hz)
+
     def _overload_error(self, block: Block, overload: Overload) -> LimitExceeded:
         roles = [channel.role.value for channel in self._channels]
         channel = self._channels[roles.index(overload.channel)]
         volts = block.volts[roles.index(overload.channel)]
         is_sensor = channel.full_scale_v < channel.range_v
         what = f"range of the {channel.sensor}" if is_sensor else f"range of {channel.physical}"
-        trip = LimitTrip(
-            channel=overload.channel,
-            quantity=what,
-            value=float(np.max(np.abs(volts))) * abs(channel.units_per_volt),
-            limit=channel.full_scale_v * abs(channel.units_per_volt),
-            unit=channel.unit,
-            sample=overload.first_sample,
-            time_s=overload.first_sample / self._rate_hz,
-        )
+        scale = abs(channel.units_per_volt)
+        value, limit = scale * float(np.max(np.abs(volts))), scale * channel.full_scale_v
+        trip = self._trip(channel.role, what, value, limit, channel.unit, overload.first_sample)
         return LimitExceeded(
             f"{overload.channel} was overloaded at sample {overload.first_sample} ({trip.time_s:.4f} s): it "
             f"reached {trip.value:.4g} {trip.unit}, the {what} is {trip.limit:.4g} {trip.unit}. The run was "
