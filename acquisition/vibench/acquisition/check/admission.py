@@ -11,7 +11,6 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from math import inf, log10
 from pathlib import Path
-from typing import assert_never
 
 from pydantic import ValidationError
 
@@ -123,28 +122,19 @@ def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, .
 
 
 def _change(now: Finding, before: Finding, since: str) -> Finding | None:
-    if now.number is None or before.number is None:
+    kind = LASTING.get(now.name)
+    if kind is None or now.number is None or before.number is None:
         return None
-    match LASTING.get(now.name):
-        case Lasting.GAIN:
-            return _change_finding(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
-        case Lasting.LEVEL if now.number > 0 and before.number > 0:
-            change_db = 20 * log10(now.number / before.number)
-            return _change_finding(now.name, change_db, _DECIBELS, DRIFT_DB, since)
-        case Lasting.CLOCK:
-            return _change_finding(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
-        case _:
+    change, unit, bounds = now.number - before.number, _DECIBELS, DRIFT_DB
+    if kind is Lasting.CLOCK:
+        unit, bounds = _PPM, CLOCK_PPM
+    elif kind is Lasting.LEVEL:
+        if min(now.number, before.number) <= 0:
             return None
-
-
-def _change_finding(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
+        change = 20 * log10(now.number / before.number)
+    expected = f"0 {unit} within {bounds.well:g} {unit}"
     finding = finding_of(
-        f"{name} since last time",
-        change,
-        unit,
-        f"0 {unit} within {bounds.well:g} {unit}",
-        bounds.verdict(abs(change)),
-        _ADVICE,
+        f"{now.name} since last time", change, unit, expected, bounds.verdict(abs(change)), _ADVICE
     )
     return finding.model_copy(update={"value": f"{change:+.2f} {unit} {since}"})
 
@@ -208,32 +198,25 @@ def require_fresh(
     """
     if bench.rig.plays_back:
         return None
-    match rule:
-        case CheckRule.WAIVED:
-            bench.last_check = last_check(bench.rig.name)
+    if rule is CheckRule.WAIVED:
+        bench.last_check = last_check(bench.rig.name)
+        return bench.last_check
+    if rule is CheckRule.FRESH:
+        complaint = _complaint_about_last_check(bench, clock())
+        if complaint is None:
             return bench.last_check
-        case CheckRule.NOW:
-            return _require_passed(check_bench(bench, folder, clock, switch))
-        case CheckRule.FRESH:
-            return _valid_check(bench, folder, clock, switch)
-        case _:
-            assert_never(rule)
-
-
-def _valid_check(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
-    last = last_check(bench.rig.name)
-    complaint = why_not(last, bench.rig, clock())
-    if last is not None and complaint is None:
-        bench.last_check = last
-        return last
-    match bench.kind:
-        case BenchKind.SIMULATED:
-            return _require_passed(check_bench(bench, folder, clock, switch))
-        case BenchKind.REAL:
+        if bench.kind is BenchKind.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; run 'vibench bench check --bench FILE', or measure with "
                 "'--check now', or skip the check with '--check waived'"
             )
+    result = check_bench(bench, folder, clock, switch)
+    if result.verdict is Verdict.FAIL:
+        raise CheckFailed(
+            f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "
+            "fix what 'vibench bench check' reports, and check again"
+        )
+    return result
 
 
 def require_on_record(bench: Bench) -> None:
@@ -243,12 +226,18 @@ def require_on_record(bench: Bench) -> None:
     """
     if bench.rig.plays_back:
         return
+    complaint = _complaint_about_last_check(bench, utc_now())
+    if complaint is not None and bench.kind is BenchKind.REAL:
+        raise CheckFailed(f"{complaint}. Nothing was armed; check the bench first")
+
+
+def _complaint_about_last_check(bench: Bench, now: datetime) -> str | None:
+    """Admit a bench by its last check, or return the reason why the check is not valid."""
     last = last_check(bench.rig.name)
-    complaint = why_not(last, bench.rig, utc_now())
+    complaint = why_not(last, bench.rig, now)
     if complaint is None:
         bench.last_check = last
-    elif bench.kind is BenchKind.REAL:
-        raise CheckFailed(f"{complaint}. Nothing was armed; check the bench first")
+    return complaint
 
 
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
@@ -263,15 +252,6 @@ def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
     if last.verdict is Verdict.FAIL:
         return f"{when} did not pass: {_failures(last)}"
     return None
-
-
-def _require_passed(result: CheckResult) -> CheckResult:
-    if result.verdict is Verdict.FAIL:
-        raise CheckFailed(
-            f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "
-            "fix what 'vibench bench check' reports, and check again"
-        )
-    return result
 
 
 def _output_after(result: CheckResult) -> str:
