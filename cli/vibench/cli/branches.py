@@ -18,7 +18,18 @@ from .range_option import axis_fields, range_of
 from .specimen_option import SPECIMEN, specimen_request
 
 FILE = "branches.h5"
-OPTIONS = ("method", *SPECIMEN, "harmonics", "places", "starts", "most_periods", "seed", "phase_of")
+OPTIONS = (
+    "method",
+    *SPECIMEN,
+    "harmonics",
+    "places",
+    "starts",
+    "most_periods",
+    "seed",
+    "phase_of",
+    "error",
+    "time_s",
+)
 
 
 def branches(
@@ -44,12 +55,6 @@ def branches(
     ] = None,
     *,
     options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
-    error: Annotated[
-        str | None, option("Error of harmonic balance, such as 1%; shooting is far more accurate.", "E")
-    ] = None,
-    time_limit: Annotated[
-        str | None, option("Time limit of the search, such as 20s; results are kept.", "T", name="--time")
-    ] = None,
     holdable: Annotated[
         Path | None,
         option("Report which unstable motions the feedback of this bench can hold.", "BENCH.toml"),
@@ -62,9 +67,7 @@ def branches(
         measured, drive = _drive(amplitude, frequency, like)
     else:
         measured, drive = _resonance(amplitude, frequency, like, resonance)
-    wishes = (("error", error), ("time_s", time_limit))
-    wish = {name: value for name, value in wishes if value is not None}
-    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive, **wish)
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
     if holdable is not None:
         lowest_hz = request.start if request.along is Parameter.FREQUENCY else request.frequency_hz
         if request.resonance_band_hz is not None:

@@ -24,7 +24,7 @@ from .range_option import range_of
 from .specimen_option import SPECIMEN, read_specimen, specimen_request
 
 FILE = "chain.h5"
-OPTIONS = (*SPECIMEN[1:], "duration_s", "settle_s", "exponent_s", "accuracy")
+OPTIONS = (*SPECIMEN[1:], "duration_s", "settle_s", "exponent_s", "accuracy", "error", "time_s")
 _SWEEP_ENDS = 2
 
 
@@ -48,12 +48,6 @@ def chain(
     ] = None,
     *,
     options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
-    error: Annotated[
-        str | None, option("Requested relative error of each transmissibility under a sine, such as 1%.", "E")
-    ] = None,
-    time_limit: Annotated[
-        str | None, option("Time limit of each steady run, such as 2s.", "T", name="--time")
-    ] = None,
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -66,7 +60,6 @@ def chain(
         others=tuple(read_specimen(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),
-        **{name: value for name, value in (("error", error), ("time_s", time_limit)) if value is not None},
     )
     from vibench.analysis.report import chain_figure
 

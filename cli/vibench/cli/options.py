@@ -128,9 +128,16 @@ def _help(model: "type[BaseModel]", name: str) -> str:
 
 
 def _plain(annotation: Any) -> Any:
-    """Return a field's type without limits and ``| None``; return str for a union, which the model parses."""
+    """Return a field's type without limits and ``| None``.
+
+    Return str for a union and for numbers with a unit, because the model parses their text.
+    """
+    from vibench.sim import NumberWith
+
     while get_origin(annotation) is Annotated:
-        annotation = get_args(annotation)[0]
+        annotation, *marks = get_args(annotation)
+        if any(isinstance(mark, NumberWith) for mark in marks):
+            return str
     if get_origin(annotation) in (Union, UnionType):
         parts = [part for part in get_args(annotation) if part is not NoneType]
         return _plain(parts[0]) if len(parts) == 1 else str

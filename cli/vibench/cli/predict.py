@@ -40,6 +40,7 @@ from .range_option import frequencies
 from .specimen_option import AXES, SPECIMEN, read_specimen
 
 AUTO: Literal["auto"] = "auto"
+OPTIONS = ("window_s", "accuracy", "error", "time_s")
 _SHOWN = 24
 """Largest number of result rows printed on the terminal; JSON and file contain all rows."""
 
@@ -62,8 +63,6 @@ def predict(
             "S",
         ),
     ] = None,
-    error: Annotated[str | None, option("Relative error to reach at each point, such as 1%.", "E")] = None,
-    time_limit: Annotated[str | None, option("Time limit per point, such as 2s.", "T", name="--time")] = None,
     workers: Workers = None,
     cluster: Cluster = None,
     out: Annotated[Path | None, option("Store the results in a file.", "FILE.h5")] = None,
@@ -72,14 +71,16 @@ def predict(
     as_json: AsJson = False,
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
-    options: Annotated[RequestOptions[Study], Fields(("window_s", "accuracy"))],
+    options: Annotated[RequestOptions[Study], Fields(OPTIONS)],
 ) -> None:
     """Predict Responses I and II of m0, and of the motion p of m1, over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, which it needs; give both")
     require_suffix(out or Path(), ".h5")
-    given = {"error": error, "time_s": time_limit, "budget_s": budget and _seconds("budget", budget)}
-    given["duration_s"] = duration if duration in (None, AUTO) else _seconds("duration", duration)
+    given = {
+        "budget_s": budget and _seconds("budget", budget),
+        "duration_s": duration if duration in (None, AUTO) else _seconds("duration", duration),
+    }
     typed = {name: value for name, value in given.items() if value is not None}
     _refuse_beside_target(typed.keys() | options.typed.keys())
     request = options.request(
