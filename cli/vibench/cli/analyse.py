@@ -17,7 +17,6 @@ from vibench.analysis import (
     AnalysisOptions,
     CampaignResults,
     FailedStep,
-    FrequencyResponseRequest,
     InvalidRequest,
     MagnitudeScale,
     Parameter,
@@ -32,11 +31,11 @@ from vibench.analysis import (
     recordings_in,
     update_model,
 )
-from vibench.analysis.dynamics import BranchDiagram, read_diagram
+from vibench.analysis.dynamics import read_diagram
 from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion, tracked_specimen
 from vibench.sim import Specimen
 from vibench.sim.background import Observer
-from vibench.sim.maps import MapResults, open_map
+from vibench.sim.maps import open_map
 
 from .options import Fields, RequestOptions, option
 from .output import ExitCode, bold, console, errors, print_json
@@ -59,12 +58,6 @@ class DrivenBy(StrEnum):
 
 NOISE = "Transmission of noise"
 OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "overlap", "confidence")
-
-
-class _Output(StrEnum):
-    OMITTED = "left out"
-    REPORTED = "told"
-    STORED = "kept"
 
 
 def analyse(
@@ -143,46 +136,15 @@ def analyse(
     """Analyse complete, interrupted or still growing recordings, and write one HTML report."""
     request = options.request().request
     request = replace(request, segment_s=segment, view=parse_view(quantity, scale))
-    if fit and specimen is not None:
-        raise InvalidRequest(
-            "--fit and --specimen were given; give only one of them, to select the overlaid specimen"
-        )
-    if free and not fit:
-        raise InvalidRequest(
-            f"--free {free[0].value} was given without --fit, which it needs; give both, or neither"
-        )
-    if keep and not hidden:
-        raise InvalidRequest("--keep was given without --hidden, which it needs; give both, or neither")
+    _require_partners(specimen, free, fit=fit, hidden=hidden, keep=keep)
     overlay = None if specimen is None else read_specimen(specimen).specimen()
     if hidden and overlay is not None:
         tracked_specimen(overlay)
-    overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
-    simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
-    _analyse(
-        recording,
-        out,
-        request,
-        overlays,
-        (simulation, draws),
-        fit=tuple(free or ()) if fit else None,
-        hidden=_Output.STORED if keep else _Output.REPORTED if hidden else _Output.OMITTED,
-        overlay=overlay,
-        as_json=as_json,
+    diagrams, opened_maps = (
+        [read_diagram(each) for each in branches or ()],
+        [open_map(each) for each in maps or ()],
     )
-
-
-def _analyse(
-    recording: Path,
-    out: Path | None,
-    request: FrequencyResponseRequest,
-    overlays: tuple[Sequence[BranchDiagram], Sequence[MapResults]],
-    simulated: tuple[Simulation, int],
-    *,
-    fit: Sequence[Parameter] | None,
-    hidden: _Output,
-    overlay: Specimen | None,
-    as_json: bool,
-) -> None:
+    simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
     # The path "." has no name, so use its absolute form.
     place = recording if recording.name.strip(".") else recording.resolve()
@@ -192,11 +154,10 @@ def _analyse(
     if has_report:
         room_for_folder(folder)
     with reading_bar() as observer:
-        simulation, draws = simulated
-        updated = None if fit is None else fit_specimen(paths, name, observer, fit)
+        updated = fit_specimen(paths, name, observer, free or ()) if fit else None
         overlay = overlay if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, overlay, draws)
-        motions = list(hidden_motions(results, overlay, observer, hidden))
+        motions = list(hidden_motions(results, overlay, observer, is_kept=keep)) if hidden else []
         others = {
             role: analyse_files(
                 having, f"{name}, {role}", Simulation.LEFT_OUT, request, observer, response=role
@@ -205,27 +166,18 @@ def _analyse(
         }
     if updated is not None:
         results = replace(results, model_sentences=(updated := updated.confirm(results)).sentences)
-    from vibench.analysis.report import check_warnings, findings, write_report
+    from vibench.analysis.report import write_report
 
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
-        known = {each.name: each.to_dict() for each in motions}
-        motion_document = {} if hidden is _Output.OMITTED else {"hidden_motion": known}
+        motion_document = {"hidden_motion": {each.name: each.to_dict() for each in motions}} if hidden else {}
         further = {"responses": {role: campaign_summary(each) for role, each in others.items()}}
         print_json({**campaign_summary(results), **fitted, **motion_document, **(further if others else {})})
     else:
-        for sentence in (
-            *findings(results),
-            *(f"warning: {each}" for each in check_warnings(results)),
-            *(s for each in motions for s in each.sentences),
-            *budget_sentences(results),
-            *(f"{role}: {text}" for role, each in others.items() for text in budget_sentences(each)),
-        ):
-            console.print(sentence)
+        _print_findings(results, motions, others)
     if results.results and has_report:
-        diagrams, maps = overlays
         place = free_path(folder / "report.html")
-        report = write_report(results, place, folder / "figures", diagrams, motions, maps)
+        report = write_report(results, place, folder / "figures", diagrams, motions, opened_maps)
         if not as_json:
             console.print("The report:", bold(report.resolve()))
         if updated is not None and updated.is_fitted:
@@ -236,6 +188,37 @@ def _analyse(
     if has_report:
         _write_reports(others, folder, as_json=as_json)
     complain_about(merge_results(name, (results, *others.values())))
+
+
+def _require_partners(
+    specimen: str | None, free: list[Parameter] | None, *, fit: bool, hidden: bool, keep: bool
+) -> None:
+    """Refuse an option that needs or excludes another one."""
+    if fit and specimen is not None:
+        raise InvalidRequest(
+            "--fit and --specimen were given; give only one of them, to select the overlaid specimen"
+        )
+    if free and not fit:
+        raise InvalidRequest(
+            f"--free {free[0].value} was given without --fit, which it needs; give both, or neither"
+        )
+    if keep and not hidden:
+        raise InvalidRequest("--keep was given without --hidden, which it needs; give both, or neither")
+
+
+def _print_findings(
+    results: CampaignResults, motions: Sequence[HiddenMotion], others: Mapping[str, CampaignResults]
+) -> None:
+    from vibench.analysis.report import check_warnings, findings
+
+    for sentence in (
+        *findings(results),
+        *(f"warning: {each}" for each in check_warnings(results)),
+        *(s for each in motions for s in each.sentences),
+        *budget_sentences(results),
+        *(f"{role}: {text}" for role, each in others.items() for text in budget_sentences(each)),
+    ):
+        console.print(sentence)
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
@@ -251,14 +234,14 @@ def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_js
 
 
 def hidden_motions(
-    results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Output
+    results: CampaignResults, specimen: Specimen | None, observer: Observer, *, is_kept: bool
 ) -> Iterator[HiddenMotion]:
     """Yield the estimated motion of m1 for each recording; print an error if the estimate fails."""
-    for facts in results.facts if hidden is not _Output.OMITTED else ():
+    for facts in results.facts:
         with open_recording(facts.path) as recording:
             try:
                 motion = hidden_motion(recording, specimen, observer=observer)
-                if hidden is _Output.STORED:
+                if is_kept:
                     keep_hidden_motion(recording, motion)
                 yield motion
             except AnalysisError as error:
