@@ -398,13 +398,6 @@ class TestStopLevels:
         assert run.outcome.cause is Cause.OPERATOR
         assert_ended_without_a_jump(bench)
 
-    def test_an_abort_takes_three_periods_of_the_suspension(self, bench, tmp_path):
-        _, shown = self.stop_at_levels(bench, tmp_path, StopLevel.ABORT)
-        ramp_s = shortest_ramp_s(bench.rig)
-        took_s = shown[-1].elapsed_s - shown[0].elapsed_s - LISTEN_S
-        assert took_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
-        assert_ended_without_a_jump(bench)
-
     def test_an_immediate_stop_acts_before_the_next_read(self, bench, tmp_path, monkeypatch):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         was_on = []
@@ -439,16 +432,6 @@ class TestStopLevels:
         # The last step of the ramp is below the level that counts as silence.
         assert 0.85 * shortest_ramp_s(bench.rig) < took_s <= shortest_ramp_s(bench.rig)
         assert "silence was measured" in said
-
-    def test_an_immediate_stop_acts_before_the_converter_is_queried(self, bench, tmp_path, monkeypatch):
-        run = run_upto(RunState.RECORDING, bench, tmp_path)
-        was_on = []
-        waiting = property(lambda _: was_on.append(bench.world.is_on) or 0)
-        monkeypatch.setattr(type(bench.digitizer), "waiting_samples", waiting)
-        run.switch.ask(by_operator(StopLevel.OFF))
-        list(run)
-        assert was_on
-        assert not any(was_on)
 
     def test_unread_samples_do_not_delay_a_stop(self, bench, tmp_path, monkeypatch):
         """A busy computer reads five times as fast as real time and has ten seconds of unread samples."""
