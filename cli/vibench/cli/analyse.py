@@ -77,12 +77,12 @@ def analyse(
     driven_by: Annotated[
         DrivenBy,
         option(
-            "voltage: simulate rig and specimen as an ensemble, valid in chaos; base: simulate the specimen "
+            "voltage: simulate rig and specimen several times, valid in chaos; base: simulate the specimen "
             "under the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
-        int, option("Runs of the ensemble for motions with contact.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS)
+        int, option("Simulation runs for motions with contact.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS)
     ] = DRAWS,
     fit: Annotated[
         bool,
@@ -117,7 +117,7 @@ def analyse(
     quantity: Annotated[
         str,
         option(
-            "Quantity of m0 / quantity of the base, such as velocity/acceleration; one word stands for both.",
+            "Quantity of m0 / quantity of the base, such as velocity/acceleration; one word applies to both.",
             "Q[/Q]",
             panel=NOISE,
         ),
@@ -126,7 +126,7 @@ def analyse(
         MagnitudeScale, option("Scale of magnitudes in figures.", panel=NOISE)
     ] = MagnitudeScale.LOG,
     segment: Annotated[
-        float | None, option("Segment length of spectra, in place of a resolution.", "S", panel=NOISE)
+        float | None, option("Segment length of spectra, instead of a resolution.", "S", panel=NOISE)
     ] = None,
     *,
     options: Annotated[RequestOptions[AnalysisOptions], Fields(OPTIONS, NOISE)],

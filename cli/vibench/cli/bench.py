@@ -99,7 +99,7 @@ def new(
     template: Annotated[
         str, option("Configuration with the proposed values.", "NAME|FILE", name="--from")
     ] = "lab_rig",
-    answers: Annotated[Path | None, option("Answers, in place of questions.", "FILE.toml")] = None,
+    answers: Annotated[Path | None, option("Answers to all questions.", "FILE.toml")] = None,
 ) -> None:
     """Set up a bench: ask questions, write its file, check wiring, noise, gains and signs (first at 5 mV).
 

@@ -43,7 +43,7 @@ def branches(
     like: Annotated[
         Path | None,
         option(
-            "Use range and level of this stepped sine or sweep, and overlay the branches.", "RECORDING.h5"
+            "Use range and level of this stepped sine or sweep, and draw it too.", "RECORDING.h5"
         ),
     ] = None,
     resonance: Annotated[
@@ -62,7 +62,7 @@ def branches(
     out: Annotated[Path | None, option("Folder for branches.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations."""
+    """Find stable and unstable periodic motions, and follow them over frequency or level to bifurcations."""
     if resonance is None:
         measured, drive = _drive(amplitude, frequency, like)
     else:

@@ -38,7 +38,7 @@ def chain(
             "F|START:STOP:STEP|START:STOP",
         ),
     ] = None,
-    recording: Annotated[Path | None, option("Drive the chain by a recorded motion.", "RECORDING.h5")] = None,
+    recording: Annotated[Path | None, option("Recorded base motion as drive.", "RECORDING.h5")] = None,
     specimen: Annotated[
         list[str] | None,
         option(

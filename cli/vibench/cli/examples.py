@@ -19,7 +19,7 @@ def examples(
     copy: Annotated[Path | None, option("Copy all files to DIR; nothing is overwritten.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List the shipped campaigns, rigs, studies and scripts, or copy them to be changed."""
+    """List the shipped campaigns, rigs, studies and scripts, or copy them for editing."""
     found = {folder: files_of(shipped_folder(folder)) for folder in FOLDERS}
     if copy is not None:
         copy_all(found, copy)

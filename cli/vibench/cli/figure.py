@@ -44,7 +44,7 @@ def figure(
     ],
     as_json: AsJson = False,
 ) -> None:
-    """Draw a figure of the paper; DIR/studies keeps the studies, and interrupted studies continue."""
+    """Draw a figure of the paper; a repeated command continues the studies stored in DIR/studies."""
     if as_json:
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)

@@ -130,7 +130,7 @@ def duration_s(text: str) -> float:
 NotifyCommand = Annotated[
     str | None,
     option(
-        "Command to run (no shell) at every fault and at the end; it gets the reason as JSON on stdin.",
+        "Command to run (no shell) at every fault and at the end; its stdin is the reason as JSON.",
         "COMMAND",
         name="--notify",
     ),

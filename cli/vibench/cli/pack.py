@@ -29,7 +29,7 @@ def pack(
     organisation_url: Annotated[str, option("Its home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Pack a folder of recordings as a Research Object Crate, described for a repository."""
+    """Pack a folder of recordings as a Research Object Crate for a data repository."""
     if as_json:
         leave_output_to_json()
     here = folder.resolve()

@@ -39,7 +39,7 @@ def reproduce(
     workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Test the claims of the paper; DIR/studies keeps the studies, and interrupted studies continue."""
+    """Test the claims of the paper; a repeated command continues the studies stored in DIR/studies."""
     from vibench.analysis.report import write_page
 
     from .paper.claims import SECTIONS

@@ -24,7 +24,7 @@ class ServedPace(StrEnum):
 
 
 def serve_rig(
-    bench: Annotated[Path | None, option("Rig with a table 'virtual'.", "BENCH")] = None,
+    bench: Annotated[Path | None, option("Hardware configuration with a table 'virtual'.", "BENCH")] = None,
     address: Annotated[
         str, option("Address at which the rig is served; other computers need a token.", "HOST:PORT")
     ] = "127.0.0.1:31763",

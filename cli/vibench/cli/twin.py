@@ -175,7 +175,7 @@ def twin(
     specimen: SpecimenOption = None,
     new_baseline: Annotated[bool, option("Start a new baseline after changing the specimen.")] = False,
 ) -> None:
-    """Estimate the hidden motion in an engine's measurement, and report changes of the specimen."""
+    """Estimate the hidden motion during a measurement, and report changes of the specimen."""
     lower_priority(NICE)  # the window and the measurement have priority
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client, ThreadPoolExecutor(1) as executor:

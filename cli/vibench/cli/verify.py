@@ -27,7 +27,7 @@ def verify(
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check all recordings of a folder, including every sample, and the journals against their seals."""
+    """Check the seals of all recordings and journals in a folder, including every sample."""
     found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
     counts = Counter(each.verdict for each in found)
     if as_json:

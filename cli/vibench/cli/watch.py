@@ -32,7 +32,7 @@ Pid = Annotated[int | None, option("Process id; by default the only engine.", "N
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
-    """Watch an engine from any terminal of the same user; Ctrl-C ends the watching, not the run."""
+    """Watch a running engine from any terminal of the same user; Ctrl-C does not stop the run."""
     if as_json:
         engines = [each for each in announced_engines() if pid in (None, each.pid)]
         others = [each for each in programs_without_engine() if pid in (None, each.pid)]
@@ -59,14 +59,14 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
 
 
 def stop(
-    pid: Annotated[int | None, option("Process id; default: all; for hold: the only one.", "N")] = None,
+    pid: Annotated[int | None, option("Process id; by default all (hold: the only one).", "N")] = None,
     level: Annotated[
         StopLevel,
         option("hold: until vibench release; ramp: as planned; abort: shortest ramp; off: at once."),
     ] = StopLevel.RAMP,
     reason: Annotated[str, option("Reason, stored in the recording.")] = "vibench stop",
 ) -> None:
-    """Stop everything that engines, scripts and checks drive on this computer, including campaigns."""
+    """Stop all engines, campaigns, scripts and bench checks that drive a shaker from this computer."""
     programs = programs_to_stop(pid)
     if level is StopLevel.HOLD and len(programs) > 1:
         programs = (the_engine(pid),)

@@ -69,7 +69,7 @@ class BranchRequest(SpecimenChoice):
     starts: Annotated[int, Field(ge=0, le=10_000)] = 12
     """Number of random initial states at each value; a larger number may find further isolated branches."""
     most_periods: Annotated[int, Field(ge=1, le=16)] = 4
-    """Longest period to search, in drive periods."""
+    """Longest period to search for, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random initial states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
