@@ -240,8 +240,8 @@ def section(curves, models, chaos):
         "",
         "- Newton's iteration finds stable periodic motions; a smaller requested error takes no longer.",
         "- In chaos, the result is a mean over runs from different initial conditions (*starts*). In 19 of",
-        "  20 cases, other starts change this mean by at most the stated error, which no accuracy level",
-        "  reduces. A single run may differ from the mean by far more.",
+        "  20 cases, other starts change this mean by at most the stated error. No accuracy level reduces",
+        "  this error. A single run may differ from the mean by far more.",
         "",
         (
             "| contact law, drive | requested error | stated error | time "

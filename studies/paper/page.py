@@ -23,10 +23,10 @@ Each claim of Gong et al. (2025) with a number or direction is checked by simula
 The paper states few tolerances, so the required bounds are our choice, some made after seeing first
 results. The bounds allow for chaos, whose responses differ by some per cent between runs.
 "Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
-If chaos lasts a random time, a claim is measured from several starts (initial states a millionth of the gap
-apart); its range is in parentheses. If a claim fails, options are tried in order until it holds.
-A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest Lyapunov
-exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
+If the duration of chaos is random, a claim is measured from several starts (initial states a millionth of the
+gap apart), and the range of the results is in parentheses. If a claim fails, options are tried in order until
+the claim holds. A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest
+Lyapunov exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
 DIR/report.html describes each measurement."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
