@@ -194,7 +194,8 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
         yield from (
             "",
-            f"In these motions, a stricter level divides the state error by less than {LEAST_GAIN:g}:",
+            "In these motions, a stricter level reduces the state error by less than a factor of",
+            f"{LEAST_GAIN:g}:",
             "",
             *lines,
         )

@@ -290,7 +290,7 @@ def write_section(page, curves):
         "",
         f"Measured with vibench {version('vibench')}.{absent}",
         "",
-        "The first row has vibench's simulated seconds per second, its error in brackets. Other cells have:",
+        "The first row has vibench's simulated seconds per second (error in brackets). Other cells have:",
         "",
         "1. the solver's time over vibench's time, for the same error (`never`: no tolerance reaches it);",
         "2. this ratio of times at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
