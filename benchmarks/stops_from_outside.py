@@ -27,9 +27,8 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import asdict, astuple, dataclass
-from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
 
@@ -41,12 +40,17 @@ from time_to_silence import (
     PLAN,
     RAMP_S,
     STATES,
-    Witness,
+    STOP_INTO,
+    WatchedRun,
     busy,
+    disk_full,
+    idle,
+    limit_resource,
+    no_descriptors,
     wall_rig,
 )
 
-from vibench.acquisition import CheckRule, StopLevel, load_toml, save_toml
+from vibench.acquisition import CheckRule, load_toml, save_toml
 from vibench.acquisition.engine import (
     Announcement,
     Attendant,
@@ -118,31 +122,24 @@ class CellResult:
         return ""
 
 
-class Laboratory:
-    """A virtual rig with its witness, and one process that drives it."""
+class Laboratory(WatchedRun):
+    """A rig under watch, and one process that drives it."""
 
     def __init__(self, virtual: VirtualRig, folder: Path, dead_man_s: float | None) -> None:
-        self.virtual = virtual
-        self.witness = Witness(virtual)
-        self.folder = folder
-        generator = {"resource": virtual.socket_resource, "dead_man_s": dead_man_s}
-        self.served = virtual.rig.model_copy(
-            update={
-                "virtual": None,
-                "daq": virtual.rig.daq.model_copy(update={"server": virtual.daq_address}),
-                "generator": virtual.rig.generator.model_copy(update=generator),
-            }
-        )
+        super().__init__(virtual, folder, dead_man_s=dead_man_s)
         self.rig_path, self.knobs_path = folder / "rig.json", folder / "knobs.toml"
         self.rig_path.write_text(self.served.model_dump_json())
-        sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=virtual.rig.knobs)
-        save_knob_sheet(sheet, self.knobs_path)
+        save_knob_sheet(self.sheet, self.knobs_path)
         self.recordings = folder / "0"
         self.process: subprocess.Popen[bytes]
         self.engine: Announcement
-        self.client: EngineClient
         self._terminal = -1
         self._said = b""
+
+    @property
+    def pid(self) -> int:
+        """Process id of the driving process."""
+        return self.engine.pid
 
     def start(self, subject: str) -> None:
         """Start the process that drives the rig."""
@@ -161,23 +158,10 @@ class Laboratory:
 
     def run_into(self, state: str, after_s: float) -> None:
         """Wait for a state of the run, and then for ``after_s``."""
-        first = "recording" if state in ("held", "ramping_down") else state
-        self.wait_until(lambda: self.run_state() == first and self.is_loud(), first)
-        if state == "held":
-            self.client.stop(StopLevel.HOLD)
-        elif state == "ramping_down":
-            self.client.stop(StopLevel.RAMP)
-        self.wait_until(lambda: self.run_state() == state, state)
+        first = "recording" if state in STOP_INTO else state
+        self.wait_until(lambda: self.is_in(first), first)
+        self.stop_into(state)
         time.sleep(after_s)
-
-    def run_state(self) -> str:
-        """Return the state of the run; empty without a run."""
-        run = self.client.status().run
-        return "" if run is None else run.run_state.value
-
-    def is_loud(self) -> bool:
-        """Return whether the output was loud within the last 0.1 s."""
-        return time.monotonic() - self.witness.last_loud_s < 0.1
 
     def type(self, keys: bytes) -> None:
         """Type keys on the terminal of the process."""
@@ -238,7 +222,7 @@ def stop_by_command(level: str) -> Callable[[Laboratory], int]:
 
 def send(number: int) -> Callable[[Laboratory], None]:
     """Return a function that sends a signal to the driving process."""
-    return lambda laboratory: os.kill(laboratory.engine.pid, number)
+    return lambda laboratory: os.kill(laboratory.pid, number)
 
 
 def press_twice(laboratory: Laboratory) -> None:
@@ -278,44 +262,27 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
 
 
 @contextmanager
-def limit_resource(pid: int, what: int, most: int) -> Iterator[None]:
-    """Set a resource limit of a process."""
-    resource.prlimit(pid, what, (most, resource.prlimit(pid, what)[1]))
-    yield
-
-
 def exhaust_memory(laboratory: Laboratory) -> Iterator[None]:
     """Limit the memory of the process to its present size."""
-    status = Path(f"/proc/{laboratory.engine.pid}/status").read_text()
+    status = Path(f"/proc/{laboratory.pid}/status").read_text()
     size_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmSize"))
-    with limit_resource(laboratory.engine.pid, resource.RLIMIT_AS, 1024 * size_kb):
+    with limit_resource(laboratory, resource.RLIMIT_AS, 1024 * size_kb):
         yield
 
 
-def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
-    """Prevent the process from opening more files."""
-    highest = max(int(each.name) for each in Path(f"/proc/{laboratory.engine.pid}/fd").iterdir())
-    with limit_resource(laboratory.engine.pid, resource.RLIMIT_NOFILE, highest + 1):
-        yield
-
-
-def disk_full(laboratory: Laboratory) -> Iterator[None]:
-    """Make every write to a file fail."""
-    with limit_resource(laboratory.engine.pid, resource.RLIMIT_FSIZE, 0):
-        yield
-
-
+@contextmanager
 def remove_folder(laboratory: Laboratory) -> Iterator[None]:
     """Remove the folder of the recordings."""
     shutil.rmtree(laboratory.recordings, ignore_errors=True)
     yield
 
 
-def with_shim(condition: str) -> Callable[[Laboratory], Iterator[None]]:
+def with_shim(condition: str) -> Callable[[Laboratory], AbstractContextManager[None]]:
     """Return a function that starts a condition of the shim."""
 
+    @contextmanager
     def make(laboratory: Laboratory) -> Iterator[None]:
-        flag = Path(os.environ["SHIM_FOLDER"]) / f"{condition}.{laboratory.engine.pid}"
+        flag = Path(os.environ["SHIM_FOLDER"]) / f"{condition}.{laboratory.pid}"
         flag.touch()
         yield
         flag.unlink()
@@ -323,20 +290,9 @@ def with_shim(condition: str) -> Callable[[Laboratory], Iterator[None]]:
     return make
 
 
-def nothing(_: Laboratory) -> Iterator[None]:
-    """Change nothing."""
-    yield
-
-
-def both_cores_busy(_: Laboratory) -> Iterator[None]:
-    """Run one busy program per core."""
-    with busy(_):  # type: ignore[arg-type]  # it looks at none of the laboratory
-        yield
-
-
-CONDITIONS: dict[str, Callable[[Laboratory], Iterator[None]]] = {
-    "idle": nothing,
-    "busy": both_cores_busy,
+CONDITIONS: dict[str, Callable[[Laboratory], AbstractContextManager[None]]] = {
+    "idle": idle,
+    "busy": busy,
     "memory exhausted": exhaust_memory,
     "no descriptors": no_descriptors,
     "no threads": with_shim("no threads"),
@@ -365,7 +321,7 @@ def measure_cell(laboratory: Laboratory, cell: Cell, after_s: float) -> CellResu
         stack.callback(laboratory.virtual.faults.heal)
         laboratory.start(cell.subject)
         laboratory.run_into(cell.state, after_s)
-        stack.enter_context(contextmanager(CONDITIONS[cell.condition])(laboratory))
+        stack.enter_context(CONDITIONS[cell.condition](laboratory))
         since_s = time.monotonic()
         code = happen(laboratory)
         took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
@@ -382,7 +338,7 @@ def kill_driver(laboratory: Laboratory, cell: Cell, after_s: float) -> CellResul
     laboratory.start(cell.subject)
     laboratory.run_into(cell.state, after_s)
     since_s = time.monotonic()
-    os.kill(laboratory.engine.pid, signal.SIGKILL)
+    os.kill(laboratory.pid, signal.SIGKILL)
     took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
     return CellResult(cell, took_s, DEAD_MAN_S + LATE_S, {}, load)
 

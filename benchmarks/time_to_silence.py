@@ -72,6 +72,8 @@ PLAN = {
         }
     ],
 }  # fmt: skip
+STOP_INTO = {"held": StopLevel.HOLD, "ramping_down": StopLevel.RAMP}
+"""States of a run that begin with a stop."""
 STATES = ("checking", "ramping_up", "settling", "recording", "held", "ramping_down")
 
 
@@ -101,22 +103,53 @@ class Witness:
         return self.last_loud_s
 
 
-class Laboratory:
-    """A virtual rig with its witness, and an engine that is started when needed."""
+class WatchedRun:
+    """A virtual rig with its witness, and the client of an engine that drives it."""
 
-    def __init__(self, virtual: VirtualRig, folder: Path) -> None:
+    client: EngineClient
+    pid: int
+    """Process id of the engine."""
+
+    def __init__(self, virtual: VirtualRig, folder: Path, **of_generator: object) -> None:
         self.virtual = virtual
         self.witness = Witness(virtual)
         self.folder = folder
+        generator = {"resource": virtual.socket_resource, **of_generator}
         self.served = virtual.rig.model_copy(
             update={
                 "virtual": None,
                 "daq": virtual.rig.daq.model_copy(update={"server": virtual.daq_address}),
-                "generator": virtual.rig.generator.model_copy(update={"resource": virtual.socket_resource}),
+                "generator": virtual.rig.generator.model_copy(update=generator),
             }
         )
+        self.sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=virtual.rig.knobs)
+
+    def run_state(self) -> str:
+        """Return the state of the run; empty without a run."""
+        run = self.client.status().run
+        return "" if run is None else run.run_state.value
+
+    def is_in(self, state: str) -> bool:
+        """Return whether the run is in a state and the output was loud within the last 0.1 s."""
+        return self.run_state() == state and time.monotonic() - self.witness.last_loud_s < 0.1
+
+    def stop_into(self, state: str) -> None:
+        """Request the stop that leads to a state, if one does, and wait for the state."""
+        if state in STOP_INTO:
+            self.client.stop(STOP_INTO[state])
+        self.wait_until(lambda: self.run_state() == state, state)
+
+    def wait_until(self, is_so: Callable[[], bool], what: str) -> None:
+        """Wait for a condition; raise an exception if it takes too long."""
+        raise NotImplementedError
+
+
+class Laboratory(WatchedRun):
+    """A rig under watch, and an engine that is started when needed."""
+
+    def __init__(self, virtual: VirtualRig, folder: Path) -> None:
+        super().__init__(virtual, folder)
         self.engine: EngineProcess | None = None
-        self.client: EngineClient
         self._number = 0
         self._attendant: Attendant | None = None
 
@@ -137,27 +170,18 @@ class Laboratory:
             threading.Thread(target=self._attend, args=(self._attendant,), daemon=True).start()
         self.client = EngineClient.attach(self.engine.address)
         if self.client.status().state in (EngineState.CLOSED, EngineState.FAULT):
-            knobs = self.virtual.rig.knobs
-            sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=knobs)
-            self.client.open(self.served, sheet)
+            self.client.open(self.served, self.sheet)
         self.wait_until(lambda: self.client.status().state is EngineState.READY, "an open bench")
 
     def run_into(self, state: str) -> None:
         """Start a recording and wait for a state; repeat, because a check may fail on a busy computer."""
         for _ in range(ATTEMPTS):
             self._begin()
-            first = "recording" if state in ("held", "ramping_down") else state
-            self.wait_until(
-                lambda: self.has_ended() or (self.run_state() == first and self.is_loud()),  # noqa: B023
-                first,
-            )
+            first = "recording" if state in STOP_INTO else state
+            self.wait_until(lambda: self.has_ended() or self.is_in(first), first)  # noqa: B023
             if not self.has_ended():
                 break
-        if state == "held":
-            self.client.stop(StopLevel.HOLD)
-        elif state == "ramping_down":
-            self.client.stop(StopLevel.RAMP)
-        self.wait_until(lambda: self.run_state() == state, state)
+        self.stop_into(state)
 
     def has_ended(self) -> bool:
         """Return whether the run has ended."""
@@ -172,15 +196,6 @@ class Laboratory:
         )
         self.client.arm_request(request)
         self.client.start()
-
-    def run_state(self) -> str:
-        """Return the state of the run; empty without a run."""
-        run = self.client.status().run
-        return "" if run is None else run.run_state.value
-
-    def is_loud(self) -> bool:
-        """Return whether the output was loud within the last 0.1 s."""
-        return time.monotonic() - self.witness.last_loud_s < 0.1
 
     def wait_until(self, is_so: Callable[[], bool], what: str) -> None:
         """Wait for a condition; exit with an error if it takes too long."""
@@ -257,13 +272,13 @@ CAUSES = {
 
 
 @contextmanager
-def idle(_: Laboratory) -> Iterator[None]:
+def idle(_: WatchedRun) -> Iterator[None]:
     """Change nothing."""
     yield
 
 
 @contextmanager
-def busy(_: Laboratory) -> Iterator[None]:
+def busy(_: WatchedRun) -> Iterator[None]:
     """Run one busy process per core."""
     with ExitStack() as stack:
         for _ in range(os.cpu_count() or 1):
@@ -288,30 +303,29 @@ def connections(laboratory: Laboratory) -> Iterator[None]:
 
 
 @contextmanager
-def limit_resource(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
+def limit_resource(run: WatchedRun, what: int, most: int) -> Iterator[None]:
     """Set a resource limit of the engine's process, and restore it at the end."""
-    pid = laboratory.pid
-    before = resource.prlimit(pid, what)
-    resource.prlimit(pid, what, (most, before[1]))
+    before = resource.prlimit(run.pid, what)
+    resource.prlimit(run.pid, what, (most, before[1]))
     try:
         yield
     finally:
         with suppress(ProcessLookupError):
-            resource.prlimit(pid, what, before)
+            resource.prlimit(run.pid, what, before)
 
 
 @contextmanager
-def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
+def no_descriptors(run: WatchedRun) -> Iterator[None]:
     """Prevent the engine from opening more files."""
-    highest = max(int(each.name) for each in Path(f"/proc/{laboratory.pid}/fd").iterdir())
-    with limit_resource(laboratory, resource.RLIMIT_NOFILE, highest + 1):
+    highest = max(int(each.name) for each in Path(f"/proc/{run.pid}/fd").iterdir())
+    with limit_resource(run, resource.RLIMIT_NOFILE, highest + 1):
         yield
 
 
 @contextmanager
-def disk_full(laboratory: Laboratory) -> Iterator[None]:
+def disk_full(run: WatchedRun) -> Iterator[None]:
     """Make every write to a file fail."""
-    with limit_resource(laboratory, resource.RLIMIT_FSIZE, 0):
+    with limit_resource(run, resource.RLIMIT_FSIZE, 0):
         yield
 
 
