@@ -84,11 +84,6 @@ class BranchContinuation(AbstractFeedback):
         perturbed = self.perturbed_periods + _BEFORE if self.perturbation else 0
         return self.most_points * (_NO_TRIES * look_s + self.record_s + perturbed / self.low_hz)
 
-    @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """The single base level of the branch."""
-        return (self.base_level,)
-
     def segment(self, number: int, frequency_hz: float) -> Segment:
         """Return the segment in which a point is recorded."""
         return Segment(SegmentLabel.BRANCH, {"point": number, "frequency_hz": frequency_hz})

@@ -27,11 +27,6 @@ class HeldDwell(FixedSine, AbstractFeedback):
     """Interval at which the level is measured, and corrected if needed, during the recording [s]."""
 
     @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry: the base level that feedback holds."""
-        return (self.base_level,)
-
-    @property
     def playing_s(self) -> float:
         """Duration of the longest wait for settling and of the recording [s]."""
         return self.settling.longest_wait_s + self.duration_s

@@ -27,11 +27,6 @@ class HeldSweep(MovingSine, AbstractFeedback):
     """Criteria by which the motion counts as settled before the sweep."""
 
     @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry: the base level that feedback holds."""
-        return (self.base_level,)
-
-    @property
     def playing_s(self) -> float:
         """Duration of the longest wait at the start and of the sweep [s]."""
         return self.settling.longest_wait_s + self.duration_s

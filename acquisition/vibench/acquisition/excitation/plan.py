@@ -291,8 +291,12 @@ class AbstractFeedback(AbstractExcitation):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; if empty, no level of a sine is held."""
-        return ()
+        """Levels of the base to be held, in the order played; if empty, no level of a sine is held.
+
+        Here: the field ``base_level``, if the excitation has it.
+        """
+        level: BaseLevel | None = getattr(self, "base_level", None)
+        return () if level is None else (level,)
 
     @property
     def level_text(self) -> str:

@@ -35,11 +35,6 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """Longest search for one jump [s]; after it, the last frequency interval is the result."""
 
     @property
-    def held_levels(self) -> tuple[BaseLevel, ...]:
-        """One entry, the level of the base to be held; empty if the amplitude setting is constant."""
-        return () if self.base_level is None else (self.base_level,)
-
-    @property
     def playing_s(self) -> float:
         """Duration of all steps with the longest waits, and of all searches [s]."""
         passes = sum(1 for _ in self.passes())
