@@ -13,169 +13,92 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 11.0
 """
 
-from ..excitation.dwell import Dwell
-from ..excitation.held_dwell import HeldDwell
-from ..excitation.held_noise import HeldNoise, SpectrumPoint
-from ..excitation.held_response import HeldResponse
-from ..excitation.held_sweep import HeldSweep
+from ..excitation.dwell import Dwell as Dwell
+from ..excitation.held_dwell import HeldDwell as HeldDwell
+from ..excitation.held_noise import HeldNoise as HeldNoise, SpectrumPoint as SpectrumPoint
+from ..excitation.held_response import HeldResponse as HeldResponse
+from ..excitation.held_sweep import HeldSweep as HeldSweep
 from ..excitation.kinds import (
-    EXCITATION_KINDS,
-    Excitation,
-    ExcitationKind,
-    excitation_text,
-    present_word,
-    rows_by_kind,
+    EXCITATION_KINDS as EXCITATION_KINDS,
+    Excitation as Excitation,
+    ExcitationKind as ExcitationKind,
+    excitation_text as excitation_text,
+    present_word as present_word,
+    rows_by_kind as rows_by_kind,
 )
-from ..excitation.odd_multisine import OddMultisine
-from ..excitation.plan import AbstractExcitation, Family, LeadIn, SignalPreview
-from ..excitation.resonance_tracking import ResonanceTracking
-from ..excitation.settled_sine import SettledSine
-from ..excitation.sine_sweep import Hold, SineSweep
-from ..excitation.stepped_level import SteppedLevel
-from ..excitation.stepped_sine import FrequencySteps, SteppedSine
-from ..excitation.steps import Approach, Direction, Segment, Step
-from ..excitation.streamed_noise import StreamedNoise
-from ..excitation.white_noise import WhiteNoise
-from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, distinct_drives, load_campaign
+from ..excitation.odd_multisine import OddMultisine as OddMultisine
+from ..excitation.plan import (
+    AbstractExcitation as AbstractExcitation,
+    Family as Family,
+    LeadIn as LeadIn,
+    SignalPreview as SignalPreview,
+)
+from ..excitation.resonance_tracking import ResonanceTracking as ResonanceTracking
+from ..excitation.settled_sine import SettledSine as SettledSine
+from ..excitation.sine_sweep import Hold as Hold, SineSweep as SineSweep
+from ..excitation.stepped_level import SteppedLevel as SteppedLevel
+from ..excitation.stepped_sine import FrequencySteps as FrequencySteps, SteppedSine as SteppedSine
+from ..excitation.steps import Approach as Approach, Direction as Direction, Segment as Segment, Step as Step
+from ..excitation.streamed_noise import StreamedNoise as StreamedNoise
+from ..excitation.white_noise import WhiteNoise as WhiteNoise
+from ._campaign import (
+    BYTES_PER_SAMPLE as BYTES_PER_SAMPLE,
+    Campaign as Campaign,
+    Retryable as Retryable,
+    RetryPolicy as RetryPolicy,
+    distinct_drives as distinct_drives,
+    load_campaign as load_campaign,
+)
 from ._limits import (
-    LimitCheck,
-    LimitSide,
-    check_amplitude_vpp,
-    check_phases,
-    check_phasors,
-    nearest_expected,
-    require_within_limits,
-    run_check_vpp,
-    shortest_ramp_s,
+    LimitCheck as LimitCheck,
+    LimitSide as LimitSide,
+    check_amplitude_vpp as check_amplitude_vpp,
+    check_phases as check_phases,
+    check_phasors as check_phasors,
+    nearest_expected as nearest_expected,
+    require_within_limits as require_within_limits,
+    run_check_vpp as run_check_vpp,
+    shortest_ramp_s as shortest_ramp_s,
 )
-from ._loads import BaseMotion, base_motion, needed_vpp, predicted_loads
-from ._loop_time import (
-    LOOK_PERIODS,
-    look_s,
-    loop_time_s,
+from ._loads import (
+    BaseMotion as BaseMotion,
+    base_motion as base_motion,
+    needed_vpp as needed_vpp,
+    predicted_loads as predicted_loads,
 )
+from ._loop_time import LOOK_PERIODS as LOOK_PERIODS, look_s as look_s, loop_time_s as loop_time_s
 from ._measurement_preview import (
-    MeasurementPreview,
-    preview_measurement,
+    MeasurementPreview as MeasurementPreview,
+    preview_measurement as preview_measurement,
 )
 from ._schedule import (
-    CHECK_FREQUENCY_HZ,
-    CHECK_QUIET_S,
-    CHECK_S,
-    FEWEST_STAIRS,
-    HUSH_S,
-    DriveSource,
-    InRunLimits,
-    Measurement,
-    OnChange,
-    OnOverload,
-    Phase,
-    Point,
-    RunState,
-    ScanPoint,
-    drive_source_of,
-    duration_s,
-    half_cosine,
-    known_phases,
-    lead_in_s,
-    lowest_setting_vpp,
-    measuring_s,
-    phases,
-    ramp,
-    require_played,
-    stairs,
+    CHECK_FREQUENCY_HZ as CHECK_FREQUENCY_HZ,
+    CHECK_QUIET_S as CHECK_QUIET_S,
+    CHECK_S as CHECK_S,
+    FEWEST_STAIRS as FEWEST_STAIRS,
+    HUSH_S as HUSH_S,
+    DriveSource as DriveSource,
+    InRunLimits as InRunLimits,
+    Measurement as Measurement,
+    OnChange as OnChange,
+    OnOverload as OnOverload,
+    Phase as Phase,
+    Point as Point,
+    RunState as RunState,
+    ScanPoint as ScanPoint,
+    drive_source_of as drive_source_of,
+    duration_s as duration_s,
+    half_cosine as half_cosine,
+    known_phases as known_phases,
+    lead_in_s as lead_in_s,
+    lowest_setting_vpp as lowest_setting_vpp,
+    measuring_s as measuring_s,
+    phases as phases,
+    ramp as ramp,
+    require_played as require_played,
+    stairs as stairs,
 )
-from ._sweep import (
-    Range,
-    RangeSpacing,
-    SweepAxis,
-)
-from ._until import FEWEST_REALISATIONS, LOOK_FACTOR, Until
+from ._sweep import Range as Range, RangeSpacing as RangeSpacing, SweepAxis as SweepAxis
+from ._until import FEWEST_REALISATIONS as FEWEST_REALISATIONS, LOOK_FACTOR as LOOK_FACTOR, Until as Until
 
-__all__ = [
-    "BYTES_PER_SAMPLE",
-    "CHECK_FREQUENCY_HZ",
-    "CHECK_QUIET_S",
-    "CHECK_S",
-    "EXCITATION_KINDS",
-    "FEWEST_REALISATIONS",
-    "FEWEST_STAIRS",
-    "HUSH_S",
-    "LOOK_FACTOR",
-    "LOOK_PERIODS",
-    "AbstractExcitation",
-    "Approach",
-    "BaseMotion",
-    "Campaign",
-    "Direction",
-    "DriveSource",
-    "Dwell",
-    "Excitation",
-    "ExcitationKind",
-    "Family",
-    "FrequencySteps",
-    "HeldDwell",
-    "HeldNoise",
-    "HeldResponse",
-    "HeldSweep",
-    "Hold",
-    "InRunLimits",
-    "LeadIn",
-    "LimitCheck",
-    "LimitSide",
-    "Measurement",
-    "MeasurementPreview",
-    "OddMultisine",
-    "OnChange",
-    "OnOverload",
-    "Phase",
-    "Point",
-    "Range",
-    "RangeSpacing",
-    "ResonanceTracking",
-    "RetryPolicy",
-    "Retryable",
-    "RunState",
-    "ScanPoint",
-    "Segment",
-    "SettledSine",
-    "SignalPreview",
-    "SineSweep",
-    "SpectrumPoint",
-    "Step",
-    "SteppedLevel",
-    "SteppedSine",
-    "StreamedNoise",
-    "SweepAxis",
-    "Until",
-    "WhiteNoise",
-    "base_motion",
-    "check_amplitude_vpp",
-    "check_phases",
-    "check_phasors",
-    "distinct_drives",
-    "drive_source_of",
-    "duration_s",
-    "excitation_text",
-    "half_cosine",
-    "known_phases",
-    "lead_in_s",
-    "load_campaign",
-    "look_s",
-    "loop_time_s",
-    "lowest_setting_vpp",
-    "measuring_s",
-    "nearest_expected",
-    "needed_vpp",
-    "phases",
-    "predicted_loads",
-    "present_word",
-    "preview_measurement",
-    "ramp",
-    "require_played",
-    "require_within_limits",
-    "rows_by_kind",
-    "run_check_vpp",
-    "shortest_ramp_s",
-    "stairs",
-]
+__all__ = [name for name in globals() if not name.startswith("_")]
