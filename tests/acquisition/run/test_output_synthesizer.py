@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import ConfigurationError
+from vibench.acquisition.excitation.gaussian_band import GaussianBand
 from vibench.acquisition.excitation.steps import Stream, Tone, Waveform
-from vibench.acquisition.excitation.streamed_noise import GaussianBand
 from vibench.acquisition.plan import Phase, RunState
 from vibench.acquisition.run.stream_drive import RELEASE_S, OutputSynthesizer
 

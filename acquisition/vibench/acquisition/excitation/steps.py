@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar, Protocol, TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ..instruments import Samples, Sweep
 from ..recording import SegmentLabel
+from .gaussian_band import GaussianBand
 
 
 @dataclass(frozen=True)
@@ -33,30 +34,11 @@ class Waveform:
     repetition_hz: float
 
 
-class SampleSource(Protocol):
-    """A Gaussian noise signal that never repeats, computed on demand."""
-
-    @property
-    def band_start_hz(self) -> float:
-        """Lower edge of the noise's flat spectrum [Hz]."""
-
-    @property
-    def band_stop_hz(self) -> float:
-        """Upper edge of the noise's flat spectrum [Hz]."""
-
-    @property
-    def crest_factor(self) -> float:
-        """Peak value of the noise divided by its rms value."""
-
-    def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
-        """Return samples ``first`` to ``first + count - 1``, from -1 to 1; identical at every call."""
-
-
 @dataclass(frozen=True, eq=False)
 class Stream:
     """A signal that does not repeat, for an analogue output: the full range is the amplitude setting."""
 
-    source: SampleSource
+    source: GaussianBand
 
 
 Play: TypeAlias = Tone | Waveform | Stream | Sweep

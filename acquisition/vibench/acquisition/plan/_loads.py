@@ -13,6 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..excitation.gaussian_band import CREST_FACTOR, GaussianBand
 from ..excitation.kinds import Excitation
 from ..excitation.multisine import held_lines
 from ..excitation.steps import (
@@ -20,7 +21,6 @@ from ..excitation.steps import (
     Play,
     RelativeSetting,
     RmsSetting,
-    SampleSource,
     Stream,
     Tone,
     Waveform,
@@ -93,10 +93,10 @@ def terminal_volts(excitation: Excitation, rig: Rig) -> float:
     return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
 
 
-def _split_by_kind(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
+def _split_by_kind(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[GaussianBand]]:
     tones: set[Tone] = set()
     waveforms: list[Waveform] = []
-    sources: list[SampleSource] = []
+    sources: list[GaussianBand] = []
     for play in plays:
         match play:
             case Tone():
@@ -143,7 +143,7 @@ class _BroadPlay:
         return self._follow(lambda hz: self._terminal_v * transfer(quantity, hz))
 
 
-def _band_hz(source: SampleSource) -> Floats:
+def _band_hz(source: GaussianBand) -> Floats:
     return np.linspace(source.band_start_hz, source.band_stop_hz, BAND_POINTS, dtype=np.float64)
 
 
@@ -160,9 +160,9 @@ def _of_waveform(lines: ComplexArray, repetition_hz: float, number: int, transfe
     return Load(peak, rms, f"in realisation {number}")
 
 
-def _of_source(source: SampleSource, transfer: Transfer) -> Load:
+def _of_source(source: GaussianBand, transfer: Transfer) -> Load:
     gain = float(np.sqrt(np.mean(np.abs(transfer(_band_hz(source))) ** 2)))
-    return Load(gain, gain / source.crest_factor, "streamed noise")
+    return Load(gain, gain / CREST_FACTOR, "streamed noise")
 
 
 def needed_vpp(
