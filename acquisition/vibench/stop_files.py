@@ -1,10 +1,10 @@
-"""Stop requests as files for a program that drives a bench, and the result reported to their sender.
+"""Files by which one program asks another to stop its drive, and the result reported to the sender.
 
 A file ``PID.START.stop-LEVEL`` in the folder of engines stops the process with number PID and start time
-START. The program renames the file to ``.taken-LEVEL`` when it obeys, updates its time while it ramps down,
-and renames it to ``.silent-LEVEL`` when its output has been read back as off. A missing file confirms
-nothing: somebody may have emptied the folder. This module imports only a small part of the standard library,
-so that `vibench stop` starts without delay.
+START. The program renames the file to ``.taken-LEVEL`` when it obeys, and updates the file's time while it
+ramps down. When the generator's output reads back as off, it renames the file to ``.silent-LEVEL``. A missing
+file confirms nothing: somebody may have emptied the folder. This module imports only a small part of the
+standard library, so that `vibench stop` starts without delay.
 """
 
 import os
@@ -16,7 +16,7 @@ LONGEST_REASON = 500
 TAKEN_S = 1.0
 """Longest time for a program to accept a stop [s]; programs check 20 times per second."""
 HEEDED_S = 5.0
-"""Longest time without progress until the output is off [s]; a block plus a setting take some tenths."""
+"""Longest time without progress until the output is off [s]; a block and a setting take less than 1 s."""
 LOOK_S = 0.01
 SWITCH_OFF = "The generator may still be driving: switch the amplifier off, then open the bench again"
 
@@ -47,9 +47,9 @@ def write_stop_file(stop: str, reason: str) -> None:
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         os.write(descriptor, reason.encode(errors="replace")[:LONGEST_REASON])
-        if hasattr(os, "fchown"):  # root may stop the program of a user, who must read and update the file
+        if hasattr(os, "fchown"):  # if root stops a user's program, the user must own the file to update it
             os.fchown(descriptor, os.stat(os.path.dirname(stop)).st_uid, -1)  # noqa: PTH116, PTH120
-    except OSError:  # such as a full disk: the file name is sufficient
+    except OSError:  # for example a full disk; the file's name alone requests the stop
         pass
     finally:
         os.close(descriptor)
@@ -62,7 +62,7 @@ def write_stop_file(stop: str, reason: str) -> None:
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
-    """Return the result of a stop request, once the program has obeyed or failed to obey."""
+    """Wait until the program has obeyed a stop request, or failed to obey; return the result."""
     written_ns, give_up_s = _modified_ns(stop) or 0, time.monotonic() + TAKEN_S
     while _modified_ns(stop) is not None:
         if time.monotonic() > give_up_s:

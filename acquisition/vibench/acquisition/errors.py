@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 class AcquisitionError(Exception):
-    """Base class of all errors between plan and recording.
+    """Base class of all errors from reading a plan to writing its recording.
 
     The text is one or two sentences for the person at the bench: what happened (given and allowed value),
     what the program did about it, and what to do next.
@@ -39,7 +39,7 @@ class BrokenPromise(InstrumentError):
 
 
 class SettingRefused(InstrumentError):
-    """The instrument uses a value other than the requested one, as read back from it."""
+    """The value read back from the instrument differs from the requested value."""
 
 
 class DriveLate(AcquisitionError):
@@ -51,7 +51,7 @@ class RunStalled(AcquisitionError):
 
 
 class DataLost(AcquisitionError):
-    """Samples were overwritten before they were read; the recording has a gap and ends there."""
+    """Samples were overwritten before they were read; the recording ends at this gap."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class LimitTrip:
 class LimitExceeded(AcquisitionError):
     """A plan, or the running measurement, exceeds a limit of shaker, amplifier or specimen.
 
-    The text names the quantity, its value, the limit, and the source of the limit. ``trip`` contains the
-    values if a running measurement was stopped; it is None for a refused plan.
+    The text names the quantity, its value, the limit, and the source of the limit. If a running measurement
+    was stopped, ``trip`` contains the limit and the measured value; it is None for a refused plan.
     """
 
     def __init__(self, text: str, trip: LimitTrip | None = None) -> None:
