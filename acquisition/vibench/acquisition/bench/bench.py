@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Number of characters read from a lock file. Errors quote them, and any user may write to the file."""
+"""Text that a lock file may contain. Errors quote it, and any user may write to the file."""
 
 
 class BenchLock:
@@ -75,7 +75,7 @@ class BenchLock:
     def of(cls, rig: Rig) -> "BenchLock":
         """Lock the instruments of a rig, and return the locks.
 
-        Raises InstrumentBusy when another process has locked one of them, or a lock file cannot be locked.
+        Raises InstrumentBusy when another process has locked an instrument, or a lock file cannot be locked.
         """
         lock = cls([])
         if rig.virtual is not None or rig.plays_back:
@@ -361,7 +361,7 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
-        note_open_bench(simulated + next(_instruments(rig)))  # names the generator, as rig names may repeat
+        note_open_bench(simulated + next(_instruments(rig)))  # the generator; two rigs may share a name
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)
@@ -394,7 +394,7 @@ def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
 
 
 def _kind(rig: Rig, digitizer: Digitizer) -> BenchKind:
-    """Return SIMULATED if the rig is virtual or plays a recording (nothing can be energised), else REAL."""
+    """Return SIMULATED if no hardware can be driven (the rig is virtual or plays a recording), else REAL."""
     is_real = rig.virtual is None and not digitizer.identity.origin
     return BenchKind.REAL if is_real else BenchKind.SIMULATED
 
