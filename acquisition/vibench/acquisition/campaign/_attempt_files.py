@@ -66,7 +66,7 @@ def read_attempt(path: Path, measurement: Measurement, depth: SealDepth) -> Kept
 
 
 def is_made_by(recording: Recording, measurement: Measurement) -> bool:
-    """Return whether the plan of a recording, as this version reads it, equals ``measurement``."""
+    """Return whether the plan of a recording, as read by this version of vibench, equals ``measurement``."""
     try:
         return Measurement.model_validate(recording.plan) == measurement
     except ValidationError:

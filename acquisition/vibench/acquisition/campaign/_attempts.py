@@ -57,7 +57,7 @@ Reopen = Callable[[], Bench]
 """Function that closes and reopens a bench that has lost an instrument; may raise AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
-"""Interval between two searches for a lost instrument, and pause before another attempt [s]."""
+"""Interval between searches for a lost instrument, and pause before another attempt at a point [s]."""
 
 
 @dataclass
@@ -167,7 +167,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # Simulated time of a virtual rig passes faster: use the longer of real and simulated time.
+                # Simulated time may pass faster than real time: use the longer of the two waits.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self.policy.reopen_for_s or self.switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

@@ -52,7 +52,7 @@ class CatalogueEntry:
     """Catalogue entry of one recording. Unknown values are empty or None."""
 
     path: str
-    """Path of the recording relative to the folder, with ``/``."""
+    """Path of the recording relative to the folder, with ``/`` as separator."""
     name: str
     """Name of the measurement."""
     state: str
@@ -172,7 +172,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Version of the catalogue. It increases when the fields of an entry change; other versions are rebuilt."""
+"""Version of the catalogue. A change of the fields increases it; catalogues of other versions are rebuilt."""
 WAIT_S = 10.0
 """Longest wait for another program that writes the same catalogue [s]."""
 
@@ -245,8 +245,8 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
         except OSError:  # for example a link to itself; the entry states that the file cannot be read
             size_bytes, stamp = 0, ""
         where = place_below(folder, path)
-        # The state of a .part file changes to "interrupted" when its program has ended, although the file
-        # stays the same.
+        # When the program that writes a .part file ends, the recording becomes "interrupted", although the
+        # file stays the same.
         if known.pop(where, None) != stamp or path.suffix == PART_SUFFIX:
             entry = read_entry(where, path, size_bytes)
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
@@ -261,7 +261,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
 
 
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
-    """Return a value that changes with any write to the file, or with the seals of the file in journals.
+    """Return a value that changes when the file is written, or when a journal's seal of the file changes.
 
     The value includes the file system's time of change, which programs cannot set back.
     """
@@ -302,13 +302,13 @@ class VerifiedRecording:
     """Result of comparing one file with its seal."""
 
     path: str
-    """Path relative to the folder, with ``/``; for a single file, its name."""
+    """Path relative to the folder, with ``/`` as separator; for a single file, its name."""
     verdict: str
     """State of the seal: value of `recording.SealState`, or ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]
-    """Verdict on each saved result, by its name."""
+    """Verdict on each saved result, keyed by the name of the result."""
 
     @property
     def is_bad(self) -> bool:

@@ -78,7 +78,7 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
 
 
 def reason_code_of(error: AcquisitionError) -> ReasonCode:
-    """Return the code in the journal for an error."""
+    """Return the journal's reason code for an error."""
     return next(
         (reason_code for kind, reason_code in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT
     )
@@ -159,7 +159,7 @@ class FinishedPoint:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """All completed points in the order of the campaign, including ``point`` and those before a resume."""
+    """All completed points in the order of the campaign, including ``point`` and earlier sessions."""
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]

@@ -106,7 +106,7 @@ class CampaignLog(ClosedOnLeaving):
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval of status lines between events [s]; they take half a megabyte per night."""
+"""Interval between status lines while a point runs [s]; the lines take half a megabyte per night."""
 LEFT_ALONE_S = 1.0
 """Longest wait on closing for the last lines to be written [s]."""
 
@@ -174,7 +174,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _remaining_time(self) -> timedelta:
-        """Return the planned remaining time, scaled by this session's ratio of real to planned time [s]."""
+        """Return the planned remaining time, multiplied by this session's ratio of real to planned time."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
@@ -282,7 +282,7 @@ class CommandMessenger:
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with ``document`` as input; return a clause if it fails, empty text on success."""
+        """Run the command with ``document`` as input; return a clause on its failure, or empty text."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,

@@ -1,4 +1,4 @@
-"""Start or resume a campaign: check for obstacles, find kept recordings, and open the journal.
+"""Start or resume a campaign: check plan, bench and folder, find kept recordings, and open the journal.
 
 After a crash, journal and folder are compared to find the state of the point that was running.
 """
@@ -36,11 +36,11 @@ PROGRAM_ENDED = "the program ended during the recording"
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     """Update a resumed journal from the files in its folder.
 
-    A point with a complete recording is done, even if the last entry in the journal is missing. A running
-    point without a complete recording is interrupted, and its unfinished recording is made readable. A done
-    point is queued again when its recording is missing or differs from its seal; the file is kept, and the
-    next attempt gets a new file. Reading a folder may take minutes. After a stop request, the next resume
-    updates the remaining points.
+    A point with a complete recording becomes "done", even if the last entry in the journal is missing. A
+    "running" point without a complete recording becomes "interrupted", and its unfinished recording is made
+    readable. A "done" point is queued again when its recording is missing or differs from its seal; the file
+    is kept, and the next attempt gets a new file. Reading a folder may take minutes. After a stop request,
+    the remaining points are left for the next resume.
     """
     for point in journal.points():
         if stop.request is not None:
@@ -68,9 +68,9 @@ def find_recordings(
 ) -> dict[str, KeptRecording]:
     """Return the recordings in a folder by point, for a campaign whose journal is lost or never existed.
 
-    After a stop request, the samples of further recordings are left unchecked until the next resume.
-    Damaged recordings are returned too. So are recordings whose seal is in no journal of the folder: the
-    campaign may have been renamed. Raises RecordingError when a complete recording was made by another plan.
+    After a stop request, the samples of further recordings are left unchecked until the next resume. Damaged
+    recordings are returned too, and so are recordings whose seal is in no journal of the folder (the campaign
+    may have been renamed). Raises RecordingError when a complete recording was made by another plan.
     """
     found: dict[str, KeptRecording] = {}
     for point in points:

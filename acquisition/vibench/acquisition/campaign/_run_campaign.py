@@ -290,11 +290,11 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
 
 
 LOOK_AGAIN_S = 1.0
-"""Simulated time before a virtual bench is reopened [s], in which its fault script may reconnect cables."""
+"""Simulated time before a virtual bench is reopened [s]; the fault script may reconnect cables meanwhile."""
 
 
 class ReconnectingBench:
-    """Bench that can be reopened without asking for knobs again. Use it in a ``with`` statement."""
+    """Bench that can be reopened without confirming its knobs again. Use it in a ``with`` statement."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
@@ -354,7 +354,7 @@ class ReconnectingBench:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Final size of a recording relative to its size while growing, for 24-bit white noise; less for dwells."""
+"""Ratio of a recording's final size to its size while growing; for 24-bit white noise, less for dwells."""
 
 
 @dataclass(frozen=True)
