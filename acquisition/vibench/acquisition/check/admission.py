@@ -1,7 +1,7 @@
 """Admission of a bench, which requires a recent passed check of the same configuration.
 
-The last check of each rig is a JSON file in the user's state folder. The next check reports later changes of
-gains in decibels, and of the clock in ppm.
+The last check of each rig is stored as a JSON file in the user's state folder. The next check reports the
+changes since then: of gains in decibels, and of the clock in ppm.
 """
 
 import hashlib
@@ -41,7 +41,7 @@ _HASH_DIGITS = 8
 
 
 def archive_path(rig_name: str, *, passed: bool = False) -> Path:
-    """Return the path of a rig's last check; the file name contains the rig's name and its hash.
+    """Return the path of a rig's last check; the file name contains the rig's name and a hash of the name.
 
     With ``passed``, return the path of the last check that did not fail.
     """

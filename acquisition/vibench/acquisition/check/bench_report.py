@@ -37,7 +37,7 @@ _IN_MOMENTS = 0.2
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
-"""Bounds on the time for one verified change of a generator setting [s]; a stop takes as long."""
+"""Bounds on the time to change and verify one generator setting [s]; a stop takes the same time."""
 ROOM_H = Bounds(-10.0, -1.0)
 """Bounds on the recording time for which the disk has space [h], negated because a longer time is better."""
 
@@ -75,7 +75,7 @@ def bench_report(
     during = reader.during_sine(drive)
     after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
-        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # the output relay may be stuck
+        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # in case the relay is stuck
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle_finding(bench.output))
@@ -95,7 +95,7 @@ class _BlockReader:
         self._advance: Callable[[], None] = lambda: None
 
     def in_silence(self) -> Samples:
-        """Return all channels while nothing plays, after the AC couplings have settled."""
+        """Return samples of all channels while nothing plays, after the AC couplings have settled."""
         self._begin()
         try:
             self._read_for(_SETTLE_S)
@@ -119,7 +119,7 @@ class _BlockReader:
                 blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
                 return np.concatenate(blocks, axis=1)
             except BaseException:
-                guard.silence()  # the second call below lowers the amplitude: the output's relay may be stuck
+                guard.silence()  # the call below also lowers the amplitude, in case the relay is stuck
                 raise
             finally:
                 try:

@@ -25,7 +25,7 @@ class SineFit:
     uncertainty: float
     """Standard uncertainty of the amplitude, from the residual of the fit."""
     phase_rad: float
-    """Phase at the first sample, with the sine written as a cosine."""
+    """Phase of the cosine at the first sample [rad]."""
 
 
 @dataclass(frozen=True)
