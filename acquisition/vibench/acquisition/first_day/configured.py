@@ -223,12 +223,12 @@ def _number(answer: str, key: str) -> str:
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Function that asks a question, with proposals and the template's value, which an empty answer keeps."""
+"""Function that asks a question, given proposals and the template's value; an empty answer keeps it."""
 Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer, for input that does not allow a question to be repeated."""
+    """Raise the error of an answer, where the question cannot be repeated (as in a script)."""
     raise error
 
 
@@ -248,8 +248,8 @@ def configure(
     """Ask all questions, write the configuration, read it back, and return it.
 
     By default, ``questions`` are those with a place in the template. CONFIRM in comments of ``template``
-    marks unchecked values. ``note``, such as name and time, is a comment on each answer. ``refuse`` receives
-    the error of one answer or of all answers together; if it returns, the questions are asked again.
+    marks unchecked values. ``note``, such as name and time, becomes a comment behind each answer. ``refuse``
+    receives the error of one answer or of all answers together; if it returns, the questions are repeated.
 
     Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; then nothing is written.
     """
@@ -259,7 +259,7 @@ def configure(
         raise ConfigurationError(
             f"{target.absolute().parent} is not a folder; create it, or choose another folder"
         )
-    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is relative to the template
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # the path in it is relative to the template
     questions = questions_for(text) if questions is None else questions
     for question in questions:
         if len(choices := question.choices(seen)) == 1:

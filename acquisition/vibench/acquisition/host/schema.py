@@ -74,7 +74,7 @@ def _starts_from_another(part: Json) -> None:
 
 
 def _with_ranges(schema: Json) -> None:
-    """Allow the specimen's former key. Frequencies may be a range, or a list of numbers and ranges."""
+    """Allow ranges of frequencies, alone or in a list, and the specimen's former key ``structure``."""
     _with_a_base(schema)
     several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
     schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
@@ -118,7 +118,7 @@ def json_schema(kind: str) -> Json:
 
 
 def schema_line(model: BaseModel, schemas: Path) -> str:
-    """Return the line that tells an editor the schema of a file of ``model``; empty if there is none.
+    """Return the line that tells an editor the schema of a file of ``model``; empty if no schema exists.
 
     ``schemas`` is the folder of the schemas, as ``shipped_folder("schemas")`` gives it.
     """
