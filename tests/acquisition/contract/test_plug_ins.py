@@ -152,7 +152,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         "plain_scpi", f"--vibench-bench={BENCH}", path=os.pathsep.join((str(tmp_path), str(installed)))
     )
     assert done.returncode == 1
-    for promise in ("test_a_waveform_is_played_point_by_point", "test_stop_is_silence_at_any_time"):
+    for promise in ("test_a_waveform_is_played_point_by_point", "test_stop_silences_the_output_at_any_time"):
         assert promise in done.stdout
 
 

@@ -32,7 +32,7 @@ def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first shipped virtual one; None if this bench lacks the instrument."""
+    """Return the given bench, or the first suitable shipped one; None if it does not use the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in plug_ins_of(rig)[kind] else None
@@ -47,7 +47,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in with this name; refuse a name that no bench contains."""
+    """Return a bench for each kind of plug-in with this name; refuse a name that no bench uses."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
@@ -72,7 +72,7 @@ def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
-    """Report an error in the options of the command line once, before the first test."""
+    """Report an error in the command-line options once, before the first test."""
     config.stash[_RIGS] = chosen_rigs(
         config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
     )

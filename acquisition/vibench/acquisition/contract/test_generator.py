@@ -76,7 +76,7 @@ def test_frequency_and_amplitude_can_change_during_output(bench: Bench) -> None:
     assert tone_v(bench, 1.5 * TONE_HZ) == pytest.approx(0.5 * terminal_v(bench), rel=SAME)
 
 
-def test_a_waveform_is_played_point_by_point_at_its_repetition(bench: Bench) -> None:
+def test_a_waveform_is_played_point_by_point_at_its_repetition_rate(bench: Bench) -> None:
     # The peak is half of full scale: the amplitude setting must refer to full scale, not to the peak.
     fewest, most = generator_driver(bench.rig.generator).describe(bench.rig.generator).memory_points
     points = max(fewest, min(most, 1024))
@@ -163,7 +163,7 @@ def test_the_measured_command_latency_is_between_zero_and_five_seconds(bench: Be
     assert 0 < bench.generator.measured_latency_s() < 5.0
 
 
-def test_stop_is_silence_at_any_time(bench: Bench) -> None:
+def test_stop_silences_the_output_at_any_time(bench: Bench) -> None:
     bench.generator.stop()
     bench.generator.load_sine(TONE_HZ, level_vpp(bench))
     bench.generator.start()

@@ -32,7 +32,7 @@ def level_v(bench: Bench) -> float:
 
 @contextmanager
 def playing(bench: Bench) -> Iterator[None]:
-    """Play a tone as long as the samples that are written ahead."""
+    """Play a tone that lasts as long as the samples written ahead."""
     output = output_of(bench)
     stretch = output.ahead_samples // 2
     output.write(tone(output, level_v(bench), 0, stretch))
@@ -91,7 +91,7 @@ def test_stopping_outputs_zero_at_any_time_and_allows_another_stream(bench: Benc
         bench.digitizer.read(256)
 
 
-def test_closing_may_be_repeated_and_ends_writing(bench: Bench) -> None:
+def test_closing_twice_is_allowed_and_later_writing_is_refused(bench: Bench) -> None:
     output = output_of(bench)
     output.close()
     output.close()
