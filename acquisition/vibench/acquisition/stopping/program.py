@@ -31,7 +31,7 @@ from vibench.stop_files import answer_path, stop_path
 from ..errors import AcquisitionError
 from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 
-# A stop needs no connection: it is a file in the state folder, which a driving program checks all the time.
+# A stop needs no connection: it is a file in the state folder, where programs that drive a bench look for it.
 # The file name contains process, start time and level, so a process that cannot open more files can still see
 # the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
 
@@ -59,9 +59,9 @@ class KeptStops:
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
-        """Stops that are being carried out, by the original names of their files."""
+        """Stops that are being carried out, each given by the original path of its file."""
         self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Reserved file descriptor; once it is closed, a reason can be read even if no other is free."""
+        """Reserved file descriptor, closed to read a reason even if no other descriptor is free."""
 
     @classmethod
     def of_this_process(cls, press: Press) -> "KeptStops":
@@ -150,7 +150,7 @@ class Watchdog:
             ) from error
 
     def close(self) -> None:
-        """Stop the calls; a call that hangs, for example in a lost folder, is abandoned."""
+        """Stop the calls; a call that hangs, for example in a lost network folder, is abandoned."""
         self._closing.set()
         self._thread.join(LEFT_ALONE_S)
 
@@ -177,7 +177,7 @@ class Program(BaseModel):
     process_start: str = ""
     """Start time of the process, from the system. Process numbers are reused; number and start are unique."""
     computer: str = ""
-    """Name of the computer; several computers may share a home folder with the state folder."""
+    """Name of the computer; several computers may share the home folder that contains the state folder."""
     rigs: tuple[str, ...] = ()
     """Generators of the rigs whose benches the process has opened."""
 
@@ -222,7 +222,7 @@ def facts_of_this_process(what: str) -> dict[str, object]:
 
 
 def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
-    """Return all living programs on this computer (or in this container), oldest first, as ``model``.
+    """Return all programs running on this computer (or in this container), oldest first, as ``model``.
 
     Raises AcquisitionError when there is no state folder and none can be created.
     """
@@ -248,7 +248,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced the generator ``rig``, also on behalf of earlier programs."""
+    """Note that this process has silenced the generator ``rig``; forget ended programs that drove it."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():
@@ -259,7 +259,7 @@ def note_open_bench(rig: str) -> None:
 
 
 def programs_of_other_places() -> tuple[Program, ...]:
-    """Return all living programs of other containers or computers that share the state folder.
+    """Return all programs running in other containers or computers that share the state folder.
 
     Raises AcquisitionError in the same cases as `announced_programs`.
     """
@@ -461,7 +461,7 @@ def _sweep() -> None:
 
 
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
-"""Signals that are not handled: the first two cannot be caught; the others recur after their handler."""
+"""Signals that are not handled: the first two cannot be caught; the others recur when a handler returns."""
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 """Signals that by default neither end nor suspend a process."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
@@ -472,12 +472,12 @@ _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
 
 @contextmanager
 def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]:
-    """Inside the context, request a stop of ``switch`` on a signal or a stop from outside the program.
+    """Inside the context, request a stop of ``switch`` on a signal or a stop file of another program.
 
     ``vibench stop`` finds the program under the name ``what`` and leaves a stop file in the state folder.
-    This works in any thread. Python delivers signals only to the main thread. There, every signal that would
-    end or suspend the program requests a stop (`stop_signals`). SIGHUP stays ignored if it was ignored before
-    (nohup), because such a run is meant to continue.
+    Stop files work in any thread. Python delivers signals only to the main thread. There, every signal that
+    would end or suspend the program requests a stop (`stop_signals`). SIGHUP stays ignored if it was ignored
+    before (nohup), because such a run is meant to continue.
 
     The first signal ramps down and ends the run as stopped: Ctrl-C with the planned ramp, the others faster.
     A second signal raises KeyboardInterrupt, which silences the generator without the measured ramp. Later
