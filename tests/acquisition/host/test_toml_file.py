@@ -77,7 +77,7 @@ def test_errors_name_the_key_of_the_variant_that_the_file_uses(tmp_path, text, t
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (("name", '"my campaign"'), "name = 'my campaign': a file name has 1 to 64 of a-z"),
+        (("name", '"my campaign"'), "name = 'my campaign': a file name has 1 to 64 letters, digits"),
         (("name", '""'), "name = '': a file name has"),
         (("name", "3"), "name = 3: give text, in quotes"),
         (("rest_s", "2026-01-01"), "rest_s = 2026-01-01: "),

@@ -221,7 +221,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
             excitation.highest_frequency_hz,
             carried_hz,
             "Hz",
-            f"levels there are {LARGEST_LEVEL_ERROR:.0%} off",
+            f"at this limit, levels are {LARGEST_LEVEL_ERROR:.0%} too low",
             "lower the frequency or raise virtual.grid_rate_hz",
         )
     if rig.daq.output is not None and source is DriveSource.OUTPUT:
@@ -384,9 +384,9 @@ _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) *
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
-    """Return a setting of at least 10 mVpp for a check, at which p stays within a quarter of the gap [Vpp].
+    """Return the setting of a check [Vpp]: ``wanted_vpp``, or less to keep p within a quarter of the gap.
 
-    ``wanted_vpp`` is the upper limit of the result; the model of ``rig`` includes the specimen on the table.
+    It is not lowered below 10 mVpp. The model of ``rig`` includes the specimen on the table.
     """
     model = RigModel(rig)
     per_vpp = 0.5 * rig.generator.terminal_factor()

@@ -189,7 +189,7 @@ class BaseMotion:
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
     """Return the predicted base amplitude at each of ``frequency_hz``; exact for levels held by feedback.
 
-    For other plans it follows from the rig's model with specimen; noise is treated as a sine of equal rms.
+    For other plans, the amplitude follows from the rig's model with specimen (noise: a sine of equal rms).
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
     model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)

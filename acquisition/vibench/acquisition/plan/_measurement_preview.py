@@ -43,7 +43,7 @@ class MeasurementPreview:
     size_bytes: int
     """Size of the recording while it grows [bytes]."""
     least_growth_time_s: float | None
-    """Shortest growth time (by a factor of e) of an unstable motion that feedback can hold [s]; or None."""
+    """Shortest growth time (by a factor of e) of an unstable motion that feedback can hold [s], if known."""
 
     @property
     def is_allowed(self) -> bool:

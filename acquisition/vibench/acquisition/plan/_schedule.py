@@ -27,7 +27,7 @@ _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
 def _is_of_a_file(value: object) -> object:
     if isinstance(value, str) and re.search(_NAME, value) is None:
-        raise ValueError("a file name has 1 to 64 of a-z, 0-9, _ and -, and starts with a letter or digit")
+        raise ValueError("a file name has 1 to 64 letters, digits, _ or -, and starts with a letter or digit")
     return value
 
 
@@ -317,7 +317,7 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level of a half-cosine ramp at ``progress`` (0 to 1) [1]; both ends have zero slope."""
+    """Return the level (0 to 1) of a half-cosine ramp at ``progress`` (0 to 1); both ends have zero slope."""
     return 0.5 * (1 - cos(pi * progress))
 
 
@@ -330,7 +330,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; for a stream, the analogue output even if it is missing."""
+    """Return the source that plays a measurement; an analogue output is returned even if the rig lacks it."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
