@@ -55,7 +55,7 @@ _MEASURED = 0.55
 LARGEST_LEVEL_ERROR = 0.01
 """Largest allowed level error of a plan on a grid coarser than the default."""
 STEPS_PER_SAMPLE = 2
-"""Smallest number of time steps per sample on a coarse grid: the converter filter has a transition band."""
+"""Smallest number of time steps per sample on a coarse grid; the converter filter has a transition band."""
 
 
 class VirtualConfig(FrozenModel):
@@ -106,14 +106,14 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest frequency with correct levels on a grid [Hz]; None (no limit) by default."""
+    """Return the highest frequency with correct levels on a grid [Hz]; None (no limit) for the default."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
-    """Return the highest sample rate on a simulation's time grid [samples/s]; None (no limit) by default."""
+    """Return the highest sample rate on a time grid [samples/s]; None (no limit) for the default."""
     return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
 
 
@@ -147,8 +147,8 @@ class OutputConfig(FrozenModel):
     """Sample rate of the output, which the hardware must support exactly [samples/s]."""
     # At least three blocks of a run: one is being played, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
-    """Duration of the samples written in advance [s]: longest tolerated pause of this computer, and delay of
-    an early ramp down."""
+    """Duration of the samples written in advance [s]. It is also the longest pause of this computer that is
+    tolerated, and the delay of an early ramp down."""
     source: str = Field(min_length=1)
     """Source of the values ``limit_v`` and ``sample_rate_hz``."""
 
@@ -203,7 +203,7 @@ class GeneratorConfig(FrozenModel):
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
     def terminal_factor(self) -> float:
-        """Return the terminal voltage per displayed volt: 2 for a load setting of 50 ohm without a load."""
+        """Return the terminal voltage per displayed volt: 2 for a load setting of 50 ohm and no load."""
         return self.connected_ohm / (self.connected_ohm + SOURCE_OHM) / self.shown_fraction
 
 
@@ -371,7 +371,7 @@ class ControllerConfig(FrozenModel):
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input for a proportional-derivative law; absent if the controller accepts any linear law."""
+    """The one input of a proportional-derivative law; absent if the controller accepts any linear law."""
     source: str = Field(min_length=1)
     """Source of the values for sample rate, latency and limit."""
 

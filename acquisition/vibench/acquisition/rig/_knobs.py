@@ -223,7 +223,7 @@ def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ..
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet over an older one, if any; raises ConfigurationError for a file of another kind."""
+    """Save a sheet, or replace an older one; raises ConfigurationError if the file there is not a sheet."""
     if path.exists():
         load_knob_sheet(path)
     save_toml(sheet, path)

@@ -103,13 +103,13 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck_motion)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the complex ``quantity`` per metre of p imposed by the stops, shape as ``frequency_hz``."""
+        """Return the complex ``quantity`` per metre of p imposed by the stops, shape of ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
-        """Return complex peaks of ``quantity`` at peaks ``terminal_v`` [V]; both inputs are broadcast."""
+        """Return complex amplitudes of ``quantity`` for peaks ``terminal_v`` [V]; the inputs broadcast."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).response(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:

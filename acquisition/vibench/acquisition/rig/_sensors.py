@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest number accepted in a sensitivity; the largest is its inverse. Others are typing errors."""
+"""Smallest number accepted in a sensitivity; the largest is its inverse. This catches typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
@@ -151,7 +151,7 @@ class SensorConfig(FrozenModel):
 
 
 class TransducerConfig(SensorConfig):
-    """A sensor of any other channel, described by a table such as ``[sensors.m0_acceleration]``."""
+    """A sensor other than accelerometer and vibrometer, in a table such as ``[sensors.m0_acceleration]``."""
 
     sensitivity: str
     """Sensitivity with the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
