@@ -33,7 +33,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     start_share: Share = 0.02
     """First setting at the first frequency, as a fraction of ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
-    """Longest wait for ``response_m`` at a frequency [s]; the step's note states if the tolerance was met."""
+    """Longest wait for ``response_m`` at a frequency [s]; the step's note states if it was reached."""
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
 

@@ -190,7 +190,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def approach(self) -> Approach:
-        """Initial state: the motion at the neighbouring frequency if the frequency moves, else rest."""
+        """Initial state: rest, or the motion at the previous frequency if the drive moves through a band."""
         return Approach.REST
 
     @property
@@ -215,7 +215,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Return this excitation with lead-in ``way``, and the tone it adds; None if it has no lead-in."""
+        """Return this excitation with lead-in ``way``, and its own tone; None if it allows no lead-in."""
         del way, lead_s
         return None
 

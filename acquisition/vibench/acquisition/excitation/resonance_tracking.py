@@ -17,7 +17,7 @@ _MOST_CHANGE = 1.6
 
 
 class ResonanceTracking(AbstractFeedback):
-    """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
+    """Phase resonance of one mode at rising (or falling) levels of the base: the mode's backbone.
 
     At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. At the first
     level, the resonance is searched in settled motion. Then a phase-locked loop, which acts every ten
@@ -30,7 +30,7 @@ class ResonanceTracking(AbstractFeedback):
     Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and Kerschen, arXiv 2401.01151). For n = 2 the
     phase is measured from a cosine at twice the drive frequency, as in the square of a sine. This harmonic
     lags if the spring between the masses is stiffer at positive p and p moves in phase with m0 in the mode
-    (modes 1 and 3 of the paper). If only one of these holds, it leads by 90 degrees (``phase_deg = 90``).
+    (modes 1 and 3 of the paper). If only one of these holds, it leads instead (``phase_deg = 90``).
 
     ``subharmonic`` n = 2 or 3 tracks a motion of m0 that repeats every n drive periods: n times its phase
     lags the base by 90 degrees; for n = 2 the phase is again measured from a cosine. Super- and
@@ -106,7 +106,7 @@ class ResonanceTracking(AbstractFeedback):
     def motion(self, harmonics: Sequence[complex]) -> complex:
         """Return the complex motion whose phase is compared with ``phase_deg``.
 
-        ``harmonics`` (m0 over base) start with that of m0's period, which is longer for a subharmonic.
+        The first of ``harmonics`` (m0 over base) has m0's period, which is longer for a subharmonic.
         """
         if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])

@@ -16,8 +16,8 @@ from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 class Hold(StrEnum):
     """Quantity of the base motion whose amplitude stays about constant along a sweep, without feedback.
 
-    Above its suspension resonance, a shaker that drives a mass converts voltage to acceleration. The motion
-    is only as constant as this assumption is accurate; the recording contains the real motion of the base.
+    A shaker that drives a mass above its suspension resonance converts voltage to acceleration. The motion is
+    only as constant as this assumption is accurate; the recording contains the real motion of the base.
     """
 
     ACCELERATION = "acceleration"
