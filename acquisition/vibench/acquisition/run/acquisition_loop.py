@@ -14,7 +14,7 @@ BLOCK_S = 0.1
 
 
 class AcquisitionLoop:
-    """Loop that reads and records blocks; its clock is the samples read, so waiting means reading."""
+    """Loop that reads and records blocks. Its clock is the number of samples read: waiting means reading."""
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """Create a loop, which calls ``advance`` after every block of samples."""

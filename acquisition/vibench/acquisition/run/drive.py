@@ -59,7 +59,7 @@ class Drive(Protocol):
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
         """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.
 
-        ``clock_s`` returns the time [s]; if reading is slow, it advances by more than the yielded times.
+        ``clock_s`` returns the time [s]; if reading is slow, more time passes than was yielded.
         """
 
     def cut(self) -> None:

@@ -164,7 +164,7 @@ class GeneratorDrive:
 
         Used when the run ends without sampling, or if a drive signal is still measured after switching off.
         The ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output
-        was off already or the ramp failed, the amplitude is lowered, too: a stuck relay is read back as off.
+        was off already or the ramp failed, the amplitude is lowered too, because a stuck relay reads as off.
         """
         was_off = not self._is_on
         try:

@@ -1,4 +1,4 @@
-"""Limit monitor of a measurement: checks every block, including displacements integrated from it."""
+"""Limit monitor of a measurement: checks the signals of every block and motions integrated from them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class _Section:
 
     def run(self, values: Samples) -> Samples:
         if self._state is None:
-            # Start from the mean of the first block. Its first value could be a peak of the last run's
+            # Start from the mean of the first block. The first sample could be a peak of the last run's
             # decay, to which the filter would respond for a second.
             self._state = lfilter_zi(self._b, self._a) * float(np.mean(values))
         out, self._state = lfilter(self._b, self._a, values, zi=self._state)
@@ -80,7 +80,7 @@ class SpecimenTracker:
     def follow(self, mass: Samples, base: BaseMotion, is_blind: NDArray[np.bool_]) -> Samples:
         """Return the displacement of m0 relative to the base [m] for the next samples of its sensor.
 
-        Where the sensor exceeds its range (``is_blind``), no relative motion is assumed.
+        Where the sensor exceeds its range (``is_blind``), the relative motion is taken to be zero.
         """
         moved = self._to_velocity.run(np.where(is_blind, 0.0, mass))
         if self._role is Role.M0_DISPLACEMENT:
@@ -91,7 +91,7 @@ class SpecimenTracker:
 RMS_S = 1.0
 """Averaging time for the rms current, whose limit is due to heating [s]."""
 REACTION = 1.1
-"""Allowed force on the table, relative to the coil's force limit; above 1 because the specimen reacts."""
+"""Allowed force on the table, relative to the coil's force limit; above 1 for the specimen's reaction."""
 SETTLING_S = 0.5
 """Time after the start during which integrated quantities are not checked [s]. An AC-coupled input drifts
 after its current is switched on, and the drift integrates to metres. During this time, the run plays only the

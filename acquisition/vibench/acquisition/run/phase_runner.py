@@ -130,7 +130,7 @@ HOLD_LONGEST_S = HOLD_ROOM_S
 
 
 LATEST = 0.5
-"""Largest delay of a command in a stepped sweep that is not logged, as a fraction of the step."""
+"""Delay of a stepped sweep's command above which it is logged, as a fraction of the step."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
@@ -143,7 +143,7 @@ TOLD_CYCLES = 0.1
 MOST_MADE_UP = 3.0
 """Largest frequency correction for lost cycles, as a multiple of the planned frequency step."""
 LEAST_LEFT = 0.2
-"""Shortest time for a correction, relative to the step; also the largest relative correction."""
+"""Shortest time for a correction, relative to the step; also the largest correction of f, relative to f."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
@@ -214,7 +214,7 @@ class PhaseRunner:
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
             yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # exclude the time that the next command takes
+            self.loop.enter(None)  # the time that the next command takes is in no segment
         waits = self.drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:

@@ -186,7 +186,7 @@ class SilenceWatch:
         """Whether the drive was still measured after its output was switched off."""
 
     def learn_hum(self, quiet: Samples) -> None:
-        """Set the limit of silence from ``quiet``, shape (channels, samples) [V], while nothing plays."""
+        """Set the limit of silence from ``quiet``: samples without drive, shape (channels, samples) [V]."""
         drive = self._drive(quiet)[round(STILL_SHARE * quiet.shape[1]) :]
         self._silent_v = max(SILENT_V, HUM_FACTOR * _half_peak_to_peak(drive))
 
@@ -245,11 +245,11 @@ STANDSTILL_BLOCKS = 50
 STOPPED_BLOCKS = 15
 """Number of missed blocks that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest interval between two checks that counts [s]; a longer one means that the process was suspended."""
+"""Longest interval between checks that is fully counted [s]; in a longer one, the process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Guard that switches the drive off if the run stops reading; its thread and memory are reserved.
+    """Guard that switches the drive off if the run stops reading; thread and memory are reserved in advance.
 
     The run calls the guard when its drive starts and after every block. The drive counts as on until its
     output has been read back as off.

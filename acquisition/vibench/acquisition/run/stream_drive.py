@@ -86,8 +86,8 @@ class OutputSynthesizer:
     def _advance_to_next(self, wanted: int) -> None:
         """Advance to the range that contains the next sample, skipping phases shorter than a sample.
 
-        Without further phases, silence covers only the ``wanted`` samples. Phases appended later then start
-        at the sample after them.
+        Without further phases, silence covers only the ``wanted`` samples. Phases appended later start after
+        this silence.
         """
         while self._sample >= self._stretch.end:
             phase = next(self._coming, None)

@@ -36,7 +36,7 @@ _ASK_S = 0.05
 class UntilWatch(ClosedOnLeaving):
     """Repeated analysis of a growing recording, until the error bounds are small enough.
 
-    A stretch is a part of the recording with one result. The process and a thread start before any drive. The
+    A stretch is a part of the recording with one result. The analysis process starts before any drive. The
     run queues requests, reads results and never waits. If the process fails, the longest time is recorded.
     """
 
@@ -145,7 +145,7 @@ class UntilWatch(ClosedOnLeaving):
         self._beside.do(lambda: self._look(note, recorded_s))
 
     def _look(self, note: UntilNote, recorded_s: float) -> None:
-        """Request the error bounds for the first ``recorded_s`` of the stretch; runs in the thread."""
+        """Request the error bounds for the first ``recorded_s`` of the stretch, in the helper thread."""
         bounds: dict[str, float | None] = {}
         try:
             question = {"path": str(self._path), "stretch": note.stretch, "recorded_s": recorded_s}
