@@ -37,7 +37,7 @@ class FeedbackChannels:
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
-    """Number of time derivatives from m0's signal to its velocity; -1: integrate (acceleration)."""
+    """Number of time derivatives from m0's signal to its velocity; -1 for an acceleration (integrated)."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Return drive [V], base acceleration [m/s2] and the signal of m0, each of shape (samples,).
@@ -140,7 +140,7 @@ class BridgedRows:
         return first, handed_on
 
     def skip(self) -> None:
-        """Discard the delayed samples, because they belong to an earlier phase."""
+        """Discard the samples held back, because they belong to an earlier phase."""
         self._next = self._first + self._rows.shape[1]
 
 

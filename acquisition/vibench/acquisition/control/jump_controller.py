@@ -150,7 +150,7 @@ class JumpLocator:
     def _return_to_branch(self, search: JumpBracket) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
 
-        Move forward in a fast glide first. If the motion leaves the branch, find out in steps where.
+        Move forward in a fast glide first. If the motion leaves the branch, repeat in steps to find where.
         """
         for pace in _Pace:
             place = yield from self._rejoin(search.branch)

@@ -12,8 +12,8 @@ from .settling_controller import SettledState
 _GAIN = 0.3
 """Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If more than ``_SLOW`` of a phase error is left after a look, the gain grows by ``_GROWTH``, up to
-``_LARGEST_GAIN``.
+"""If a look leaves more than the fraction ``_SLOW`` of a phase error, the gain is multiplied by ``_GROWTH``,
+up to ``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
 """Trial changes of ln(half-width) from one level to the next."""
@@ -82,7 +82,7 @@ class PhaseLaw:
         """Frequency [Hz], phase error [rad] and base level [m/s2] of each look (measurement)."""
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
-        """Add a look (measurement). Return its phase error [rad] and the expected change of the motion."""
+        """Add a look (measurement). Return its phase error [rad] and the remaining change of the motion."""
         moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi

@@ -92,7 +92,7 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Largest remaining change of a locked motion over the phase tolerance; 0.5 for super- and subharmonics."""
+"""Remaining change allowed in a locked motion, divided by the phase tolerance; 0.5 for other harmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
