@@ -1,9 +1,9 @@
 """Drivers: Tektronix AFG1022 and Keysight 33500B over VISA, NI-DAQmx inputs and outputs, sound cards, files.
 
 Each one implements a protocol of `vibench.acquisition.instruments`: every setting is read back, a refused
-setting becomes an error with advice, and outputs are switched off after any error. No other package here
-imports pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but not plans or runs, and cannot
-distinguish a simulated instrument from a real one.
+setting becomes an error with advice, and outputs are switched off after any error. Only this package imports
+pyvisa, nidaqmx and grpc. Drivers know the rig's configuration, but not plans or runs, and cannot distinguish
+a simulated instrument from a real one.
 """
 
 import lazy_loader

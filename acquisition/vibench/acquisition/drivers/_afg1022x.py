@@ -30,8 +30,8 @@ class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
     `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
-    amplitude may change during the drive. Settings beyond its limits or the bench's ``amplitude_limit_vpp``
-    are refused (`LimitExceeded`). During a change, the amplitude never exceeds the larger of both settings.
+    amplitude may change during the drive. Settings beyond the model's limits or ``amplitude_limit_vpp`` are
+    refused (`LimitExceeded`). During a change, the amplitude exceeds neither the old nor the new setting.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape too: a sine's frequency may be too high for the memory.
+            # Set the frequency also before the shape: that of the sine may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)

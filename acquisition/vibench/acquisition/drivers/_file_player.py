@@ -17,12 +17,12 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` is its path. If the recording's plan is run, its check and segments have the
-    same sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. If the recording's plan is run, check and segments have the same
+    sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     waiting_samples = 0
-    """Zero delay: a recording is read at any speed."""
+    """Zero, because a recording can be read at any speed."""
 
     def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
         self._recording = recording

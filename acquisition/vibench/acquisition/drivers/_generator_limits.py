@@ -1,6 +1,6 @@
 """Limits of each generator model, and checks of settings and waveforms before anything is sent.
 
-This module does not need pyvisa, so that plans can be checked without it.
+This module does not need pyvisa, so plans can be checked without that library.
 """
 
 from dataclasses import dataclass

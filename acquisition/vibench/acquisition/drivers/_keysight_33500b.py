@@ -100,7 +100,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Write the memory; compare the number and mean of its points, which cannot be read back."""
+        """Write the memory; compare the number and mean of its points, as the points cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

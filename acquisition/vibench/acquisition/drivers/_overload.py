@@ -33,7 +33,7 @@ def overload_ranges(
 
 
 def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
-    """Raise LimitExceeded for a NaN or a sample beyond the bench's limit, InstrumentError if it is closed."""
+    """Raise LimitExceeded for a NaN or a sample beyond the limit, InstrumentError if the output is closed."""
     peak_v = float(np.max(np.abs(volts), initial=0.0))
     if not peak_v <= limit_v:  # this form also refuses a NaN
         raise LimitExceeded(

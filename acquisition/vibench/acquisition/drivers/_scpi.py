@@ -94,7 +94,7 @@ class ScpiInstrument:
             return self.complaints()
 
     def query(self, message: str) -> str:
-        """Return the reply to a query without its line end, decoded as GB 18030; invalid bytes replaced."""
+        """Return the reply to a query without its line end, decoded as GB 18030; replace invalid bytes."""
         # These generators send "ohm" as the GBK character A6 B8: invalid text must not stop a query.
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
