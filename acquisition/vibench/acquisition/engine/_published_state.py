@@ -263,7 +263,7 @@ class PublishedState:
         self.messages.info(text)
 
     def note_result(self, point_result: PointResult) -> None:
-        """Publish the result of a recording; for a kept earlier recording, add its planned time."""
+        """Publish the result of a recording, and add its duration to the completed time."""
         if point_result.outcome is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(point_result.name, 0.0)
         elif self._status.run is not None and point_result.name == self._status.run.name:

@@ -96,7 +96,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 STALL_S = 0.2
 """If checks of the viewers are further apart than this [s], this process counts as stalled."""
 LATE_FACTOR = 4.0
-"""Growth of the time allowed without requests, per unit of this process's own delay (same computer)."""
+"""Extra time allowed without requests, divided by this process's own delay (both share a computer)."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without parent if its last request is more recent than this [s]."""
 FORGETTING = 0.995

@@ -198,7 +198,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Maximum number of viewers (20 MB each if they do not read). A further one displaces the least recent."""
+"""Maximum number of viewers (20 MB each if they do not read). Another displaces the longest silent one."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 
