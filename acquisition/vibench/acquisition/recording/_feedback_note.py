@@ -211,7 +211,7 @@ class ResonanceNote(AbstractNote):
     subharmonic: int = 1
     """Drive periods in one period of m0: above 1 for a subharmonic resonance."""
     harmonic_m: SixFigures | None = None
-    """Amplitude of that harmonic, or subharmonic [m]."""
+    """Amplitude of the tracked harmonic or subharmonic [m]."""
 
 
 class NoiseNote(AbstractNote):

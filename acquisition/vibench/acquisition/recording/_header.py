@@ -100,7 +100,7 @@ COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
 """-3 dB frequency of the first-order AC coupling of NI 9234, 4431 and similar modules [Hz]."""
 OPTIONAL = ("sensitivity", "volts_per_count")
-"""Number that may be unknown: NaN in the file, None here."""
+"""Numbers that may be unknown: NaN in the file, None in a header."""
 UNPLANNED = -1
 """Value of ``expected_samples`` in the file for a recording without a planned end."""
 

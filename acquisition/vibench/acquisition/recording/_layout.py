@@ -1,6 +1,6 @@
 """Names, shapes and version of the file format.
 
-``docs/recording-format.md`` describes it for users of h5py or MATLAB.
+``docs/recording-format.md`` describes the format for users of h5py or MATLAB.
 """
 
 import json

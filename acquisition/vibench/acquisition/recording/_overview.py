@@ -44,7 +44,7 @@ def extremes(counts: Counts) -> CountOverview:
 
 
 class OverviewSums:
-    """Overview of a channel whose counts arrive in pieces; each, except the last, must be whole bins."""
+    """Overview of a channel whose counts arrive in pieces; all pieces but the last consist of whole bins."""
 
     def __init__(self) -> None:
         self._low: list[Counts] = []

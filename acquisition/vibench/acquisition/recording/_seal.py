@@ -53,7 +53,7 @@ DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""Intermediate SHA-256 states, by path of the dataset: one before each piece of data, and a last one."""
+"""SHA-256 states, by path of the dataset: one before each piece of data, and the final state."""
 
 
 class SealDepth(StrEnum):
@@ -130,7 +130,7 @@ def seal_key(path: Path | None = None) -> SealKey | None:
 
 
 def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -> None:
-    """Seal a finished recording; ``known`` has those checksums of datasets that writing has computed."""
+    """Seal a finished recording; ``known`` has the checksums of datasets that were computed while writing."""
     manifest = {
         path: {
             "attributes": _checksum_of_header(item),

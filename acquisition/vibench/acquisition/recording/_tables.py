@@ -31,7 +31,7 @@ class EventKind(StrEnum):
     SPECIMEN = "specimen"
     """Change of the specimen found by the live twin."""
     LATE = "late"
-    """The drive deviated from its planned time or phase; the text says by how much."""
+    """The drive deviated from its planned time or phase; the text states the deviation."""
     END = "end"
     OFF = "off"
     """The output was switched off after an early end; the samples that confirm its silence follow."""
