@@ -55,7 +55,7 @@ def main() -> None:
             sys.exit(code)
     # pydantic would search every installed package for plug-ins; none is used here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # importing leaves little garbage; collecting it took a fifth of the start
+    gc.set_threshold(10_000)  # imports leave little garbage; collecting it took 1/5 of the start-up time
     from vibench.cli import main as run_command
 
     run_command()

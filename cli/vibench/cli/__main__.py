@@ -130,7 +130,7 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if type(error) is typer.BadParameter:  # another class of usage errors, such as a missing option
+        if type(error) is typer.BadParameter:  # other classes, such as a missing option, keep exit code 2
             error.exit_code = ExitCode.FAILED
         if "extra argument" in error.message:
             error.message += "; give one path, such as a folder, and put a path with spaces in quotes"
@@ -297,7 +297,7 @@ def vibench(
 
 def main() -> None:
     """Run the command line; on an error that the user can fix, print one sentence and exit with 1 or 3."""
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC reads this at import; no log of ended calls
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC reads this at import; no log for ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
         app()

@@ -97,7 +97,7 @@ def analyse(
     ] = None,
     hidden: Annotated[
         bool,
-        option("Also estimate the hidden motion of m1: p between its stops, impacts, gaps, m1, contact law."),
+        option("Also estimate the hidden motion p of m1, impacts, gaps, the mass m1 and the contact law."),
     ] = False,
     keep: Annotated[
         bool, option("With --hidden: store this motion in the recording, for vibench export --results.")

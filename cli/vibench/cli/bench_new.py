@@ -69,7 +69,7 @@ class Answers:
         return answer
 
     def connection(self, pair: str) -> str:
-        """Return the answer to whether a pair of connectors is wired; empty means no."""
+        """Return the answer to the question whether a pair of connectors is wired; empty means no."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer

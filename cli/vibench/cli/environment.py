@@ -3,8 +3,8 @@
 Imported before numpy. One thread is best: the matrices are small, and OpenBLAS threads wait for each other in
 busy loops. The tests of the bench check take 9 s of processor time with one thread, 11 s with two.
 
-Arrays of a recording take tens of megabytes. Linux's C library keeps such memory after it is freed. With this
-threshold [bytes], background processes return larger blocks to the operating system at once.
+Arrays of a recording take tens of megabytes. Linux's C library keeps such memory after it is freed. With the
+threshold below [bytes], background processes return larger blocks to the operating system at once.
 """
 
 import os

@@ -58,7 +58,7 @@ def map_motions(
         list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int, option("Map of initial states: number of random kicks per motion and size.", "N", min=0)
+        int, option("For maps of initial states: random kicks per motion and size.", "N", min=0)
     ] = 0,
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,
@@ -110,7 +110,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print a map's caption and motions; over initial states, also basin boundary and effects of kicks."""
+    """Print a map's caption and motions; for initial states, also the basin boundary and effects of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")

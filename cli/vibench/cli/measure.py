@@ -150,7 +150,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the functions that send messages by command and mail; raise ConfigurationError if one fails."""
+    """Return the messengers for command and mail; raise ConfigurationError if a setting is wrong."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))

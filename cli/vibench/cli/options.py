@@ -70,7 +70,7 @@ class RequestOptions(Generic[Request]):
 
 
 def build_request(model: type[Request], given: Mapping[str, object]) -> Request:
-    """Return a request with these values; raise InvalidRequest, which names the first forbidden one."""
+    """Return a request with these values; raise InvalidRequest, which names the first forbidden value."""
     from pydantic import ValidationError
 
     try:

@@ -18,7 +18,9 @@ from .progress_bars import transfer_bar
 
 def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with recordings and other files.")],
-    licence: Annotated[str, option("https://creativecommons.org/licenses/by/4.0/", "URL", name="--license")],
+    licence: Annotated[
+        str, option("Licence, such as https://creativecommons.org/licenses/by/4.0/.", "URL", name="--license")
+    ],
     out: Annotated[
         Path | None, option("Path of the new file or its folder; by default DIR.zip beside DIR.", "CRATE.zip")
     ] = None,
@@ -26,7 +28,7 @@ def pack(
     title: Annotated[str, option("Title of the package; by default the name of the folder.")] = "",
     description: Annotated[str, option("Description of the data in one or two sentences.")] = "",
     organisation: Annotated[str, option("Publisher and affiliation of the authors.", "NAME")] = "",
-    organisation_url: Annotated[str, option("Its home page, or https://ror.org/...", "URL")] = "",
+    organisation_url: Annotated[str, option("Publisher's home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate for a data repository."""

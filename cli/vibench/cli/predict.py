@@ -223,7 +223,7 @@ def _table(title: str, headings: Sequence[str], caption: str | None = None) -> T
 
 
 def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
-    title = "Responses I and II of m0 and p = y - z over the base amplitude, relative error"
+    title = "Responses I and II of m0 and p = y - z per base amplitude, and relative error"
     headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     rows = _table(title, headings + ["exponent [1/s]"] * has_exponents)
     step = max(1, -(-len(points) // _SHOWN))

@@ -49,7 +49,7 @@ def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: st
 def axis_fields(amplitude: Range, frequency: Range) -> dict[str, object]:
     """Return a request's fields for the axis with its limits, and for the fixed level or frequency.
 
-    The axis is the frequency, also if it has one value, unless the amplitude is given as a range.
+    The axis is the frequency, even for a single frequency, unless the amplitude is given as a range.
     """
     fixed: dict[str, object] = {"along": Parameter.FREQUENCY, "amplitude_m": amplitude.start}
     swept = frequency

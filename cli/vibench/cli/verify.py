@@ -1,4 +1,4 @@
-"""`vibench verify`: check recordings against their seals (signed digests)."""
+"""`vibench verify`: check recordings against their seals (checksums)."""
 
 from collections import Counter
 from dataclasses import asdict

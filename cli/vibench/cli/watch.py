@@ -71,10 +71,8 @@ def stop(
     if level is StopLevel.HOLD and len(programs) > 1:
         programs = (the_engine(pid),)
     failures = []
-    with ThreadPoolExecutor(
-        len(programs)
-        # Stop all programs in parallel: an unresponsive program must not delay the others.
-    ) as pool:
+    # Stop all programs in parallel: an unresponsive program must not delay the others.
+    with ThreadPoolExecutor(len(programs)) as pool:
         deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
         for program, delivery in zip(programs, deliveries, strict=True):
             try:
