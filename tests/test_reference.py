@@ -1,4 +1,4 @@
-"""Every public_objects function documents its parameters, results with unit or shape, and exceptions.
+"""Every public function documents its parameters, results with unit or shape, and exceptions.
 
 A parameter is documented by a Parameters section, by its name in the text, by a unit at the end of its name,
 or by a type of vibench. Numbers and arrays that are returned have a unit or a shape.
@@ -21,7 +21,7 @@ SECTIONS = re.compile(r"\n(Parameters|Returns|Yields|Raises)\n-+\n")
 
 
 def public_objects():
-    """Yield the name of every public_objects function and class, and the object."""
+    """Yield the name of every public function and class, and the object."""
     for face in FOR_PEOPLE:
         module = importlib.import_module(face)
         for name in module.__all__:

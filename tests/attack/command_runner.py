@@ -31,7 +31,7 @@ ADDRESS_ROOM_BYTES = 4 * MOST_BYTES
 
 
 class CommandRunner:
-    """Runs cases; use it in a ``with``."""
+    """Runs cases; use it in a ``with`` block."""
 
     def __init__(self, variables: Mapping[str, str] = MappingProxyType({})) -> None:
         """Start the process that imports everything, with additional environment variables."""

@@ -165,7 +165,7 @@ def dark_recording(rng: np.random.Generator, folder: Path) -> Member:
         told = not {"noise", "chance"} & {each.value for each in other.not_stated}
         is_told = is_told and told
         off = abs(other.value - one.value)
-        # The amplitude holds at its own frequency, which differs where drop-outs hide the largest response.
+        # Each base amplitude is at its own frequency; drop-outs can hide the largest response and change it.
         is_same = one.quantity == other.quantity or not one.quantity.startswith("base amplitude")
         if told and is_same and not off <= SURELY * other.expanded + STEADY * abs(one.value):
             faults.append(f"{other.quantity} {other.text}, not {one.value:.5g}")

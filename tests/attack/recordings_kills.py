@@ -73,7 +73,7 @@ POINTS = {"virtual_rig": 4, "virtual_rig_streaming": 2}
 
 
 class KilledCampaigns(CommandRunner):
-    """Runs campaigns in forks of one process; use it in a ``with``."""
+    """Runs campaigns in forks of one process; use it in a ``with`` block."""
 
     def __init__(self, library: Path | None = None) -> None:
         super().__init__({} if library is None else {"LD_PRELOAD": str(library), LIBRARY: str(library)})

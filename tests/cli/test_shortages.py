@@ -1,4 +1,4 @@
-"""A command that runs out of files or memory ends with one sentence and no traceback."""
+"""A command that runs out of file descriptors or memory ends with one sentence and no traceback."""
 
 import re
 import subprocess

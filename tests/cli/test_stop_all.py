@@ -134,7 +134,7 @@ def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 def test_a_program_from_before_a_restart_is_reported_until_its_bench_is_silent(vibench_here, tmp_path):
-    """The generator has its own mains, and plays on while the computer starts again."""
+    """The generator has its own mains supply, and keeps playing while the computer restarts."""
     facts = facts_of_this_process("night")
     boot, *others = facts["process_start"].split("_")
     before = facts | {"process_start": "_".join([boot[::-1], *others]), "rigs": ("lab",)}

@@ -24,7 +24,7 @@ def end_of(specimen, method, duration_s):
 
 
 def energy_ratios(method, speed, late_s):
-    """Return the energy ratios of impacts that begin ``late_s`` after the begin of a step."""
+    """Return the energy ratios of impacts that begin ``late_s`` after the start of a step."""
     before = np.zeros((len(late_s), 6))
     before[:, 1], before[:, 4] = FREE.gap_m - speed * late_s, speed
     after = textbook_states(FREE, Harmonic(100.0, 0.0), method, 4e-4, before)

@@ -1,4 +1,4 @@
-"""Reference solution: the equations of motion integrated by scipy; and what several tests need of it."""
+"""Reference solution: the equations of motion integrated by scipy; and helpers that several tests use."""
 
 import math
 from dataclasses import replace

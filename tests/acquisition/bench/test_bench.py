@@ -87,7 +87,7 @@ class TestOpening:
         assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
 
     def test_a_missing_converter_leaves_the_generator_free_and_silent(self, laboratory, virtual):
-        """Like after a killed program, the output is on before the bench opens."""
+        """The output is on before the bench opens, as after a killed program."""
         virtual.generator.execute(b"OUTP1:STAT ON")
         assert output_of(virtual) == b"1\n"
         lost = changed(laboratory, daq={"server": "127.0.0.1:9"})

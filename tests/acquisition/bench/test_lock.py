@@ -20,7 +20,7 @@ posix = pytest.mark.skipif(not hasattr(os, "fork"), reason="modes and links as P
 
 @pytest.fixture(autouse=True)
 def shared(monkeypatch):
-    """Create a folder like /tmp: every user may create files, and remove only own files."""
+    """Create a folder like /tmp: every user may create files, and remove only their own."""
     with TemporaryDirectory() as folder:
         Path(folder).chmod(0o1777)
         monkeypatch.setenv("VIBENCH_LOCK_DIR", folder)
@@ -130,7 +130,7 @@ def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path,
     assert aim.read_text() == "kept"
 
 
-def test_only_the_process_number_of_a_lock_file_is_shown(shared, monkeypatch):
+def test_only_the_process_number_in_a_lock_file_is_shown(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():

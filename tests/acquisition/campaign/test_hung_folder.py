@@ -1,4 +1,4 @@
-"""A hanging network folder does not block the stop of a campaign whose drive is on."""
+"""An unresponsive network folder does not block the stop of a campaign whose drive is on."""
 
 import os
 import sys

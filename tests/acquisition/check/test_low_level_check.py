@@ -18,7 +18,7 @@ def sine(peak, count):
 
 @pytest.fixture
 def check(rig):
-    """Return a check of 0.1 s of drive before the output, followed by a correct sine."""
+    """Return a check that takes the drive voltage of the 0.1 s before the output; the sine is correct."""
     channels = channels_of(rig)
     terminal_v = 0.5 * AMPLITUDE_VPP * rig.generator.terminal_factor()
     accelerance = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, 160.0)))

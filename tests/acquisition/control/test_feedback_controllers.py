@@ -36,7 +36,7 @@ def folds_hz(oscillator, acceleration):
 
 @pytest.fixture(scope="module")
 def both_ways(request):
-    """Return a dictionary that shares one measurement up and down through the bistable range."""
+    """Return a dictionary in which the tests share one sweep up and down through the bistable range."""
     return {}
 
 

@@ -9,7 +9,7 @@ STEP_S = 0.1
 
 
 def tracked_levels(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
-    """Follow a gain with predicted settings; return achieved over requested level at every step."""
+    """Follow a gain with predicted settings; return the ratio of achieved to requested level per step."""
     random = np.random.default_rng(seed)
     estimator = GainEstimator(memory_s)
     achieved = []

@@ -14,7 +14,7 @@ from vibench.acquisition.recording import Hold, Steadiness
 
 
 def error_deg(frequency_hz, natural_hz, damping):
-    """Return the phase error of the relative motion from -90 degrees, for a base-excited oscillator."""
+    """Return how far the phase of the relative motion is above -90 degrees, for a base-excited oscillator."""
     ratio = frequency_hz / natural_hz
     return float(np.degrees(np.angle(1 / (1 - ratio**2 + 2j * damping * ratio)))) + 90
 

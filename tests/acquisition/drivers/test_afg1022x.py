@@ -38,7 +38,7 @@ def largest_peak_v(states):
 
 
 class TestOpening:
-    def test_the_output_is_first_switched_off_and_an_empty_identity_asked_again(self, plugged):
+    def test_the_output_is_first_switched_off_and_an_empty_identity_queried_again(self, plugged):
         generator = AFG1022X.open(plugged.config)
         assert plugged.log.messages[0] == "OUTP1:STAT OFF"
         assert plugged.log.messages.count("*IDN?") == 2

@@ -211,7 +211,7 @@ def test_requests_and_answers_round_trip(handler):
 
 
 def test_a_hold_of_a_drive_that_cannot_be_held_is_refused(shipped_rig, tmp_path):
-    """A run with a dead man cannot be held; a confirmed hold would end it as complete."""
+    """A run with a dead man's switch cannot be held; a confirmed hold would end it as complete."""
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
     engine, refusals = Engine(Supervision.UNATTENDED), []
     handler = RequestHandler(engine, JobQueue(engine))

@@ -132,7 +132,7 @@ def test_an_unplayable_plan_names_the_allowed_values(kind, fields, sentence):
 
 def test_noise_excites_exactly_the_lines_of_its_band():
     plan = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
-    # At a multiple of the playback rate the lines of a held waveform lie on the bins, and images above half.
+    # At this multiple of the playback rate, lines lie on bins; images lie above half the playback rate.
     shown = plan.preview(8192 * 0.5 * 4)
     strong = shown.frequency_hz[(shown.spectrum_v > 1e-9) & (shown.frequency_hz < 2048)]
     np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))

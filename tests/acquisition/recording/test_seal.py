@@ -189,7 +189,7 @@ def test_a_recording_without_a_seal_is_reported_as_such(make_file):
             assert (found.state, recording.seal) == (SealState.SEAL_GONE, "")
             assert "its seal is gone: vibench" in found.sentence
     with h5py.File(path, "r+") as file:
-        del file["overview"], file["view"]  # which files of versions before seals do not have
+        del file["overview"], file["view"]  # as in a file of a version before seals
     with open_recording(path) as recording:
         found = recording.check_seal("whole")
         assert found.state is SealState.UNSEALED

@@ -86,7 +86,7 @@ def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, late
         assert not bench.world.calls
         return
     carry_out(bench, plan, tmp_path)
-    # A command takes effect when it ends, so that the sweep lags by this time, also at its end.
+    # A command takes effect when it ends. The sweep lags by the duration of a command, also at its end.
     late = latency_s * (plan.excitation.stop_hz - plan.excitation.start_hz) * (1 - step_s / 4.0)
     assert cycles(segment_drive(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
 

@@ -1,4 +1,4 @@
-"""A drive with a dead man: bursts that end by themselves unless the run triggers them again."""
+"""A drive with a dead man's switch: bursts that end by themselves unless the run triggers them again."""
 
 from collections import deque
 from itertools import pairwise
@@ -32,7 +32,7 @@ LOUD_V = 5e-3
 
 @pytest.fixture
 def guarded(laboratory):
-    """Yield a virtual rig, and a bench on it whose generator has a dead man."""
+    """Yield a virtual rig, and a bench on it whose generator has a dead man's switch."""
     virtual, connected = laboratory()
     generator = connected.generator.model_copy(update={"dead_man_s": DEAD_MAN_S})
     connected = connected.model_copy(update={"generator": generator})

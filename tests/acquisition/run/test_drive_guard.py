@@ -107,7 +107,7 @@ def test_a_stop_is_not_confirmed_by_the_silence_of_another_generator(recording, 
 
 
 class Output:
-    """A drive whose output fails to switch off, as often as there are failures."""
+    """A drive whose output fails to switch off once for each given failure."""
 
     def __init__(self, *failures):
         self.failures = list(failures)

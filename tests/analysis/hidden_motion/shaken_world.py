@@ -102,7 +102,7 @@ def with_sensor(rig, role):
 
 
 def contacts(p, gaps_m):
-    """Return begin and end of each contact in grid steps, in the order of time."""
+    """Return the beginning and end of each contact in grid steps, in the order of time."""
     found = []
     for side, gap in zip((-1, 1), gaps_m, strict=True):
         depth = side * p - gap

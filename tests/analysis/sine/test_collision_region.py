@@ -226,7 +226,7 @@ def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed
 
 
 def test_ringing_above_the_drive_level_is_not_a_collision():
-    """Collisions from 97 to 118 Hz were once reported of a ringing specimen without stops."""
+    """Collisions from 97 to 118 Hz were once reported for a ringing specimen without stops."""
     specimen = gong2025(damping_time_s=4e-7)
     sweep = FastSweep(specimen, 88.0, 118.0, 8.0, 1e-6, 1)
     assert simulate_and_analyse(sweep, "linear", None).colliding == 0

@@ -72,7 +72,7 @@ def test_a_drifting_sensor_does_not_change_the_responses(per_s):
 
 
 def test_no_order_leaks_into_response_ii():
-    """The window is no whole number of subharmonic periods; a single-order fit would err by 1e-4."""
+    """The window is not a whole number of subharmonic periods; a single-order fit would err by 1e-4."""
     parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}
     drive, base, velocity = dwell(3, parts)
     result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=1.2345)

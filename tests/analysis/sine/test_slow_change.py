@@ -94,7 +94,7 @@ MODE_HZ, SETTLE_S, RECORD_S = 200.0, 3.0, 1.0
 
 
 def unsettled_step(folder, hz, damping, seed):
-    """Record 1 s of a step, 3 s after its begin; return the result and the settled response."""
+    """Record 1 s of a step, 3 s after its start; return the result and the settled response."""
     rng = np.random.default_rng(seed)
     motion, time_s = (
         synthetic.sine(SETTLE_S + RECORD_S + 1, hz, A0_M),

@@ -238,7 +238,7 @@ def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
     (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))
-    assert collides[np.argmax(whole.response_i)]  # not at the begin of the sweep
+    assert collides[np.argmax(whole.response_i)]  # not at the beginning of the sweep
     assert Cause.CHANCE in largest.not_stated
     before = replace(
         sweep.analysis, response=replace(whole, response_i=np.where(collides, 1e-3, whole.response_i))

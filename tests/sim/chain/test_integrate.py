@@ -32,7 +32,7 @@ def state_of(cells, seed=1):
 
 
 def reference_state(chain, drive, duration_s, state):
-    """Return the final state by scipy's DOP853, restarted at every begin and end of a contact."""
+    """Return the final state by scipy's DOP853, restarted at every beginning and end of a contact."""
     size, first = 3 * chain.size, chain.cells[0]
     mass, stiffness, damping = chain.masses, chain.stiffness_matrix, chain.damping_matrix
     omega, springs = 2.0 * np.pi * drive.frequency_hz, [spring_of(cell) for cell in chain.cells]

@@ -52,7 +52,7 @@ def test_a_shifted_series_has_a_shifted_mean_and_the_same_error(values, shift):
         assert other.standard_error == pytest.approx(one.standard_error, rel=1e-6, abs=1e-9)
 
 
-def test_the_mean_of_equal_values_has_zero_error_and_that_of_one_value_an_unknown_error():
+def test_the_mean_has_zero_error_for_equal_values_and_an_unknown_error_for_one_value():
     assert block_mean([2.5] * 40).standard_error == 0.0
     assert np.isnan(block_mean([2.5]).standard_error)
 

@@ -42,7 +42,7 @@ def test_perturbations_match_an_independent_integrator(spring):
         system = np.array([[0.0, 1.0], [-stiff, -0.05]])
         return (system @ flat.reshape(2, 2)).ravel()
 
-    # Integrate between contact begins and ends, where the stiffness jumps.
+    # Integrate between beginnings and ends of contacts, where the stiffness jumps.
     edges = [0.0, *crossings(spring, motion, 2.0 * math.pi), 2.0 * math.pi]
     state = np.eye(2).ravel()
     for start, stop in pairwise(edges):

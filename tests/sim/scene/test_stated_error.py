@@ -40,7 +40,7 @@ def test_spectral_lines_are_computed_over_whole_periods_of_the_motion(window_s):
         for length_s in (window_s, 2.0)
     )
     assert found.period == longer.period == 5
-    # The window is no multiple of five drive periods; leakage of subharmonics would be 1e-4.
+    # The window is not a multiple of five drive periods; leakage of subharmonics would be 1e-4.
     assert int(window_s * 278.6) % 5 != 0
     off = np.abs(responses(found) / responses(longer) - 1.0)
     assert np.all(off <= errors(found) + errors(longer))
