@@ -58,7 +58,7 @@ def map_motions(
         list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int, option("For maps of initial states: random kicks per motion and size.", "N", min=0)
+        int, option("For maps of initial states: number of kicks per motion and size.", "N", min=0)
     ] = 0,
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,

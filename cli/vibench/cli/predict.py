@@ -251,7 +251,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return the fraction of starts that lead to the motion (5/8), "lost" for a forgotten start, or ""."""
+    """Return the share of starts that lead to the motion (5/8), "lost" if the start is forgotten, or ""."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
