@@ -261,7 +261,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
 
 
 def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
-    """Return a value that changes when the file is written, or when a journal's seal of the file changes.
+    """Return a value that changes when the file is written, or when its seal in a journal changes.
 
     The value includes the file system's time of change, which programs cannot set back.
     """

@@ -59,7 +59,7 @@ _DEAD_SHARE = 0.3
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
-"""Fraction of the base's level error [dB] that one correction removes; below 1: the specimen is slow."""
+"""Fraction of the base's level error [dB] that one correction removes; below 1, as the specimen is slow."""
 _BATCHES = 8
 """Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
 

@@ -63,7 +63,7 @@ class _Pace(Enum):
 
 @dataclass
 class JumpBracket:
-    """Bracket around a jump; each new point replaces one of its ends, as `side` decides."""
+    """Bracket around a jump; each new point replaces one of its ends, chosen by `side`."""
 
     branch: list[SettledPoint]
     """Points on the branch before the jump, in the order of the pass."""
@@ -106,7 +106,7 @@ class JumpLocator:
 
         Return the point reached there, and whether it is on the new branch behind a jump.
 
-        A steep slope is no jump: across it, the change of the response shrinks with the bracket. If both
+        A steep slope is not a jump: across it, the change of the response shrinks with the bracket. If both
         branches exist at the frequency of ``after``, the motion may end on either; the note states on which.
         """
         search = JumpBracket(list(points), after)
@@ -192,7 +192,7 @@ class JumpLocator:
         return None
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
-        """Stop the motion at the branch's first frequency; return 0 if it restarts on the branch, or None."""
+        """Stop the motion at the first frequency; return 0 if it restarts on the branch, else None."""
         yield from decay_motion(self._controller.loop)
         found = yield from self._controller.settle()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None

@@ -18,7 +18,7 @@ up to ``_LARGEST_GAIN``.
 _WIDER = np.linspace(-0.25, 0.25, 15)
 """Trial changes of ln(half-width) from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
-"""Trial changes of ln(half-width) for super- and subharmonics: their first half-width is rough."""
+"""Trial changes of ln(half-width) for super- and subharmonics, whose first half-width is only rough."""
 _SURE_RAD = radians(12.0)
 """Unexplained phase drift that weighs as much in the fit as a change of the half-width by the factor e."""
 _STEEPER = 0.5
@@ -237,7 +237,7 @@ class PhaseSearch:
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # Extrapolate from the best measurement: other modes bend the line, so the zero of the line is off.
+        # Extrapolate from the best measurement: other modes bend the line and thereby shift its zero.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)

@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency also before the shape: that of the sine may be too high for the memory.
+            # Set the frequency before the shape too: the sine's frequency may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)

@@ -387,7 +387,7 @@ class DaqmxDigitizer:
         piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self.sample_rate_hz))
         for first in range(0, rows.shape[1], piece):
             count = min(piece, rows.shape[1] - first)
-            # The reader needs C order, unlike a slice of columns, so pieces of a long read are copied.
+            # The reader needs C order, which a slice of columns lacks, so pieces of a long read are copied.
             target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
             # A short reply leaves this marker in place; no converter returns such a value.
             target[-1, -1] = missing = -np.inf if target.dtype.kind == "f" else np.iinfo(target.dtype).min

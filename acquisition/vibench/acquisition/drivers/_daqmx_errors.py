@@ -129,7 +129,7 @@ def daqmx_call(doing: str) -> Iterator[None]:
             "daq.server to the address of a device server"
         ) from error
     except (AssertionError, ArithmeticError, LookupError, NameError, TypeError, ValueError) as error:
-        # The client assumes that a reply has the requested size, known values, and an error code if it fails.
+        # The client assumes that a reply has the requested size, known values, and a code for every error.
         raise InstrumentError(
             f"{doing} failed: the driver's reply cannot be used ({type(error).__name__}: {error}). Use "
             "matching versions of client, driver and device server, then open the bench again"

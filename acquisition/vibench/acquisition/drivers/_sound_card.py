@@ -315,7 +315,7 @@ def _require_calibration(rig: Rig) -> None:
 
 
 def _input(channel: Channel, rig: Rig) -> int:
-    """Return the number of a card's input; raises ConfigurationError for settings that no card supports."""
+    """Return the index of a card's input; raises ConfigurationError for settings that no card supports."""
     name = channel.physical.rpartition("/")[2]
     full_scale_v = float(rig.daq.options["input_full_scale_v"])
     if (

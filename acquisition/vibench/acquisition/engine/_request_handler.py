@@ -94,7 +94,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 STALL_S = 0.2
-"""If checks of the viewers are further apart than this [s], this process counts as stalled."""
+"""If checks for viewers are further apart than this [s], this process counts as stalled."""
 LATE_FACTOR = 4.0
 """Extra time allowed without requests, divided by this process's own delay (both share a computer)."""
 TAKEN_OVER_S = 2.0

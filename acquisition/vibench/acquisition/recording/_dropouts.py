@@ -43,7 +43,7 @@ _LEAST_OF_FLANK = 0.25
 DROPOUT_DELAY_S = LONGEST_S + 2.0 * _FLANK_S
 """Time that must follow a sample before it is known whether it belongs to a drop-out [s]."""
 _OUTSTANDING = 8.0
-"""Lowest distance of a drop-out from a smooth fit, relative to the rms residual of the fit in the flanks."""
+"""Smallest distance of a drop-out from a smooth fit, relative to the rms residual in the flanks."""
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest change in the flanks."""
 _STEEP = 0.2

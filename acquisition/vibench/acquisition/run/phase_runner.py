@@ -143,12 +143,12 @@ TOLD_CYCLES = 0.1
 MOST_MADE_UP = 3.0
 """Largest frequency correction for lost cycles, as a multiple of the planned frequency step."""
 LEAST_LEFT = 0.2
-"""Shortest time for a correction, relative to the step; also the largest correction of f, relative to f."""
+"""Shortest time for a correction, relative to the step; also the largest relative frequency correction."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
 class _Pace(Enum):
-    """Time at which a phase and its parts begin to count."""
+    """Instant from which the times of a phase and its parts are counted."""
 
     AFTER_THE_COMMAND = auto()
     """The end of the phase's first command; used for settling."""
