@@ -1,7 +1,7 @@
 """Alterations of recordings of a campaign: no command may take an altered recording as intact.
 
 Each number alters one file, the journal or the folder as an outsider could, and runs every reading command on
-it. Altered numbers must be refused or warned of; unaltered recordings must stay intact.
+it. Altered recordings must be refused or give a warning; unaltered recordings must stay intact.
 """
 
 import io

@@ -37,7 +37,7 @@ REQUESTS: tuple[dict[str, Any], ...] = (
     {"ask": "beat"},
     {"ask": "look", "since_sample": 0, "most": 100},
 )
-"""A valid request of every kind that neither plays nor ends: not `start`, `check` or `shutdown`."""
+"""One valid request of every kind that neither plays a signal nor ends the engine."""
 
 
 def frame(text: bytes, payload: bytes = b"") -> bytes:

@@ -38,12 +38,12 @@ class ServedProcess:
 
     @property
     def out(self) -> str:
-        """Its standard output so far."""
+        """Standard output of the process so far."""
         return (self.folder / "out.txt").read_text(encoding="utf-8", errors="replace")
 
     @property
     def err(self) -> str:
-        """Its standard error so far."""
+        """Standard error of the process so far."""
         return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
 
     def until(self, is_there: Callable[[str], bool]) -> str:
@@ -62,22 +62,22 @@ class ServedProcess:
 
     @property
     def resident_bytes(self) -> int:
-        """Its resident memory [bytes]."""
+        """Resident memory of the process [bytes]."""
         return int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]) * PAGE
 
     @property
     def peak_bytes(self) -> int:
-        """Its largest resident memory so far [bytes]."""
+        """Largest resident memory of the process so far [bytes]."""
         status = Path(f"/proc/{self._process.pid}/status").read_text().splitlines()
         return 1024 * next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
 
     @property
     def descriptors(self) -> int:
-        """Its number of open files and sockets."""
+        """Number of open files and sockets of the process."""
         return sum(1 for _ in Path(f"/proc/{self._process.pid}/fd").iterdir())
 
     def faults(self, most_descriptors: int) -> tuple[str, ...]:
-        """Return its faults: a traceback, too much memory or too many open files and sockets."""
+        """Return the faults of the process: a traceback, too much memory, too many open files or sockets."""
         found = (
             ("a traceback", "Traceback (most recent call last)" in self.err),
             (f"took {self.peak_bytes / 1e6:.0f} MB", self.peak_bytes > MOST_BYTES),

@@ -23,7 +23,7 @@ class Finding:
     number: int
     faults: tuple[str, ...]
     told: str
-    """The end of its output."""
+    """End of the output of the command or server."""
 
 
 @dataclass

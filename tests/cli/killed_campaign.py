@@ -103,7 +103,7 @@ def kill_at(arguments: list[str], out: Path, points: int, chance: random.Random)
 
 
 def logged_points(out: Path) -> int:
-    """Return the number of points that the log lists as done, which is fast enough for polling."""
+    """Return the number of points that the log lists as done; reading it is fast enough for polling."""
     log = out / f"{CAMPAIGN}.log.jsonl"
     return log.read_bytes().count(b'"point_done"') if log.exists() else 0
 

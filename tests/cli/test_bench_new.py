@@ -167,7 +167,7 @@ def test_a_question_is_repeated_after_a_number_too_large_to_use(tmp_path):
 
 
 def test_a_configuration_that_cannot_be_written_completely_is_removed(tmp_path):
-    """On a full disk; otherwise a second attempt would find the name in use."""
+    """The disk is full. If the file were kept, a second attempt would find its name in use."""
     with full_disk(), pytest.raises(ConfigurationError, match="File too large"):
         configure(LAB, tmp_path / "lab.toml", found_instruments(), lambda *_: "", "note")
     assert not list(tmp_path.iterdir())

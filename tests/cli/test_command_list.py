@@ -22,7 +22,7 @@ def test_the_command_list_shows_the_first_help_line_of_each_command(name):
 
 
 WITHOUT_A_RESULT = {"twin", "stop", "release", "gui", "serve-rig", "bench", "schema", "warm"}
-"""Their result is not a document; ``bench`` is a group, and ``schema`` always prints JSON."""
+"""Commands without a document as result; ``bench`` is a group, and ``schema`` always prints JSON."""
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS.keys() - WITHOUT_A_RESULT))

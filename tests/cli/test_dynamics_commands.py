@@ -41,7 +41,7 @@ SHORT_LINE = (
 
 def test_branches_report_which_motions_a_bench_can_hold():
     found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
-    # Ten control steps of ten periods or of a fifth of a second.
+    # Ten control steps; each takes ten periods, or a fifth of a second if that is longer.
     assert found["least_growth_time_s"] == pytest.approx(2.0, rel=0.05)
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
@@ -49,7 +49,7 @@ def test_branches_report_which_motions_a_bench_can_hold():
 def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
-    # Ten times the latency of 0.3 ms plus one and a half sample periods of 10,240 samples per second.
+    # Ten times the sum of the latency, 0.3 ms, and one and a half periods of the rate of 10,240 samples/s.
     assert found["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
 
 

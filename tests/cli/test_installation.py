@@ -190,7 +190,7 @@ CORE_ALONE = [
 
 
 @pytest.mark.thorough
-def test_the_base_installation_runs_all_help_and_all_commands_without_figures(tmp_path):
+def test_the_base_installation_shows_all_help_and_runs_all_commands_without_figures(tmp_path):
     helps = [(*words, "--help") for words in (*((name,) for name in COMMANDS), ("bench", "list"))]
     program = ONE_AFTER_ANOTHER.format(
         libraries=[*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], lines=[*CORE_ALONE, *helps]

@@ -71,7 +71,7 @@ def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
 
 
 @pytest.mark.parametrize(("highest", "kinds"), [("6e-5", ["periodic"]), ("-4.6e-5", [])])
-def test_points_next_to_failed_ones_of_a_map_have_no_motion(vibench_here, tmp_path, highest, kinds):
+def test_map_points_next_to_failed_points_have_no_motion(vibench_here, tmp_path, highest, kinds):
     # Starts with p beyond the rigid stops, at 45 um, are refused.
     starts = f"y_m = {{ start = -6e-5, stop = {highest}, points = 33 }}"
     text = BASIN.replace("y_m = { start = -4e-5, stop = 4e-5, points = 5 }", starts) + 'model = "rigid:0"\n'

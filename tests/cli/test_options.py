@@ -39,7 +39,7 @@ def test_options_take_help_and_default_from_their_request_fields(vibench_here, t
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_option_has_a_help(vibench_here, tmp_path, name):
+def test_every_option_has_a_help_text(vibench_here, tmp_path, name):
     shown = vibench_here(name, "--help", cwd=tmp_path)
     assert shown.returncode == 0
     assert re.findall(r"^  --\S+( \S+)?$\n(?=  --|\n|$)", shown.stdout, flags=re.MULTILINE) == []

@@ -68,7 +68,7 @@ def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
         assert south.poll() is None
 
 
-def test_hold_requires_a_program(vibench_here, tmp_path):
+def test_a_hold_without_a_named_program_is_refused_if_several_run(vibench_here, tmp_path):
     with driving_program("north"), driving_program("south"):
         told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert told.returncode == 1

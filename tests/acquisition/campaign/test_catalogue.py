@@ -54,7 +54,7 @@ def reads(monkeypatch):
     return opened
 
 
-def test_the_catalogue_lists_the_plan_time_and_size_of_recordings_in_subfolders_too(folder):
+def test_the_catalogue_lists_recordings_in_subfolders_with_plan_time_and_size(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")
@@ -93,7 +93,7 @@ def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
-def test_the_verdict_of_a_recording_names_its_end_and_overload(bench, folder):
+def test_the_verdict_on_a_recording_states_its_end_and_any_overload(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 

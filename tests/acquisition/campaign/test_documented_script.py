@@ -9,7 +9,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.campaign._journal import journal_path
 
 ROOT = Path(__file__).parents[3]
-# A specimen that stops colliding may do so up to a second late, by chance.
+# By chance, collisions that cease may do so up to a second late.
 CAMPAIGN = """
 name = "jump"
 [[sweeps]]

@@ -151,7 +151,7 @@ def test_a_sweep_holds_its_level_over_a_shaker_resonance(new_control_bench):
     bench.carry_out(Measurement(name="sweep", excitation=plan, ramp_s=0.2))
     achieved = notes_of(bench, "achieved")[-1]
     assert achieved["steps"] == 200
-    # At 0.2 Hz a step on a flank of 9 % per Hz, the previous step predicts the next to within 2 %.
+    # With steps of 0.2 Hz on a flank of 9 % per Hz, each step predicts the next to within 2 %.
     assert achieved["steps_outside"] <= 20
     for outside in notes_of(bench, "level"):
         assert 140 < outside["from_hz"] <= outside["to_hz"] < 160
@@ -208,7 +208,7 @@ def test_a_strongly_bent_resonance_is_followed(new_control_bench):
 def test_an_unsettled_motion_gives_no_resonance(
     new_control_bench,
 ):
-    """Phase and level are within tolerance, but the motion is not observed for a thousand periods."""
+    """Phase and level are within tolerance, but the motion is observed for less than a thousand periods."""
     bench = new_control_bench()
     plan = ResonanceTracking(
         amplitude_vpp=1.0,

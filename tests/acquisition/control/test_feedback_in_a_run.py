@@ -127,7 +127,7 @@ def test_a_base_level_beyond_the_planned_voltage_is_refused_before_output(bench,
     ],
 )
 def test_limits_are_checked_at_the_largest_voltage_of_a_feedback_plan(bench, tmp_path, excitation):
-    """One micrometre needs millivolts, but the plan allows ten volts, which at 20 Hz exceed the stroke."""
+    """One micrometre needs millivolts, but the allowed ten volts exceed the stroke limit at 20 Hz."""
     with pytest.raises(LimitExceeded, match="the stroke"):
         list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))
 

@@ -222,7 +222,7 @@ def test_a_resonance_with_impacts_is_followed_while_the_motion_is_steady(record_
     level = model.amplitudes_m * (2 * np.pi * model.frequencies_hz) ** 2
     onward = model.frequencies_hz > 95.0
     colliding = [each for each in found if each["frequency_hz"] > 95.0]
-    # How the quasi-periodic motion ends where contacts begin decides whether one more level locks in time.
+    # Whether one more level locks in time depends on how the quasi-periodic motion ends as contacts begin.
     assert len([each for each in colliding if each["asked_m_per_s2"] > 0.35]) >= 4
     for each in colliding:
         expected_hz = np.interp(each["base_m_per_s2"], level[onward], model.frequencies_hz[onward])

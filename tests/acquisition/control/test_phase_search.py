@@ -93,7 +93,7 @@ def uncertainty_deg(response, **plan):
 
 @pytest.mark.parametrize("plan", [{"harmonic": 2}, {"harmonic": 3}, {"subharmonic": 2}, {"subharmonic": 3}])
 def test_only_signals_above_noise_have_a_phase(plan):
-    """The phases of eight noise periods scatter by 100 degrees, so their mean seems known to 30."""
+    """The phases of eight noise periods scatter by 100 degrees, so their mean seems known to 30 degrees."""
     known = []
     for seed in range(300):
         random = np.random.default_rng(seed)

@@ -112,7 +112,7 @@ def test_a_motion_with_too_few_periods_is_unsettled():
     ("drives", "share", "period"), [(2, 0.1, 2), (3, 0.002, 3), (2, 0.0, 1), (3, 0.0, 1)]
 )
 def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, period):
-    """Orders that are not multiples of the drive's show whether the motion really has the longer period."""
+    """Orders between those of the drive show whether the motion really has the longer period."""
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
     seen[:, 1] += share

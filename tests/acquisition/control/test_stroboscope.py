@@ -8,7 +8,7 @@ from vibench.acquisition.control.steadiness import ORDERS, Stroboscope
 RATE_HZ = 51200.0
 NEAR_HZ = 260.3
 FIRST_BLOCK = 52
-"""Number of periods before a second block shows the clock difference: up to 0.2 degrees off."""
+"""Number of periods in the first block; the clock difference is not yet known: up to 0.2 degrees off."""
 
 
 def observe(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3, drives=1):

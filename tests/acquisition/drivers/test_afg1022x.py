@@ -146,7 +146,7 @@ class TestPlaying:
             assert generator.query("OUTP1?") == "0"
             generator.close()
 
-    def test_an_asymmetric_waveform_has_the_right_volts_after_an_amplitude_change(self, plugged, generator):
+    def test_an_asymmetric_waveform_has_the_right_voltage_after_an_amplitude_change(self, plugged, generator):
         values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
         generator.load_waveform(values, 2.0, 1.0)
         generator.set_amplitude(2.0)

@@ -222,7 +222,7 @@ class TestFaults:
 
 class TestErrors:
     @pytest.mark.parametrize("code", MEANINGS)
-    def test_every_daqmx_error_in_the_table_has_action_event_and_advice(self, code):
+    def test_every_daqmx_error_in_the_table_states_what_failed_why_and_what_to_do(self, code):
         error = from_code(DaqError("said", code.value), "reading Dev1")
         assert isinstance(error, AcquisitionError)
         assert str(error).startswith("reading Dev1 failed: ")

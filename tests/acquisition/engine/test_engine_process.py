@@ -78,7 +78,7 @@ def stop_events(path, reason):
 
 class TestRuns:
     @pytest.mark.thorough
-    def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
+    def test_opening_checking_arming_running_and_closing_a_bench_succeed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
         bench = open_rig(client, shipped_rig).bench
         assert bench.is_simulated

@@ -76,7 +76,7 @@ def test_equal_seeds_give_equal_periods_and_different_seeds_different_ones():
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
 
 
-def test_requesting_more_realisations_does_not_change_the_first_phases():
+def test_more_realisations_do_not_change_the_phases_of_the_first_ones():
     alone = flat_periods(BAND, 1, seed=7)[0]
     among = flat_periods(BAND, 4, seed=7)[0]
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)

@@ -133,9 +133,7 @@ def sectors_of(write):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_syncs", [True, False])
-def test_only_synced_recordings_open_whatever_unsynced_writes_survive_a_power_cut(
-    tmp_path, traced, has_syncs
-):
+def test_only_synced_recordings_always_open_after_a_power_cut(tmp_path, traced, has_syncs):
     places, empty, trace, truth = traced
     trace = [each for each in trace if has_syncs or each is not None]
     cut_file = CutFile(tmp_path / "cut.h5.part", empty)

@@ -21,7 +21,7 @@ def path(tmp_path, make_header, make_block):
     return tmp_path / "a.h5"
 
 
-def test_a_recording_contains_all_metadata_of_its_start(path, make_channel):
+def test_a_recording_contains_all_metadata_known_at_its_start(path, make_channel):
     with open_recording(path) as recording:
         assert recording.channel("m0_velocity") == make_channel("m0_velocity", long_name="m0 velocity")
         assert recording.plan == {"kind": "dwell", "frequency_hz": 260.0}

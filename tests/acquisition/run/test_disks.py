@@ -114,7 +114,7 @@ def test_a_jump_of_the_computer_clock_changes_only_time_labels(laboratory, tmp_p
     with bench_on(connected) as bench:
         with Run(bench, PLAN, tmp_path / "run.h5") as run:
             upto(run, RunState.RECORDING)
-            # Replace the clock of the recording only: gRPC must agree with its own core.
+            # Replace the clock of the recording only: the clock of gRPC must agree with that of its core.
             clock = SimpleNamespace(time=lambda: now() + by_s, monotonic=time.monotonic)
             monkeypatch.setattr(_committer, "time", clock)
             run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "enough"))

@@ -252,7 +252,7 @@ def test_background_jobs_of_a_run_start_no_new_thread(monkeypatch):
     assert done == [1, 2]
 
 
-def test_a_drive_guard_that_cannot_silence_warns_once_and_tries_again(monkeypatch, caplog):
+def test_a_drive_guard_that_fails_to_silence_a_drive_warns_once_and_tries_again(monkeypatch, caplog):
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 1)
     output = Output(*[InstrumentLost("THE OUTPUT MAY STILL BE ON")] * 3)
     with caplog.at_level("INFO"), DriveGuard(output, StopSwitch()) as guard:
