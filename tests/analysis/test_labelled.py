@@ -30,7 +30,7 @@ from vibench.analysis.uncertainty.budget import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 PUBLIC_APIS = ("", ".live", ".report", ".dynamics", ".hidden_motion")
-"""Those of the analysis that give results; `exchange` makes files."""
+"""Public parts of the analysis that return results; `exchange` makes files."""
 NOT_RESULTS = {
     "SpectralAverages",
     "FittedShaker",
@@ -43,7 +43,7 @@ NOT_RESULTS = {
     "OverviewLevel",
     "Thumbnail",
 }
-"""Working values behind a result, which holds what they say."""
+"""Classes of intermediate values; the results contain the same information."""
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +200,7 @@ PURE_HERE = {
     "CollisionNumbers.misfit",
     "Suspect.behind",
 }
-"""The same of names that mean something else in another result."""
+"""The same for names that mean something else in other results."""
 UNIT_NOT_KNOWN = {
     "LiveSpectrum.amplitude_density": "of channels that are not in it",
     "FrequencyResponseSettings.noise_ratio": "of the two channels that somebody chose",

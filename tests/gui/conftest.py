@@ -14,7 +14,7 @@ from vibench.gui.window.open_window import application
 from vibench.gui.window.window import PAGES, Window
 
 YARDSTICK_S = 0.0054
-"""Time of `yardstick` [s] on the machine of the bounds; bounds scale with it on slower processors."""
+"""Time of `yardstick` [s] on the machine for which bounds are stated; bounds grow on slower processors."""
 
 
 @pytest.fixture(scope="session")

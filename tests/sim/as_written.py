@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from vibench.sim import Harmonic, PowerLaw, gong2025, spring_of
 
 UNITS = np.repeat([1e-4, 0.1], 3)
-"""Of an error: 100 um and 0.1 m/s."""
+"""Units in which errors of a state are stated: 100 um and 0.1 m/s."""
 
 
 def paper(contact="hertz", **options):

@@ -24,9 +24,9 @@ from vibench.sim import (
 LAWS = ["hertz", "linear_gap", "hunt_crossley:0.5", "power:5", "power:29", "rigid:0", "rigid:0.7", "rigid:1"]
 DRIVE = Harmonic(170.0, 20e-6)
 DURATION_S = 0.015
-"""Longer than the first impacts, shorter than chaos needs to make a rounding large."""
+"""Duration that includes the first impacts, but is too short for chaos to make rounding errors large."""
 LIMITS = 1e-6 * np.repeat([1e-4, 0.1], 3)
-"""A millionth of 100 um and of 0.1 m/s: how alike is alike at reference accuracy."""
+"""Allowed difference of two states at reference accuracy: a millionth of 100 um and of 0.1 m/s."""
 
 laws = st.sampled_from(LAWS)
 places = st.tuples(*[st.floats(-20e-6, 20e-6)] * 3)

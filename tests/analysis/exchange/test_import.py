@@ -32,7 +32,7 @@ from vibench.sim.hdf5_files.door import allow_external_data
 RATE_HZ = 8000.0
 SAMPLES = 60_000
 ROUNDING = 2.0**-30
-"""Of a channel's range: the finest step of a stored channel."""
+"""Finest step of a stored channel, relative to its range."""
 DWELL = """
 started_utc = 2026-03-01T12:00:00Z
 sample_rate_hz = 8000.0

@@ -228,7 +228,7 @@ def test_the_uncertainty_of_a_sensor_widens_the_intervals_that_depend_on_it(true
 
 
 @pytest.mark.parametrize("averages", [3, 12])
-def test_reduced_chi_square_of_a_true_model_is_one_with_few_averages(true, averages):
+def test_the_reduced_chi_square_of_a_true_model_is_one_even_with_few_averages(true, averages):
     rng = np.random.default_rng(30 + averages)
     lines_hz = np.arange(60.0, 560.0, 1.0)
     draws = 0.01 * (rng.standard_normal((averages, lines_hz.size, 2)))

@@ -27,7 +27,7 @@ TRUE = with_values(
 LINES = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
 REALISATIONS = 4
 LASER_NOISE = 2e-7
-"""Of the velocity channel [m/s rms]; the response is some tens of micrometres per second."""
+"""Noise of the velocity channel [m/s rms]; the response is some tens of micrometres per second."""
 SWEEP = {"start_hz": 225.0, "stop_hz": 305.0, "duration_s": 16.0}
 SWEEP_M = 6e-6
 

@@ -22,7 +22,7 @@ from vibench.virtual_rig.world.world import World
 RIG = load_rig("virtual_rig")
 GRID_HZ = 102_400.0
 GROUP_DELAY = 39
-"""Samples by which the world's converter shows late what its grid had."""
+"""Delay of the simulated converter behind the time grid [samples]."""
 RAMP_S = 0.3
 SCORED_FROM_S = 0.4
 
@@ -68,7 +68,7 @@ class ShakenRecording:
     p: np.ndarray
     """True p at the recording's samples [m]."""
     touches: np.ndarray
-    """Begin of each contact, as a fractional sample number."""
+    """Beginning of each contact, as a fractional sample number."""
     middles: np.ndarray
     """Middle of each contact, as a fractional sample number."""
 

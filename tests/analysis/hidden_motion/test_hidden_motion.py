@@ -17,7 +17,7 @@ from vibench.sim import HuntCrossley, LinearGap, RigidStops, gong2025
 
 SCORED_FROM_S = 0.4
 PAIRED_S = 1e-4
-"""Told and true impacts nearer than this are one."""
+"""Largest distance between a reported impact and its true impact [s]."""
 
 
 def estimate(recorded, **how):

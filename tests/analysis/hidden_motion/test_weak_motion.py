@@ -12,7 +12,7 @@ from vibench.sim import gong2025
 
 RATE_HZ, SAMPLES = 51_200.0, 61_440
 NOISE = (5e-3, 3.2e-6)
-"""Of the rig's channels [m/s2, m/s], rms."""
+"""Rms noise of the rig's channels [m/s2, m/s]."""
 SPECIMEN = gong2025()
 
 

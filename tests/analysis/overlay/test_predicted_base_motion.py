@@ -31,7 +31,7 @@ HELD_UM = {
     "branch-branch_3um": 3.0,
     "superharmonic-superharmonic_3": 494.7,
 }
-"""Highest level of the base that each plan names, as a displacement where it is played."""
+"""Highest held level of the base in each plan, as a displacement at the played frequency [um]."""
 
 
 def played_hz(excitation):

@@ -17,7 +17,7 @@ from vibench.sim import base_transmissibility
 
 WEAK_VPP = 0.01
 AMPLIFIER_NOISE_V = (0.0, 0.02)
-"""That of the generator alone, which is white and fills resonances; and a floor that outdoes the drive."""
+"""No amplifier noise, so that only the generator's white noise excites resonances; noise above the drive."""
 
 
 def measure(folder, excitation, **virtual):

@@ -169,7 +169,7 @@ def test_recorded_sweep_phase_is_unaffected_by_a_clock_difference():
     assert phase.frequency_hz[at] == pytest.approx(349 + 10e-6 * (150 + 2 * 199), abs=0.01)
 
 
-def test_all_orders_are_separated_even_if_an_interval_holds_no_whole_number_of_periods():
+def test_all_orders_are_separated_even_if_intervals_are_not_whole_numbers_of_periods():
     _, phase = sweep(20)
     parts = {0.5: 0.2 - 0.1j, 1.0: 2.0 + 1j, 1.5: 0.05j, 2.0: -0.3 + 0j, 3.0: 0.1 + 0.2j}
     x = 0.7 + sum(np.real(a * np.exp(1j * k * phase)) for k, a in parts.items())

@@ -39,9 +39,9 @@ STATED = {
     },
 }
 DRAWN = np.array([0.97, 1.01, 1.0, 1.02, 0.98, 1.03])
-"""Largest values of draws over the measured."""
+"""Largest values of the draws, relative to the measured value."""
 BASE_NOISE, LASER_NOISE = 0.02, 2e-4
-"""Over the largest acceleration; and of the velocity, over its largest."""
+"""Noise of acceleration and of velocity, each relative to the largest value of the quantity."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy.stats import binom
 BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "report_coverage.py"
 SHARDS = 10
 LEAST = 1e-4
-"""Chance of so few bounds that hold: a shard has some forty kinds, whose repeats share one rig."""
+"""Probability below which too few bounds hold; a shard has some forty kinds, whose repeats share a rig."""
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from vibench.sim.periodic.shooting import PeriodMap
 from vibench.sim.specimen.specimen import state_scales
 
 pytestmark = pytest.mark.timeout(300)
-"""Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""
+"""The first test compiles the kernels: a minute of processor time, possibly beside other compilations."""
 
 FEW = MotionSearch(places=2, starts=2)
 LEVEL = FrequencyPath((5e-6,))

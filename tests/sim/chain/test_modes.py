@@ -18,7 +18,7 @@ from vibench.sim.chain import (
 
 OVERDAMPED = gong2025(damping_time_s=1e-2)
 UNEVEN = replace(gong2025(), dampings=(0.5, 0.0, 0.9))
-"""Not proportional to the springs."""
+"""Specimen whose dampings are not proportional to its springs."""
 
 
 @pytest.mark.parametrize(

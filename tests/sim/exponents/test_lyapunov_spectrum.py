@@ -11,7 +11,7 @@ from vibench.sim.exponents.lyapunov_spectrum import kaplan_yorke
 from vibench.sim.specimen.modes import state_matrix
 
 pytestmark = pytest.mark.timeout(300)
-"""Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""
+"""The first test compiles the kernels: a minute of processor time, possibly beside other compilations."""
 
 CHAOS = Harmonic(260.0, 5e-6)
 LARGE = Harmonic(430.0, 50e-6)

@@ -10,7 +10,7 @@ from vibench.sim import Accuracy, Harmonic, LinearSweep, Outcome, Sampled, gong2
 from vibench.sim.motion.integrate import HERMITE, sweep_interval_s
 
 PERIODIC = Harmonic(130.0, 20e-6)
-"""Strikes about 260 times a second and settles on a stable period."""
+"""Drive that causes about 260 impacts a second, and a stable periodic motion."""
 
 
 def energy(specimen, state):

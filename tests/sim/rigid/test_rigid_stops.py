@@ -27,7 +27,7 @@ from vibench.sim import (
 
 STILL = Harmonic(100.0, 0.0)
 STICKING = Harmonic(200.0, 50e-6)
-"""Chatters and sticks 200 times a second on stops of restitution 0.8."""
+"""Drive under which m1 chatters and sticks 200 times a second on stops of restitution 0.8."""
 BOUNCING = Harmonic(130.0, 20e-6)
 
 

@@ -8,7 +8,7 @@ from vibench.sim.scene.followed_run import FollowedRun
 
 SLICE_S, SLICES = 0.25, 8
 LOST_E = 10.0
-"""A small change that begins anew turns into the direction of growth, which takes some factors of e."""
+"""Factors of e by which growth may differ, because each new small change first turns into its direction."""
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(300.0, 20e-6), (200.0, 30e-6)])

@@ -22,7 +22,7 @@ from vibench.sim import (
 )
 
 COMPILING_S = 300
-"""For whoever runs the first of these tests after a change of the simulation."""
+"""Time limit that allows the first test after a change of the simulation to compile it [s]."""
 pytestmark = pytest.mark.timeout(COMPILING_S)
 AUTO = AutomaticDuration()
 
