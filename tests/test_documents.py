@@ -222,7 +222,7 @@ def test_the_readme_has_at_most_120_lines():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
 
 
-def test_the_changelog_of_the_version_has_a_date_and_takes_three_minutes_to_read():
+def test_the_changelog_of_the_version_has_a_date_and_takes_at_most_three_minutes_to_read():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     section = re.search(
@@ -238,7 +238,7 @@ def test_the_readme_links_tasks_verdicts_units_and_a_glossary_that_defines_undec
     assert "| undecided |" in (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 
 
-def test_the_package_states_system_and_status_and_no_bound_expires_within_a_year():
+def test_pyproject_states_systems_and_status_and_no_version_limit_expires_within_a_year():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert [each for each in project["classifiers"] if each.startswith("Operating System ::")]
     assert [each for each in project["classifiers"] if each.startswith("Development Status ::")]
