@@ -200,7 +200,7 @@ def _idle_finding(output: AnalogOutput) -> Finding:
     is_zero = output.idle is IdleOutput.ZERO
     advice = "if the program crashes, the output holds its last value: keep the gain knob within reach"
     return Finding(
-        name="output after a crash",
+        name="output without a program",
         value=output.idle.value,
         expected=IdleOutput.ZERO.value,
         verdict=Verdict.OK if is_zero else Verdict.WARN,
