@@ -31,8 +31,8 @@ from ..specimen.state import Floats, Vector
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06
-"""Largest distance of a branch from the chord between two neighbouring points, over the chord's length;
-follows from the largest rotation of the tangent in one step."""
+"""Largest distance of a branch from the chord between two neighbouring points, relative to the chord's
+length. It follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
 """Additional distance between scaled states that `lies_on` allows for rounding errors."""
 LENGTHS = 10.0
@@ -65,7 +65,7 @@ class FoundBranch:
 
     @property
     def is_isolated(self) -> bool:
-        """Whether the branch is a closed curve, out of reach of sweeps along other branches."""
+        """Whether the branch is a closed curve, which sweeps along other branches cannot reach."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -111,7 +111,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches from motions on no known branch, and the branches that fork off, until a time limit."""
+    """Until a time limit, yield branches through motions on no known branch, and branches that fork off."""
     known: list[FoundBranch] = []
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
@@ -132,9 +132,9 @@ def branches_from(
 
 SHOT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
-"""Distances [gaps] of the first guess from the state at a bifurcation, tried to switch branches."""
+"""Distances [gaps] from the state at a bifurcation to the first guesses for branch switching."""
 OFFSETS = (-3e-4, 3e-4, -3e-3, 3e-3)
-"""Distances of the parameter from a bifurcation, relative to its range, tried to switch branches."""
+"""Distances from a bifurcation, relative to the parameter's range, that are tried for branch switching."""
 LEFT = 1e-4
 """Distance [gaps] from the old branch above which a motion counts as being on the new branch."""
 SWITCHED = {
@@ -248,7 +248,7 @@ def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
 
 
 UPDATES_TO_HOLD = 10.0
-"""Fewest updates of a stabilising control loop in the time in which a perturbation grows by a factor e."""
+"""Fewest updates that a stabilising control loop needs while a perturbation grows by a factor e."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
@@ -259,7 +259,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
     Parameters
     ----------
     frequency_hz
-        Drive frequency [Hz], of any shape.
+        Drive frequencies [Hz], an array of any shape.
     multiplier
         Magnitude of the largest Floquet multiplier over one period of the motion, same shape.
     periods
@@ -303,13 +303,13 @@ def balance_branches(
     Parameters
     ----------
     specimen
-        Specimen with any law except rigid stops. Branches start at ``search.places`` values. For power laws,
-        every first-order solution is a start (Gong et al. 2025, eq. 5); for other laws, every motion with the
-        drive's period from `periodic_motions`.
+        Specimen with any law except rigid stops. Starts are sought at ``search.places`` values of the
+        parameter: for power laws, every first-order solution (Gong et al. 2025, eq. 5); for other laws, every
+        motion from `periodic_motions` with the drive's period.
     path, low, high, steps
         As for `shoot_branches`.
     options
-        Harmonics from ``fewest`` to ``most``; 1 and 1 give the paper's first-order balance.
+        Number of harmonics, from ``fewest`` to ``most``; 1 for both gives the paper's first-order balance.
     search
         Settings of the search for starts.
 

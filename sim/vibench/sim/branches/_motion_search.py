@@ -23,7 +23,7 @@ SETTLED = 1e-3
 SAME_MOTION = 1e-5
 """Relative distance of states at the same drive phase, below which two motions count as the same."""
 SIMPLER = 1e-6
-"""Relative distance of states below which half a period counts as a period, or a motion as symmetric."""
+"""Relative distance of states below which a motion repeats after half the period, or is symmetric."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
 """Largest abs(p) of random initial states, relative to the gap on the same side."""
@@ -177,7 +177,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return a motion as a fixed point over its shortest period, or half of it if the motion is symmetric."""
+    """Return a motion as a fixed point over its shortest period, or over half that period if symmetric."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(

@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Balances with a fixed number of harmonics along a drive path; last coordinate: parameter / scale."""
+    """Balances with a fixed number of harmonics along a drive path; points end with parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
@@ -176,7 +176,7 @@ class BalanceFamily:
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed error of p due to neglected harmonics, over the fundamental of p."""
+        """Largest allowed error of p due to neglected harmonics, relative to the fundamental of p."""
         return self.options.tolerance
 
     def drive(self, point: Vector) -> tuple[float, float]:
@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refine(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics, the new ones zero; None if that exceeds the limit."""
+        """Return the family with twice the harmonics (the new ones are zero); None if beyond the limit."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:

@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle within which a Floquet multiplier counts as on it, as without damping."""
+"""Distance from the unit circle within which a multiplier counts as on it, as is usual without damping."""
 
 
 class Parameter(StrEnum):
@@ -70,17 +70,17 @@ class Branch:
     amplitudes_m: Floats
     """Drive amplitude of each point, shape (m,) [m]."""
     response_i: Floats
-    """Largest magnitude, within a period, of every displacement (x, y, z) and of p, over the drive amplitude,
-    shape (m, n + 1)."""
+    """Largest magnitude, within a period, of every displacement (x, y, z) and of p, relative to the drive
+    amplitude, shape (m, n + 1)."""
     response_ii: Floats
-    """Amplitude of every displacement and of p at the drive frequency, over the drive's, shape (m, n + 1)."""
+    """Amplitudes at the drive frequency of every displacement and of p, divided by A0, shape (m, n + 1)."""
     states: Floats
     """Displacements and velocities at time zero of the drive, shape (m, 2 n)."""
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Estimated error of each point over the fundamental of p, shape (m,). In harmonic balance it comes from
-    neglected harmonics, in shooting from the closure error and the integration error."""
+    """Estimated error of each point relative to the fundamental of p, shape (m,). In harmonic balance it
+    comes from neglected harmonics, in shooting from the closure error and the integration error."""
     contacts: NDArray[np.int64]
     """Number of contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]
@@ -119,8 +119,8 @@ POINTWISE = (
 # crosses the unit circle (product of mu_i mu_j - 1; Guckenheimer, Myers and Sturmfels, SIAM J. Numer. Anal.
 # 34 (1997) 1). Grazing changes the number of contacts. The continuation itself detects folds.
 #
-# If a motion is its own mirror image half a period later, its monodromy matrix is the square of that over
-# half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
+# If a motion is its own mirror image half a period later, its monodromy matrix is the square of the matrix
+# for half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
 
 COMPLEX_PART = 1e-6
 """Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs of product 1."""
@@ -150,7 +150,7 @@ class OrbitSigns:
     apart: Vector = field(default_factory=lambda: np.zeros(0))
     """Closure error of the simpler motion (mirrored or half the period), (6,); empty if not defined."""
     joins: BifurcationKind | None = None
-    """Bifurcation at which this branch meets a branch of mirrored motions or of half the period."""
+    """Bifurcation where this branch meets one whose motions are mirrored or have half the period."""
     grazing_distance: float = math.inf
     """Distance from grazing: (p to the stop) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
 
@@ -194,7 +194,7 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Largest distance [gaps] from a simpler motion at the points before and after it."""
+"""Largest distance [gaps] from a simpler motion at the branch points before and after that motion."""
 IS_SIMPLER = 1e-7
 """Distance [gaps] from a simpler motion below which both motions differ only by rounding."""
 

@@ -80,18 +80,18 @@ NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
 """Number of Newton iterations at which the step length is unchanged; fewer make the next step longer."""
 FARTHEST_ASIDE = 0.5
-"""Largest allowed Newton correction, over the step length; a larger one could reach another branch."""
+"""Largest allowed Newton correction, relative to the step length; a larger one could reach another branch."""
 LEAP_GROWTH = 10.0
 """Ratio of successive step lengths that are tried across a kink."""
 LONGEST_LEAP = 5.0
-"""Largest distance between the points before and after a kink, over the tried step length."""
+"""Largest distance between the points before and after a kink, relative to the tried step length."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
 """Value at which a test function (a component of the tangent, a multiplier's distance) counts as zero."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
 """More than MOST_CRAWLED successive steps, all below CRAWLING times the shortest step, indicate a kink."""
 NEAR_START = 0.2
-"""Distance from the curve's first point, over the step length, below which the curve may have closed."""
+"""Distance from the curve's first point, in step lengths, below which the curve may have closed."""
 SAME_POINT = 1e-6
 """Distance below which two points count as the same point of the curve."""
 SHORTEST_BRACKET = 1e-12
@@ -212,7 +212,7 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
 
 
 def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
-    """Return whether a step has passed the first point of the curve, which is then closed."""
+    """Return whether a step has passed the first point of the curve, so that the curve is closed."""
     step = ahead.point - here.point
     length = float(np.linalg.norm(step))
     part = float((start.point - here.point) @ step) / length**2
@@ -250,7 +250,7 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the next step length over the last one, from the iterations and the tangent's rotation."""
+    """Return the ratio of the next step length to the last, from iterations and the tangent's rotation."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))

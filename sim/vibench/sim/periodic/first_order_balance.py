@@ -22,7 +22,7 @@ from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""Value of a sum of powers, over its largest term, below which an extremum counts as a double zero."""
+"""Value of a sum of powers, relative to its largest term, below which an extremum is a double zero."""
 ROOT_TOLERANCE = 1e-15
 """Absolute tolerance of ln u; the method `brentq` adds a relative tolerance of rounding size."""
 
@@ -52,7 +52,7 @@ def _sum_equal_exponents(coefficients: Floats, exponents: Floats) -> tuple[Float
 
 
 def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
-    """Return a sum of powers over the magnitude of its largest term; the sum keeps its sign."""
+    """Return a sum of powers divided by the magnitude of its largest term; the sum keeps its sign."""
     sizes = np.log(np.abs(coefficients)) + exponents * t
     return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
 
@@ -92,7 +92,7 @@ FUNDAMENTAL = np.array([1])
 
 
 def fundamental_share(exponent: int) -> float:
-    """Return the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1), such as 3/4 for n = 3.
+    """Return the fundamental's amplitude in cos^n: binomial(n, (n-1)/2) / 2^(n-1), such as 3/4 for n = 3.
 
     The quotient of two exact integers is correctly rounded for every n.
     """

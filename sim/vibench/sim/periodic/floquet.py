@@ -3,7 +3,7 @@
 Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
 e = dF/d(dp/dt) along the motion. Their map over one period is the monodromy matrix, whose eigenvalues
 determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Motion
-without contact is one matrix exponential. Contacts begin and end at the exact times at which p reaches a
+without contact takes one matrix exponential. Contacts begin and end at the exact times at which p reaches a
 stop; each is integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253).
 Steps are shorter near both ends, where the stiffness of a Hertz contact varies like a square root.
 """
@@ -29,7 +29,7 @@ STEPS_PER_HARMONIC = 16
 SMOOTH_STEPS = 128
 """Smallest number of Magnus steps per period, for a force that is smooth at every p."""
 GAUSS = math.sqrt(3.0) / 6.0
-"""Distance of each of the two Gauss points from the middle of a step, over the step length."""
+"""Distance of each of the two Gauss points from the middle of a step, relative to the step length."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def multipliers(monodromy: NDArray[np.float64]) -> Complex:
 def transition(
     structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
-    """Return the matrix from perturbations (d, d') at phase 0 to those at ``span_rad``, shape (2 n, 2 n)."""
+    """Return the matrix that maps perturbations (d, d') at phase 0 to those at ``span_rad``, (2 n, 2 n)."""
     departures = _Departures(structure, spring, motion)
     edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
     result = np.eye(2 * structure.size)

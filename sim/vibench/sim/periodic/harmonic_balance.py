@@ -85,7 +85,7 @@ class CondensedStructure(NamedTuple):
     reach: Complex
     """Displacements per unit force of the spring, Z_k^-1 b, shape (m, n) [m/N]."""
     carried: Complex
-    """Displacements without the spring over U, Z_1^-1 (e_k + i w e_c), shape (n,)."""
+    """Ratio of the displacements without the spring to U, Z_1^-1 (e_k + i w e_c), shape (n,)."""
 
 
 def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> CondensedStructure:
@@ -224,7 +224,7 @@ def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, o
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12
 ROUNDING = 1e-12
-"""Residual at which Newton's iteration has converged, over the spring's length scale."""
+"""Residual at which Newton's iteration has converged, relative to the spring's length scale."""
 
 
 class HarmonicSet(StrEnum):
@@ -253,7 +253,7 @@ def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
 
 @dataclass(frozen=True, eq=False)
 class BalanceProblem:
-    """Equations of harmonic balance; the unknowns are (Re P, Im P) over the spring's length scale."""
+    """Equations of harmonic balance; the unknowns are (Re P, Im P) / the spring's length scale."""
 
     structure: LinearStructure
     spring: RestoringForce
@@ -329,7 +329,7 @@ class Balance:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (m, n) [m]."""
     left_out: float
-    """Error estimate: change of p due to neglected force harmonics, over the fundamental of p."""
+    """Error estimate: change of p due to neglected force harmonics, relative to the fundamental of p."""
     outcome: BalanceEnd
 
     @property
@@ -341,7 +341,7 @@ class Balance:
 
     @property
     def response_ii(self) -> Vector:
-        """Amplitude of every displacement and of p at the drive frequency, over A0, shape (n + 1,)."""
+        """Amplitude of every displacement and of p at the drive frequency, divided by A0, shape (n + 1,)."""
         first = int(np.searchsorted(self.harmonics, 1))
         lines = np.append(self.displacements[first], self.relative[first])
         return np.asarray(np.abs(lines) / self.amplitude_m)

@@ -48,7 +48,7 @@ class ExactFamily:
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
         """Return the closure error after a period, its Jacobian, and a ratio of scales.
 
-        The map scales velocities by its drive, the family by the reference drive. The ratio converts them.
+        Velocities are scaled by the drive frequency in the map, by the reference frequency in the family.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
@@ -85,7 +85,7 @@ class OrbitFamily(ExactFamily):
         return gone, np.column_stack([by_state, along])
 
     def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
-        """Return the derivative d(final state) / d(parameter) of the map, over scales [1/Hz or 1/m]."""
+        """Return d(final state) / d(parameter) of the map, divided by the state's scales [1/Hz or 1/m]."""
         by_frequency, by_amplitude = self.path.slopes(value)
         slope = np.zeros(6)
         if by_frequency != 0.0:
@@ -115,7 +115,7 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
-    The branch ends at ``stop``, or at its starting value if it turns back there. Folds are passed by
+    The branch ends at ``stop``, or at its starting value if it turns back to it. Folds are passed by
     pseudo-arclength continuation (Keller 1977).
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.

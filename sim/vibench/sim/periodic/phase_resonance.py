@@ -4,7 +4,7 @@ At a phase resonance the fundamental of m0 lags the base by a given angle, usual
 (Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u exerts the inertia force m w^2 u
 on the motion relative to the base. This force is in phase with u, so the relative motion lags u by a quarter
 of a period. Shooting finds the phase resonance, with the phase as a seventh equation and the frequency as a
-seventh unknown. Pseudo-arclength continuation follows it over the level.
+seventh unknown. Pseudo-arclength continuation follows it along the level.
 """
 
 import math
@@ -33,9 +33,9 @@ FREQUENCY_SHARE = 0.1
 FARTHEST = 20.0
 """Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state that Newton's iteration may try, over the gap; larger ones take minutes on a hard spring."""
+"""Largest state [gaps] that Newton's iteration may try; larger ones take minutes on a hard spring."""
 DIFFERENCE = 1e-6
-"""Step of the finite differences for derivatives of the phase, over the scale of each unknown."""
+"""Step of the finite differences for derivatives of the phase, relative to the scale of each unknown."""
 SCAN_POINTS = 400
 
 
@@ -100,7 +100,7 @@ def phase_resonance_branch(
     phase_rad: float = QUARTER_BEHIND,
     steps: ArcSteps = STEPS,
 ) -> Branch:
-    """Follow the phase resonance of a mode over the level of the base, from a level without contact.
+    """Follow the phase resonance of a mode along the level of the base, from a level without contact.
 
     Return the branch over amplitude, which may turn back, with the frequency and multipliers of each motion.
     Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its
@@ -152,7 +152,7 @@ def phase_resonance_branch(
 def linear_phase_resonance_hz(
     specimen: Specimen, band_hz: tuple[float, float], of: PhaseReference, phase_rad: float
 ) -> float:
-    """Return the frequency in a band at which m0, without contact, has a given phase to the base [Hz]."""
+    """Return the frequency [Hz] in a band at which m0 has a given phase to the base, without contact."""
 
     def off(frequency_hz: float) -> float:
         seen = complex(base_transmissibility(specimen, frequency_hz)[0, 0])
@@ -171,6 +171,6 @@ def linear_phase_resonance_hz(
         return found_hz[0]
     where = f"at {', '.join(f'{each:.4g}' for each in found_hz)} Hz" if found_hz else "nowhere"
     raise ValueError(
-        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 over the base is {where} "
+        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 against the base is {where} "
         f"{math.degrees(phase_rad):.3g} degrees: give a band around one mode."
     )

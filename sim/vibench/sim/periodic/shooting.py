@@ -38,7 +38,7 @@ from .harmonic_balance import phasors_of, size_of
 # digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Step of the finite differences for derivatives with respect to a drive parameter, over its value."""
+"""Step of the finite differences for derivatives by a drive parameter, relative to its value."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Offsets (in steps) and weights of the fourth-order central difference quotient."""
 
@@ -76,7 +76,7 @@ class PeriodMap:
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the map's final state for a state at drive phase zero, shape (6,); NaN if the run fails."""
+        """Return the map's final state for a state at drive phase zero, (6,); NaN if the run fails."""
         if not self._may_start(state):
             return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)
@@ -94,7 +94,7 @@ class PeriodMap:
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
-        """Return d(final state) / d(initial state), both states over their scales, shape (6, 6)."""
+        """Return d(final state) / d(initial state), both states divided by their scales, shape (6, 6)."""
         if not self._may_start(state):
             return np.full((6, 6), math.nan)
         scales = state_scales(self.specimen, drive)
@@ -104,11 +104,11 @@ class PeriodMap:
         return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the derivative d(final state) / d ln(frequency), over the scales, shape (6,)."""
+        """Return the scaled derivative d(final state) / d ln(frequency), shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, frequency_hz=part * drive.frequency_hz))
 
     def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
-        """Return the derivative d(final state) / d ln(amplitude), over the scales, shape (6,)."""
+        """Return the scaled derivative d(final state) / d ln(amplitude), shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, amplitude_m=part * drive.amplitude_m))
 
     def _slope(self, state: Vector, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Vector:
@@ -140,10 +140,10 @@ class PeriodMap:
 NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8
 RETURNED = 1e-9
-"""Largest allowed closure error of a periodic motion: final minus initial state, over its scale."""
+"""Largest allowed closure error of a periodic motion: (final - initial state) / scale of the state."""
 FLOW_ERROR = 1e-10
-"""Assumed integration error in a period at reference accuracy, over the state's scale; ten times the measured
-error (docs/accuracy.md)."""
+"""Assumed integration error in a period at reference accuracy, relative to the state's scale; ten times the
+measured error (docs/accuracy.md)."""
 SAMPLES = 4096
 """Samples per drive period from which the responses of y and z are computed."""
 SETTLING_PERIODS = 400
@@ -167,14 +167,14 @@ class PeriodicOrbit:
     """x, y, z, vx, vy, vz at time zero of the drive, shape (6,)."""
     signs: OrbitSigns
     defect: float
-    """Closure error: final minus initial state over the state's scale."""
+    """Closure error: (final - initial state) / scale of the state."""
     error: float
-    """Error bound of the motion, and of the responses of x and p, over the fundamental of p: closure and
-    integration error times |(map - I)^-1|."""
+    """Error bound of the motion, and of the responses of x and p, relative to the fundamental of p: closure
+    and integration error times |(map - I)^-1|."""
     response_i: Vector
-    """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
+    """Largest magnitude of x, y, z and p, relative to the drive amplitude, shape (4,)."""
     response_ii: Vector
-    """Amplitude of x, y, z and p at the drive frequency over the drive amplitude, shape (4,)."""
+    """Amplitude of x, y, z and p at the drive frequency, relative to the drive amplitude, shape (4,)."""
     outcome: ShootingEnd
 
     @property
@@ -279,7 +279,7 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 def _missing(derivative: Table, gone: Vector, size: float) -> float:
     """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1.
 
-    The integration error grows with the ``size`` of the state over its scale, if that is above 1.
+    The integration error grows with ``size``, the state divided by its scale, if that is above 1.
     """
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
@@ -334,7 +334,7 @@ class PhaseReference(StrEnum):
     """Absolute motion: for a mode far above the others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Return this motion of m0 over the base motion; transmissibility - 1 for the relative motion."""
+        """Return the ratio of this motion of m0 to the base motion; transmissibility - 1 if relative."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 
