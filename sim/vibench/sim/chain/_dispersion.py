@@ -21,7 +21,7 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a band gap is a rounding error, as for a unit of several equal cells."""
+"""Relative width below which a band gap is a rounding error; units of several equal cells have such gaps."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
@@ -38,7 +38,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
 
     Returns
     -------
-    exp(i mu), shape (n,): magnitude 1 within a band without damping; below 1 in a gap or with damping.
+    exp(i mu), shape (n,). Its magnitude is 1 in a band without damping, and below 1 in a gap or with damping.
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
@@ -66,7 +66,7 @@ class CellResponse(NamedTuple):
     link: Complex
     """Stiffness of the link to the previous cell, K = k0 + i w c0 [N/m]."""
     stiffness: Complex
-    """Force on m0 over its displacement without the link, S(w) - w^2 m0 [N/m]."""
+    """Ratio of force on m0 to its displacement if the link is left out, S(w) - w^2 m0 [N/m]."""
     inner: Complex
     """Ratio y / x: displacement of m1 over that of m0."""
     middle: Complex
@@ -74,7 +74,7 @@ class CellResponse(NamedTuple):
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> CellResponse:
-    """Return the response of a cell without contact to motion of its m0; finite even where m1 resonates."""
+    """Return the response of a cell without contact to a motion of its m0, finite even if m1 resonates."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping
@@ -119,7 +119,7 @@ class BandGap(NamedTuple):
 def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
     """Return the band gaps of the infinite chain without damping and contact.
 
-    Units are coupled in one displacement only. Each band is therefore monotone in mu, from mu = 0 to mu = pi.
+    Units are coupled in one displacement only. In a band, frequency is therefore monotone in mu from 0 to pi.
     """
     ends = band_frequencies_hz(unit, [0.0, np.pi])
     lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
@@ -131,7 +131,7 @@ def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
 
 
 def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
-    """Return the transmissibility without contact: displacements of the masses and p over the base motion.
+    """Return the transmissibility without contact: ratios of x, y, z and p to the base motion.
 
     Raises ValueError when a frequency is negative.
 

@@ -105,7 +105,7 @@ class ChainRun:
 
     @property
     def forces(self) -> Complex:
-        """Integral of contact force times exp(-i (omega t + phase)) of every cell, shape (cells,) [N s]."""
+        """Integral of each cell's contact force times exp(-i (omega t + phase)), shape (cells,) [N s]."""
         return self._lines
 
     @property
@@ -134,7 +134,7 @@ class ChainRun:
 
 
 MOST_CELL_WINDOWS = 10**10
-"""Largest product of windows and cells of a run; larger runs would take hours."""
+"""Largest product of the numbers of windows and cells; larger runs would take hours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,11 +184,11 @@ def integrate_chain(
 ) -> ChainTrajectory:
     """Integrate a chain of cells under a drive.
 
-    Motion without contact is exact for a harmonic drive; other drives are piecewise polynomials. Bounds on p
-    ensure that no contact is missed. Contacts, in any number of cells at once, are integrated with the
-    tolerance of ``accuracy``. Sampling does not change the time steps. A single cell is integrated by
-    `vibench.sim.motion`. Raises ValueError when an argument is not allowed, the run would take hours, or the
-    drive ends before the run.
+    Motion without contact is exact for a harmonic drive; other drives are treated as piecewise polynomials.
+    Bounds on p ensure that no contact is missed. Contacts, in any number of cells at once, are integrated
+    with the tolerance of ``accuracy``. Sampling does not change the time steps. A single cell is integrated
+    by `vibench.sim.motion`. Raises ValueError when an argument is not allowed, the run would take hours, or
+    the drive ends before the run.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impact
 from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
-"""Distance to which the two motions are repeatedly reset, over the size of the first motion."""
+"""Distance to which the two motions are repeatedly reset, relative to the size of the first motion."""
 SHORTEST_INTERVAL_S = 5e-3
 """Shortest time between two resets [s]; at a growth rate of 100 1/s, distances grow less than twofold."""
 FEWEST_INTERVALS = 32
@@ -142,9 +142,9 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Return the second motion, moved along the line between both motions to the small distance."""
+    """Return the second motion, moved along the line to the first until it is at the small distance."""
     apart = second - first
-    # At rest the size is zero: use at least a displacement of all masses by the drive amplitude.
+    # At rest the size is zero: use at least that of a displacement of all masses by the drive amplitude.
     base = np.zeros_like(first)
     base[:, :MASSES_PER_CELL] = drive.amplitude_m
     size = max(_size(chain, first), _size(chain, base))

@@ -50,7 +50,7 @@ class ChainResponse:
 
     @property
     def response_i(self) -> Floats:
-        """Largest abs(x) and abs(p) of every cell over the drive amplitude, shape (cells, 2)."""
+        """Largest abs(x) and abs(p) of every cell, divided by the drive amplitude, shape (cells, 2)."""
         return self.largest_m / self.drive.amplitude_m
 
     @property
@@ -161,8 +161,8 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     """Return the spectral lines of x, y, z and p at the drive frequency from the forces, shape (cells, 4).
 
     M q'' + C q' + K q = f - F is multiplied by exp(-i omega t) and integrated by parts over whole periods.
-    The result is (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of
-    q, where Q, f and F now are the integrals.
+    The result is (K + i omega C - omega^2 M) Q = f - F - M (dq' + i omega dq) - C dq, where dq is the change
+    of q, and Q, f and F now are the integrals.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
     """Return the energy of every cell, shape (..., cells) [J].
 
     It is the energy of masses, springs (with the link to the previous cell) and stops. A Hunt-Crossley
-    contact stores the energy of its Hertz spring. Without damping and base motion, the sum is constant.
+    contact stores the energy of its Hertz spring. Without damping and base motion, the total is constant.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ REACH = MARKOV_TERMS
 """Number of cells on each side of a unit impulse that the truncated Taylor response reaches."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Largest allowed effect of a contact force on the velocity of another cell in the same window, over the
-tolerance; smaller effects are neglected."""
+"""Largest allowed effect of a contact force on the velocity of another cell in the same window, relative to
+the tolerance; smaller effects are neglected."""
 MOST_HALVINGS = 20
 KEPT = 2
 """Number of window lengths that are tried before the shortest one."""
@@ -81,7 +81,7 @@ def _fastest(chain: Chain, drive: Drive) -> float:
 
 
 def markov_between(chain: Chain) -> Table:
-    """Return Taylor coefficients in time of p of every cell after a unit impulse in a nearby cell.
+    """Return the Taylor coefficients of p(t) in every cell after a unit impulse in a nearby cell.
 
     Shape (MARKOV_TERMS, 2 REACH + 1, cells). The second axis is the distance from the cell with the impulse.
     """
@@ -94,7 +94,7 @@ def markov_between(chain: Chain) -> Table:
 
 
 def _answers(chain: Chain, moves: Table) -> Table:
-    """Return Taylor coefficients in time of p after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
+    """Return the Taylor coefficients of p(t) after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
     Impulses too far apart to affect the same cell share a column. ``moves`` is 0 for fixed cells, else 1.
     """
@@ -131,7 +131,7 @@ def _stretches(motion: Table) -> tuple[Table, Table, Table]:
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Return bounds on dp/dt of other cells after an impulse, within a window, over dp/dt of the cell itself.
+    """Return bounds on dp/dt of other cells within a window after an impulse, over dp/dt of the struck cell.
 
     Shape (REACH + 1,): entry d is the bound for cells at distance d; entry 0 is not used.
     """
@@ -141,7 +141,7 @@ def cross_answers(between: Table, window: float) -> Vector:
 
 
 def _answer_within(coefficients: Table, window: float) -> Table:
-    """Return a bound on d/dt of Taylor series (coefficients on the first axis) within a window [s]."""
+    """Return a bound on the derivative of Taylor series (coefficients on the first axis) in a window [s]."""
     orders = range(1, MARKOV_TERMS)
     return np.asarray(
         sum(np.abs(coefficients[k]) * window ** (k - 1) / math.factorial(k - 1) for k in orders)
@@ -149,7 +149,7 @@ def _answer_within(coefficients: Table, window: float) -> Table:
 
 
 def _back_action(chain: Chain, between: Table, window: float) -> float:
-    """Return a bound on the velocity that a cell's motion feeds back to it via its neighbours in a window."""
+    """Return a bound on the velocity that a cell's motion causes in the cell itself via its neighbours."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
     alone = _answers(chain, only_itself * 1.0)[:, places, places % COLUMNS]
@@ -190,9 +190,9 @@ def _clash(answers: Vector, allowed: float) -> int:
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""Number of polynomial terms in a piece of the drive; eight fit a sine over `WINDOW_TURN` rad to 1e-14."""
+"""Number of polynomial terms per piece of the drive; eight fit a sine to 1e-14 over `WINDOW_TURN` rad."""
 ALMOST = 1e-9
-"""Tolerance for rounding errors of time, over the length of a piece of the drive."""
+"""Tolerance for rounding errors of time, relative to the length of a piece of the drive."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16

@@ -1,4 +1,4 @@
-"""Responses of a chain to a requested relative error or within a requested computing time. SI units."""
+"""Responses of a chain, to within a requested relative error or a requested computing time. SI units."""
 
 import math
 import time
@@ -50,7 +50,7 @@ def chain_response_to(
     chain, drive
         As in `chain_response`; the chain starts from rest.
     error
-        Requested relative error of every cell's transmissibility; None for the smallest that time allows.
+        Requested relative error of every cell's transmissibility; None for the smallest within ``time_s``.
     time_s
         Limit of the computing time [s]; None for one minute.
     """
@@ -62,7 +62,7 @@ def chain_response_to(
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Continue the run for ``periods``; return whether it succeeded and leaves time for as many again."""
+        """Continue the run for ``periods``; return whether that succeeded and time remains to repeat it."""
         before_s, length_s = time.monotonic(), periods / drive.frequency_hz
         state = seen[-1].final_state if seen else None
         seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
@@ -96,7 +96,7 @@ def chain_response_to(
 
 
 def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Raise ValueError if trials of rising length show that one drive period exceeds the time limit."""
+    """Raise ValueError if trials of rising length show that one drive period takes longer than allowed."""
     integrate_chain(chain, drive, TRIED_S, accuracy)  # not timed, because it prepares the engine
     tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
     while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
@@ -117,7 +117,7 @@ def _errors(windows: Sequence[ChainResponse]) -> Floats:
 def error_of_lines(lines: Complex) -> Floats:
     """Return the relative error of the mean amplitude of spectral lines of shape (windows, cells).
 
-    It is the larger of Student's interval over pairs of windows and the difference of the two half means.
+    It is the larger of Student's interval from pairs of windows and the difference of the halves' means.
     """
     count = len(lines) // 2
     if count < FEWEST_PAIRS:
