@@ -40,10 +40,10 @@ from .shapes import (
 
 # Fit of the polynomials with which a batch computes Hertz collisions (native/collision_fit.hpp). SI units.
 #
-# Scale a collision by the depth and the time u that it would have at the same speed without other forces. It
-# then depends only on u and on the acceleration due to all other springs. The variables of the fit are u, and
-# this acceleration with its first four derivatives in the middle of the collision. The polynomials give the
-# duration and the moments of the force about the middle. They are fitted to collisions solved exactly.
+# A collision is scaled by the depth and the time u that it would have at the same speed without other forces.
+# Once scaled, it depends only on u and on the acceleration due to all other springs. The variables of the fit
+# are u, and this acceleration with its first four derivatives in the middle of the collision. The polynomials
+# give the duration and the moments of the force about the middle. They are fitted to exact collisions.
 
 MIDDLE = 1.47
 """Time from the start to the middle of a collision, in units of u."""
@@ -56,9 +56,9 @@ MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
 """Lowest and highest approach speed of the collision fit, divided by gap and fastest modal rate."""
 HARDEST_PRESS = 0.24
-"""Largest acceleration due to other springs that the collision fit covers, over approach speed / u."""
+"""Largest acceleration due to other springs in the collision fit, in units of approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest time derivative of that acceleration, over speed / u^2, and ratio of successive derivatives."""
+"""Largest time derivative of that acceleration, in units of speed / u^2; ratio of successive derivatives."""
 PAPER_TURN = 0.053
 """Fastest modal rate times u [rad], for the paper's specimen at a medium approach speed."""
 SLOWEST_TURN = 0.15
@@ -68,7 +68,7 @@ CHECKED = 200
 SEED = 1
 CORRECTIONS = 8
 FIT_ERROR = 2e-7
-"""Largest allowed error of the separation speed of a fitted collision, over the approach speed."""
+"""Largest allowed error of the separation speed of a fitted collision, relative to the approach speed."""
 GUESS_POINTS = 64
 
 
@@ -76,7 +76,7 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp for a specimen; it takes about 0.05 s.
+    """Return the `CollisionFit` of native/structures.hpp for a specimen, computed in about 0.05 s.
 
     Return None if the stops are too soft or the fit is not accurate enough.
     """
@@ -150,7 +150,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effect on p of each repeated time integral of the force, over the effect of the second."""
+    """Return the effects on p of the repeated time integrals of the force, relative to the second one."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -158,7 +158,7 @@ def _coupling(specimen: Specimen) -> Vector:
 
 
 def _free(accelerations: Table) -> Table:
-    """Return the coefficients of the indentation without contact force in powers of time, shape (n, 7)."""
+    """Return the coefficients, in powers of time, of the indentation without contact force, shape (n, 7)."""
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
@@ -216,7 +216,7 @@ MOST_DAMPED = 0.05
 """Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
 REACHED_END = Outcome.REACHED_END.value
 LEAST_PART = 1e-9
-"""Smallest contribution of a mode to p, over the largest one; a batch derives all modes from p."""
+"""Smallest contribution of a mode to p, relative to the largest; a batch derives all modes from p."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +268,7 @@ def follow_batch(
     Parameters
     ----------
     runs
-        Motions without tangent vectors, with equal tolerances, out of contact at the end of a drive period.
+        Motions with equal tolerances, out of contact, at the end of a drive period, without tangent vectors.
     periods
         Number of drive periods for each motion.
     watch
@@ -276,7 +276,7 @@ def follow_batch(
 
     Returns
     -------
-    Result of each motion; None for a motion that failed and keeps its state.
+    Result of each motion; None for a motion that failed, whose state is left unchanged.
 
     Raises ValueError when batches do not support the specimen, or a motion is in contact.
     """

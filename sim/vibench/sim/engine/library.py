@@ -175,7 +175,7 @@ class Engine:
         return code
 
     def chain_memory(self, cells: int, kinds: int) -> int:
-        """Return the work memory of a chain, in floats, for ``kinds`` different kinds of cells."""
+        """Return the size of a chain's work memory, in floats, for ``kinds`` different kinds of cells."""
         return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
@@ -282,7 +282,7 @@ def library_path() -> Path:
 
 
 def native_digest() -> str:
-    """Return the digest of the native sources, in a wheel from the library's name; empty if unknown."""
+    """Return the digest of the native sources, read from the library's name in a wheel; empty if unknown."""
     digest = sources_digest()
     if digest is not None:
         return digest

@@ -30,7 +30,7 @@ def usable_families() -> tuple[str, ...]:
 
 
 def _level() -> int:
-    """Return 3 for AVX-512, 2 for AVX2, otherwise 1, also if the features are unknown."""
+    """Return 3 for AVX-512, 2 for AVX2, and 1 otherwise or if the features are unknown."""
     if sys.platform == "win32":
         has = ctypes.windll.kernel32.IsProcessorFeaturePresent
         return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))

@@ -21,11 +21,11 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most time steps without contact in one run: seconds of computing, or two days of the paper's motion."""
+"""Most time steps out of contact in a run: two days of the paper's motion, computed in seconds."""
 MOST_IMPACTS = 1 << 26
-"""Most impacts in one run. Their times need 0.5 GB, which is used only as impacts occur."""
+"""Largest number of impacts in one run. Their times take up to 0.5 GB, used only as impacts occur."""
 SPARE_IMPACTS = 100
-"""Impacts allowed in addition to those at the allowed mean rate, so that short runs may have some."""
+"""Number of impacts allowed beyond the allowed mean rate, so that even a short run may have a few."""
 DIRECTIONS = 6
 """Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9
@@ -39,7 +39,7 @@ KNOWN_MOTION = (
     2.63303389e-02,
     -1.20895040e-02,
 )
-"""Known state of the paper's specimen (loss 0.5 s/m), 30 ms after rest, driven at 20 um and 130 Hz."""
+"""Known state of the paper's specimen (loss 0.5 s/m), 30 ms after a start from rest at 20 um and 130 Hz."""
 KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 
@@ -55,7 +55,7 @@ class Watch(IntEnum):
 
 
 class RunRecord:
-    """Record of a run with impacts, samples and observations; recording does not affect the time steps."""
+    """Record of a run's impacts, samples and observations; recording does not affect the time steps."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces samples rounded past the end."""
+        """Return all samples, shape (samples, 6); ``last`` replaces those that rounding puts past the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -229,7 +229,7 @@ class NativeRun(_Run):
         return self._tables.ctypes.data, self._state.ctypes.data
 
     def pass_over(self, length_s: float) -> None:
-        """Skip a period after which the motion repeats [s]: increase the time and keep the state."""
+        """Skip a period [s] after which the motion repeats: increase the time and keep the state."""
         clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
         self._state["clock_high"] = high = math.fsum(clock)
         self._state["clock_low"] = math.fsum((*clock, -high))
@@ -410,7 +410,7 @@ class CubicRun(_Run):
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0
-"""Default limit of the mean impact rate, several times the largest one of the paper's specimen: at 50 um,
+"""Default limit of the mean impact rate, several times the largest rates of the paper's specimen at 50 um:
 4300 per second with Hertz contacts, and 23000 in chatter on rigid stops with restitution 0.8."""
 
 

@@ -17,12 +17,12 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Number of Gauss points in phi; the duration then has an error of 1e-8, the speed a rounding error."""
+"""Number of Gauss points in phi; the duration then has an error of 1e-8, the speed only a rounding error."""
 TERMS = 8
 """Number of terms of the series for spring forces that vary slowly compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
 """First and last tabulated press, and number of tabulated values. The press is the acceleration due to all
-other springs, over speed^2 / depth."""
+other springs, divided by speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
 NEWTON_STEPS = 60
@@ -36,7 +36,7 @@ SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
 """Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to that of the
 polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from LASTS_BY on
-are derivatives of the duration, in the order of those of the depths."""
+are derivatives of the duration, in the same order as the derivatives of the depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 
@@ -50,7 +50,7 @@ def _cardinal(at: Table, points: Vector) -> Table:
 
 
 def _about_middle() -> Table:
-    """Return the matrix from depths at the Gauss points to Taylor coefficients about the middle of phi."""
+    """Return the matrix that maps depths at the Gauss points to Taylor coefficients about mid-phi."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions tabulated over the press, and their scalars; each is the first guess for the next."""
+    """Return collisions and their scalars, tabulated over the press; each solution starts from the last."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
@@ -131,7 +131,7 @@ def collision_shapes() -> tuple[Table, Table]:
 
 
 def _deepest(press: float) -> float:
-    """Return the largest depth d from the energy balance d^(5/2) = 1 + 2 press d, over the free depth."""
+    """Return the largest depth d, in free depths, from the energy balance d^(5/2) = 1 + 2 press d."""
     depth = 1.0
     for _ in range(NEWTON_STEPS):
         depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
@@ -150,8 +150,8 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
 
 
 # Weights for time steps under power laws, the same for every law and step length. The step is scaled to 0..1.
-# In it the force F is the polynomial through its values at eight Gauss points, and all results are linear in
-# these values (docs/decisions/0026-power-laws.md).
+# Within a step, the force F is the polynomial through its values at eight Gauss points. All results are
+# linear in these values (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
 """Number of Gauss points in a time step; ten would cost 50 % more for only 10 % longer steps."""
@@ -174,9 +174,8 @@ AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
 
 
 def _course() -> Table:
-    """Return the matrix that extrapolates F: from its values in a step to coefficients in powers of (s - 1).
-
-    Values are those at the points and the end. Shape (points + 1, points), zero beyond the degree.
+    """Return the matrix that extrapolates F: it maps values at the Gauss points and the end of a step to
+    coefficients in powers of (s - 1). Shape (points + 1, points), zero beyond the degree.
     """
     weights = np.append(np.ones(GAUSS_POINTS), END_WEIGHT)
     known = np.vander(np.append(POINTS_AT, 1.0) - 1.0, COURSE_DEGREE + 1, increasing=True)
