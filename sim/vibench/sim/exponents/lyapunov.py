@@ -76,7 +76,7 @@ class Precision:
     absolute_per_s: float
     """Largest allowed standard error of the exponent [1/s]."""
     relative: float = 0.0
-    """Largest allowed standard error of the exponent, over the exponent."""
+    """Largest allowed standard error of the exponent, relative to the exponent."""
 
     def __post_init__(self) -> None:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
@@ -99,7 +99,8 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of the exponent [1/s]; half the difference of two cycles if periodic, zero for modes."""
+    """Standard error of the exponent [1/s]; for multipliers, half the difference of two cycles; 0 for
+    modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
@@ -140,7 +141,7 @@ def lyapunov_exponent(
     """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
     During ``settle_s`` the motion approaches its attractor. Growth is averaged over the following
-    ``duration_s``, or over the final motion if the kind changes. The defaults add up to the paper's 30 s
+    ``duration_s``, or only over the final motion if its kind differs. The defaults add up to the paper's 30 s
     from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
 
     Parameters

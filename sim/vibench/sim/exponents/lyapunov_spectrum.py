@@ -56,7 +56,7 @@ class LyapunovSpectrum:
     impact_rate_hz: float
     """Mean impact rate of m1 in the final motion [1/s]."""
     dimension_standard_error: float
-    """Standard error of `dimension`, from the correlated errors of the exponents; 0 for whole numbers."""
+    """Standard error of `dimension`, from the correlated errors of the exponents; 0 for a whole dimension."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
@@ -72,7 +72,7 @@ class LyapunovSpectrum:
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
-        """Return Student's confidence limits of the exponents (blocks - 1 degrees of freedom), (6, 2)."""
+        """Return Student's confidence limits of the exponents for blocks - 1 degrees of freedom, (6, 2)."""
         reach = self._reach(confidence) * self.standard_errors_per_s
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 

@@ -47,11 +47,11 @@ class BlockedMean:
     standard_error: float
     """Standard error of the mean; zero if all values are equal, NaN for a single value."""
     block_length: int
-    """Number of values in a block: the smallest power of two for which neighbours are uncorrelated."""
+    """Number of values in a block: the smallest power of two that leaves adjacent blocks uncorrelated."""
     blocks: int
     correlation_length: float
     """Number of successive values that carry as much information as one independent value: the squared
-    standard error over that of independent values."""
+    standard error divided by that of independent values."""
     is_long_enough: bool
     """Whether there are at least `FEWEST_BLOCKS` blocks; otherwise the standard error is a lower bound."""
 
@@ -114,9 +114,9 @@ time the tangent vectors are still independent to several digits."""
 CHECKS = 32
 """Largest number of times that a run is tested for an early end."""
 ALMOST = 1e-9
-"""Relative tolerance within which a duration is a whole number of intervals."""
+"""Relative tolerance within which a duration counts as a whole number of intervals."""
 Enough = Callable[[Floats], bool]
-"""Function that returns whether a run may end early, from the growth in each interval so far, (n, m)."""
+"""Function that returns whether a run may end early, given the growth in each interval so far, (n, m)."""
 CYCLES = 2.0
 """Default length of an interval in cycles of the slowest mode."""
 
@@ -216,14 +216,14 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return into how many parts to divide an interval to keep tangent vectors numerically independent."""
+    """Return the number of parts of an interval that keeps tangent vectors numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
 
 
 def starting_changes(metric: Table, changes: int) -> Table:
-    """Return initial tangent vectors, shape (changes, 6): orthonormal in the metric, equal in every run."""
+    """Return initial tangent vectors, orthonormal in the metric and fixed for all runs, (changes, 6)."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
     root = np.linalg.cholesky(metric)
@@ -237,7 +237,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change of state per cycle: below the first a motion repeats, above the second it does not."""
+"""Relative change of state per cycle. Below the first limit a motion repeats; above the second, not."""
 LONGEST_CYCLE = 16
 """Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0
@@ -291,7 +291,7 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Return the interval after which mean growth is not significantly positive; None if there is none."""
+    """Return the interval after which mean growth is no longer significantly positive; else None."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None

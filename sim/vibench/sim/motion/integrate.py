@@ -17,9 +17,9 @@ from ..specimen.stops import member
 
 # Drives as cubic polynomials of the base displacement on equal time intervals. SI units.
 #
-# A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic has the displacement
-# and the velocity of the sweep at both ends of each interval (C1). Its displacement error is at most
-# amplitude (omega h)^4 / 384 at the highest frequency; the interval h makes it a thousandth of the tolerance.
+# A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic matches the sweep's
+# displacement and velocity at both ends of each interval (C1). Its displacement error is at most amplitude
+# (omega h)^4 / 384 at the highest frequency. The interval h limits it to a thousandth of the tolerance.
 
 HERMITE = 384.0
 """Denominator in the error of cubic Hermite interpolation: h^4 / 384 times the fourth derivative."""
@@ -75,7 +75,7 @@ LATEST_START_S = 1e8
 MOST_SAMPLES = 1e9
 """Largest number of samples of a run; they need 48 GB of memory."""
 ROUNDING = 1e-9
-"""Relative tolerance within which a duration contains a whole number of samples or intervals."""
+"""Relative tolerance within which a duration counts as a whole number of samples or intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +121,10 @@ def integrate(
 ) -> Trajectory:
     """Integrate the motion of a specimen under a drive.
 
-    Motion without contact is exact for a harmonic drive; other drives are piecewise cubics. Bounds on p
-    ensure that no contact is missed. Contacts are integrated with the tolerance of ``accuracy``. Sampling
-    does not change the time steps, so the motion is the same at any sample rate. Raises ValueError when an
-    argument is not allowed, or the drive ends before the run.
+    Motion without contact is exact for a harmonic drive; other drives are treated as piecewise cubics. Bounds
+    on p ensure that no contact is missed. Contacts are integrated with the tolerance of ``accuracy``.
+    Sampling does not change the time steps, so the motion is the same at any sample rate. Raises ValueError
+    when an argument is not allowed, or the drive ends before the run.
 
     Parameters
     ----------

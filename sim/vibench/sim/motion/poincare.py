@@ -21,7 +21,7 @@ def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, mo
     scales
         Scales of a state from `state_scales`, shape (6,).
     tolerance
-        Largest change of a state, over its scale, at which a motion counts as repeating.
+        Largest change of a state, relative to its scale, at which a motion counts as repeating.
     most
         Longest period to try.
     """

@@ -31,7 +31,7 @@ class Response:
     largest_p_m: float
     """Largest abs(p), p = y - z, in the window [m]."""
     line_x_m: complex
-    """Phasor at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase))); the drive is -i A0 [m]."""
+    """Phasor of x at the drive frequency [m], x = Re(line_x_m * exp(i (omega t + phase))). Drive: -i A0."""
     line_p_m: complex
     """Phasor of p at the drive frequency [m]."""
     impacts: int
@@ -46,22 +46,22 @@ class Response:
 
     @property
     def response_i(self) -> float:
-        """Largest abs(x) in the window, over the drive amplitude."""
+        """Largest abs(x) in the window, divided by the drive amplitude."""
         return self.largest_x_m / self.drive.amplitude_m
 
     @property
     def response_ii(self) -> float:
-        """Amplitude of x at the drive frequency, over the drive amplitude."""
+        """Amplitude of x at the drive frequency, divided by the drive amplitude."""
         return abs(self.line_x_m) / self.drive.amplitude_m
 
     @property
     def relative_i(self) -> float:
-        """Largest abs(p) in the window, over the drive amplitude."""
+        """Largest abs(p) in the window, divided by the drive amplitude."""
         return self.largest_p_m / self.drive.amplitude_m
 
     @property
     def relative_ii(self) -> float:
-        """Amplitude of p at the drive frequency, over the drive amplitude."""
+        """Amplitude of p at the drive frequency, divided by the drive amplitude."""
         return abs(self.line_p_m) / self.drive.amplitude_m
 
 
