@@ -24,9 +24,9 @@ BLOCKS = 4
 """Number of parts into which each axis is divided for the jackknife error of the exponent."""
 FEWEST_SIZES = 3
 FEWEST_UNCERTAIN = 100
-"""Fewest uncertain initial states at a distance that the fit uses."""
+"""Smallest number of uncertain initial states at each distance that the fit uses."""
 MOST_UNCERTAIN = 0.5
-"""Largest share of uncertain initial states at a distance that the fit uses."""
+"""Largest share of uncertain initial states at each distance that the fit uses."""
 SPREAD = 4.0
 """Smallest ratio of the largest to the smallest used distance; a narrower range gives no reliable slope."""
 
@@ -35,7 +35,7 @@ SPREAD = 4.0
 class UncertaintyExponent:
     """Exponent of basin boundaries: the share of uncertain initial states varies as distance^exponent.
 
-    The exponent is 1 for a smooth boundary, and 0 if a more accurate initial state does not help. The
+    It is 1 for a smooth boundary, and 0 if a more accurate initial state does not improve the prediction. The
     dimension of the boundary is 2 - exponent (McDonald, Grebogi, Ott and Yorke, Physica D 17 (1985) 125).
     """
 
@@ -59,7 +59,7 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     Parameters
     ----------
     numbers
-        Index of the motion from each initial state, `MapResults.motion_numbers[:, 0]`, (rows, columns).
+        Index of the motion from each initial state, `MapResults.motion_numbers[:, 0]`, shape (rows, columns).
     """
     steps = [2**k for k in range(int(math.log2(max(min(numbers.shape) // 8, 1))) + 1)]
     uncertain = {step: _is_uncertain(numbers, step, steps[-1]) for step in steps}
@@ -112,7 +112,7 @@ class KickStability:
     size: float
     """Standard deviation of the kicks: displacements / gap, velocities / (gap * 2 pi f)."""
     returned: Share
-    """Share of kicks after which the motion returns, within the drive periods of the map."""
+    """Share of kicks after which the motion returns within the map's number of drive periods."""
 
 
 def kick_stability(

@@ -285,8 +285,8 @@ class Map(GridPlan):
     refinement: Refinement = Refinement.ADAPTIVE
     """Selection of the computed points of a map over two quantities."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Grid steps between the points computed first, 2 to 64; halved until 1. By default 16, or fewer so that
-    each axis has eight intervals. Points between equal neighbours are filled in."""
+    """Grid steps between the points computed first, 2 to 64; then halved down to 1. By default 16, or fewer
+    so that each axis has eight intervals. Points between equal neighbours are filled in."""
 
     @property
     def target(self) -> Target | None:

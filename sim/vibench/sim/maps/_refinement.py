@@ -135,7 +135,7 @@ class _Sketch:
             if missing.any():
                 return missing
             self.compute(wanted)
-            # Compute filled-in cells beside a different cell: regions may be narrower than the lattice.
+            # Compute filled-in cells beside another motion: its region may be narrower than the lattice.
             beside = self._has_other_neighbour(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
@@ -168,7 +168,7 @@ class _Sketch:
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
     def _has_other_neighbour(self, fine: int) -> Mask:
-        """Return whether any of each cell's eight neighbours has another motion, shape (rows, columns)."""
+        """Return for each cell whether one of its eight neighbours has another motion, (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)
         differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
@@ -201,7 +201,7 @@ def _lines(length: int, step: int) -> Indices:
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return whether each cell is on every ``step``-th row and column, or on the last one."""
+    """Return whether each cell is on a lattice row and column: every ``step``-th one and the last."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found

@@ -30,11 +30,11 @@ class MapMotion:
     """Period of a periodic motion, in drive periods."""
     has_impacts: bool
     response_i: float
-    """Response I, largest abs(x) over the drive amplitude; median over the points with this motion."""
+    """Response I, largest abs(x) / drive amplitude: median over the points with this motion."""
     response_ii: float
     share: Share
-    """Share of initial states that reach this motion within the map's drive periods; chaos may end later. The
-    95 % intervals of all motions hold jointly. A random state used in all cells counts as one trial."""
+    """Share of initial states that reach this motion within the map's run length; chaos may end later. The 95
+    % intervals of all motions hold jointly. A random state used in all cells counts as one trial."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong audited cells by their computed motion; fractional with several initial states."""
+    """Number of wrong audited cells for each computed motion; fractional with several initial states."""
     lost: tuple[float, ...]
-    """Number of wrong audited cells by their filled-in motion."""
+    """Number of wrong audited cells for each filled-in motion."""
 
     @property
     def wrong_share(self) -> Share:

@@ -60,7 +60,7 @@ class Costs:
     def remaining_s(self, is_missing: NDArray[np.bool_]) -> float:
         """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
 
-        Without a finished neighbour, a point's planned time is multiplied by actual over planned time so far.
+        Without a finished neighbour, a planned time is multiplied by the ratio of actual to planned times.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0

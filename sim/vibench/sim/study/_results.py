@@ -92,13 +92,13 @@ def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
 
 
 CHECKED = 50
-"""About the number of points whose digests are checked when a file is opened; this takes 0.02 s."""
+"""Approximate number of points whose digests are checked when a file is opened, in 0.02 s."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:
     """Raise ValueError if a result is not possible, or belongs to another point.
 
-    Digests are checked for some points, evenly spread, that this version has computed.
+    Digests are checked for some of the points that this version has computed, evenly spread.
     """
     state = states(arrays)
     done = np.flatnonzero(state == PointState.DONE)
@@ -242,7 +242,7 @@ class GridResults(Generic[Plan]):
         name
             Name of a numeric column, such as ``"response_i"``.
         **fixed
-            Values of axes that the result then does not have: ``amplitude=5e-6, model="hertz"``.
+            Values of the axes that are fixed and left out of the result: ``amplitude=5e-6, model="hertz"``.
         """
         columns = {
             column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"

@@ -25,12 +25,12 @@ from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
 from ._study import Study, scene_identity, start_name, study_solver
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; and that of
-a bundle that is solved in SIMD batches."""
+"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; and
+computing time of a bundle that is solved in SIMD batches."""
 
 
 class Expansion(Points):
-    """Points of a study: their scenes, and what is stored."""
+    """Points of a study: their scenes, and the results to store."""
 
     def __init__(self, study: Study) -> None:
         super().__init__(study.grid, study.starts, study_solver(study))
