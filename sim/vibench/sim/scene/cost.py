@@ -111,7 +111,7 @@ class CostLedger:
         return ExpectedTime(planned_s * math.exp(known.mean + drift), factor, known.runs)
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Record the computing time of a run [s], without the loading of modules."""
+        """Record the computing time of a run [s], excluding the loading of modules."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:
@@ -206,7 +206,7 @@ LEARNT_AS: dict[Solver, str] = {
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Record the processor time of a scene [s], without the loading of modules and tables."""
+    """Record the processor time of a scene [s], excluding the loading of modules and tables."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 

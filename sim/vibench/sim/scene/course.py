@@ -115,7 +115,7 @@ def classify(
 ) -> SceneRun:
     """Classify a motion from its response window and the stretches of the run before the window.
 
-    The stretches before the window have the length of its blocks. A motion that repeats counts as periodic
+    The stretches before the window are as long as its blocks. A motion that repeats counts as periodic
     only if Newton's iteration finds a stable periodic motion nearby, because chaos also comes close to
     unstable periodic motions and stays long where a periodic motion has just vanished in a fold.
     """
@@ -209,7 +209,7 @@ class SettlingCourse:
     window_s
         Length of the window for a non-repeating motion [s]; rounded to equal parts of whole drive periods.
     longest_s
-        Longest simulated time [s], at least a window; a motion still unclear then is undecided.
+        Longest simulated time [s], at least a window; a motion still unclear then counts as undecided.
     alone_s
         Nominal computing cost for integrating chaos further [s]; zero for no further integration.
     by_itself_s
@@ -242,7 +242,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Integrate until it is clear whether the motion repeats; return the motion if it must go on."""
+        """Integrate until it is clear whether the motion repeats; return it if it must be continued."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:
@@ -320,7 +320,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the number of drive periods between two checks (a slice), and of slices in a window."""
+    """Return the number of drive periods in a slice (between two checks), and of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))

@@ -23,7 +23,7 @@ class FixedPoint:
     away: Floats
     """Inverse of (identity - Jacobian of the period map), scaled, shape (6, 6)."""
     distance: float
-    """Distance of the given run from the periodic motion, over the size of the motion."""
+    """Distance of the given run from the periodic motion, relative to the size of the motion."""
 
 
 def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:

@@ -40,7 +40,7 @@ STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
-"""Number of steps that one step with a tangent vector counts for in the limit of steps."""
+"""Number of steps as which one step with a tangent vector counts toward the step limit."""
 
 
 def nominal_cost_s(
@@ -122,7 +122,7 @@ class FollowedRun:
         """Nominal computing cost since the start of the run [s]; see `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
         self.tries = 0
-        """Number of successive calls of `follow_together` that ended in contact; at `TRIES` it stays."""
+        """Number of successive calls of `follow_together` that ended in contact, at most `TRIES`."""
 
     @property
     def tolerance(self) -> float:
@@ -190,7 +190,7 @@ class FollowedRun:
         observe: Watch = Watch.NOTHING,
         samples: Samples | None = None,
     ) -> Stretch:
-        """Integrate to a time [s] and return the stretch; a run that has failed does not move."""
+        """Integrate to a time [s] and return the stretch; a run that has failed is not advanced."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
         counts_as = TANGENT_STEPS if len(self._run.growth) else 1
@@ -259,7 +259,7 @@ class FollowedRun:
 
 
 TRIES = 8
-"""Most drive periods to wait for a period that ends without contact, at which a batch can begin."""
+"""Most drive periods to wait for one that ends without contact, so that a batch can begin there."""
 
 
 def follow_together(
@@ -437,7 +437,7 @@ def states_of(stretches: Sequence[Stretch]) -> Floats:
 LEAST_RATE_HZ = 20_000.0
 """Lowest sample rate of a spectrum [1/s]: ten times the rate of contacts, which hardly move m0."""
 HIGHEST = 0.25
-"""Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases below it."""
+"""Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases below that."""
 
 
 @dataclass(frozen=True, eq=False)

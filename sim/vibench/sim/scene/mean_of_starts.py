@@ -87,11 +87,10 @@ def others_of(starts: Sequence[Start]) -> int | None:
 def next_size(
     starts: Sequence[Start], error: float | None, lead: float, most: float = 2.0
 ) -> tuple[int, int]:
-    """Return the numbers of starts and of windows per start to use next, at the least simulated time.
-
-    Windows save the time before the first window, ``lead`` (over the window length). More starts reduce the
-    part of the variance that differs between starts, and the weight of the smallest and largest start. The
-    variance falls at most by a factor of ``most``, because it is not known well.
+    """Return the numbers of starts and of windows per start that need the least simulated time next. Windows
+    save the time before the first window, ``lead`` (in window lengths). More starts reduce the part of the
+    variance that differs between starts, and the weight of the smallest and largest start. The variance falls
+    at most by a factor of ``most``, because it is not known well.
     """
     count, windows = len(starts), windows_of(starts)
     if count < FEWEST_STARTS:
@@ -128,7 +127,7 @@ def _share_within(starts: Sequence[Start]) -> float:
 def time_factor(starts: Sequence[Start], error: float) -> float:
     """Return the factor by which the simulated time must grow to reach the requested error."""
     worst = float(error_of(starts).max())
-    # The share of motions that no start reached falls with the number of starts, other errors with its root.
+    # The share of motions that no start reached falls like 1 / starts, other errors like 1 / sqrt(starts).
     is_unseen = others_of(starts) is not None and worst <= 1.01 * _unseen(len(starts))
     return 1.05 * math.pow(worst / error, 1.0 if is_unseen else 2.0)
 

@@ -66,7 +66,7 @@ class LinearMotion:
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def transient_share(self, time_s: float) -> float:
-        """Return the remaining transient at a time over the steady motion; the larger of x and p."""
+        """Return the ratio of transient to steady motion at a time [s]; the larger one of x and p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
@@ -120,7 +120,7 @@ def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:
 
 
 DECAYED_SHARE = 1e-9
-"""Largest transient, over the steady motion, that the closed form may neglect."""
+"""Largest transient, relative to the steady motion, that the closed form may neglect."""
 
 CLOSED_FORM_S = 5e-4
 """Planned computing time for a closed form [s]. Measured run times correct the planned times for each machine
@@ -131,7 +131,7 @@ second of contact [s]."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
 """Planned computing time [s] per second and per drive period of motion, for a force that acts at every p."""
 TANGENT = 1.5
-"""Additional computing time for a tangent vector, over the time without one."""
+"""Additional computing time for a tangent vector, relative to the time without one."""
 SETTLING_S = 10.0
 """Planned simulated time of a run with an automatic duration [s]."""
 TOUCHING = 0.6

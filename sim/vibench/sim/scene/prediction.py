@@ -59,8 +59,8 @@ class FoundMotion:
     period: int | None
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude: from one start if the motion repeats, otherwise the mean over
-    the starts that reached it. The next three responses are computed in the same way."""
+    """Largest abs(x) divided by the drive amplitude: from one start if the motion repeats, otherwise the mean
+    over the starts that reached it. The next three responses are computed in the same way."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
@@ -165,13 +165,13 @@ class ScenePrediction:
     frequency_hz: float
     amplitude_m: float
     response_i: float | None
-    """Response I: largest abs(x) in the window, over the drive amplitude."""
+    """Response I: largest abs(x) in the window, divided by the drive amplitude."""
     response_ii: float | None
-    """Response II: amplitude of x at the drive frequency, over the drive amplitude."""
+    """Response II: amplitude of x at the drive frequency, divided by the drive amplitude."""
     relative_i: float | None
-    """Response I of p: largest abs(p) in the window, over the drive amplitude."""
+    """Response I of p: largest abs(p) in the window, divided by the drive amplitude."""
     relative_ii: float | None
-    """Response II of p: amplitude of p at the drive frequency, over the drive amplitude."""
+    """Response II of p: amplitude of p at the drive frequency, divided by the drive amplitude."""
     impacts: int
     """Number of contacts that began within the window."""
     impact_rate_hz: float
@@ -213,7 +213,7 @@ class ScenePrediction:
     spectrum_hz: Floats | None = None
     """Frequencies of the spectral lines, shape (lines,) [Hz], if a spectrum was requested."""
     spectrum: Floats | None = None
-    """Amplitude of x at each spectral line over the drive amplitude, shape (lines,)."""
+    """Amplitude of x at each spectral line, divided by the drive amplitude, shape (lines,)."""
     memory: StartMemory = StartMemory.UNKNOWN
     """Whether the start (initial state) determines the final motion."""
     ensemble: Ensemble | None = None

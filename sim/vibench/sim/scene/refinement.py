@@ -56,7 +56,7 @@ FIRST_S, GRACE_S = 0.1, 0.05
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 BATCH_PARTS, MOST_TOGETHER = 8, 64
-"""Nominal computing cost of a part of a batch over that of a single motion, and most motions in a batch."""
+"""Ratio of a part's nominal cost in a batch to that of a single motion, and most motions in a batch."""
 LANES = 8
 """Number of motions that a batch integrates at the same time."""
 FIT_S = 0.03
@@ -68,7 +68,7 @@ CLOSE = 3e-3
 KNOWN = 0.03
 """Relative distance from a known periodic motion, below which a run may be approaching that motion."""
 MOST_PUSH = 1000.0
-"""Largest length, over the drive amplitude, to which changes of the start are scaled instead of the gap."""
+"""Changes of the start are proportional to the gap, or to this many drive amplitudes if that is less."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
@@ -79,8 +79,8 @@ SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""
 FIRST_STARTS, MOST_STARTS = 6, 1_000_000
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
-"""Computing time of Newton's iteration over that of one period of motion, and the largest part of the
-remaining time that it may use."""
+"""Ratio of the computing time of Newton's iteration to that of one period of motion, and the largest part of
+the remaining time that the iteration may use."""
 
 
 class _Clock:
@@ -204,7 +204,7 @@ class _Refinement:
         self._has_answered = False
         self._path = _Path(self._main, np.empty((0, 6)))
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
-        """Number of latest states once per drive period that are stored."""
+        """Number of latest states, one per drive period, that are stored."""
         self._first_section = np.empty((0, 6))
         """States of the first of several starts, once per drive period of its first window."""
         self._is_batched = False
@@ -354,7 +354,7 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion over ``size``; inf if the motion is None."""
+        """Return the distance of a state from a periodic motion / ``size``; inf if the motion is None."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
@@ -428,7 +428,7 @@ class _Refinement:
 
     @property
     def _remaining_change(self) -> float:
-        """Estimate the relative distance of a run from its final motion, by the change in one decay time."""
+        """Estimated relative distance of a run from its final motion, from the change in one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]
@@ -541,7 +541,7 @@ class _Refinement:
     def _observe_starts(self, starts: list[Start], count: int, begins_s: float) -> bool:
         """Add the next ``count`` starts, with a window each; return False at the end of the time."""
         paths = [self._new_path(len(starts) + k) for k in range(count)]
-        # In a batch, simulating a settled run further takes less time than a look.
+        # In a batch, simulating a settled run further takes less time than a check.
         looks = 1 if self._is_batched else LOOKS
         for look in range(1, looks + 1):
             look_s = math.ceil(begins_s * look / looks * self._frequency_hz) / self._frequency_hz

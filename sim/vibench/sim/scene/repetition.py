@@ -22,7 +22,7 @@ MOST_PERIODS = 32
 FEWEST_BETWEEN = 8
 """Fewest drive periods between two states that are compared to detect repetition."""
 SLOWEST_RATIO = 0.99
-"""Largest assumed ratio of successive changes of state, which means the slowest settling."""
+"""Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 NEARLY = 0.01
 """Relative change of state from one period to the next, below which a motion counts as settling."""
 TINY = 1e-300
@@ -35,8 +35,8 @@ CERTAIN_GROWTH = 12.0
 NEUTRAL = 0.1
 """Largest growth per decay time (slowest mode) that counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
-"""Number of consecutive parts of a motion; in a drift, the changes of state in all of them grow, or all
-shrink. This happens by chance in 2 of 720 cases."""
+"""Number of consecutive parts of a motion. In a drift, the change of state grows from part to part, or it
+shrinks from part to part. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
 """Time [decay times] without growth or decay of a perturbation, after which a motion is quasi-periodic."""
 
@@ -47,7 +47,7 @@ class Repetition:
 
     period: int
     distance: float
-    """Estimated distance of the run from the periodic motion, over the size of the motion."""
+    """Estimated distance of the run from the periodic motion, relative to the size of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class Sharpness:
 def repetition(
     section: Floats, omega: float, forgetting_periods: float, sharpness: Sharpness
 ) -> Repetition | None:
-    """Return the shortest period of a motion at its end; None if it does not repeat.
+    """Return the shortest period with which a motion repeats at its end; None if it does not repeat.
 
     Two changes over the same number of periods, about a decay time, are compared, because a small change in
     one period may be part of a slow drift. The ratio of the two changes gives the remaining distance.
@@ -197,7 +197,7 @@ def _change(after: Floats, before: Floats) -> float:
 FORGETTING = 8.0
 """Number of decay times (slowest mode) after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""Ratio of the longest run to the longest decay time that is used; longer ones are cut to this time."""
+"""Ratio of the longest run to the longest decay time used; longer decay times are cut to that time."""
 MOST_STATES = 2_000_000
 """Most drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
@@ -210,8 +210,8 @@ EXACTLY = 1e-9
 """Relative distance from the periodic motion below which the rest of a run is skipped; below the error of
 every accuracy level."""
 STEPPING = 100.0
-"""Noise of time integration over its tolerance, because steps differ from period to period. Measured: at most
-70 (p^7 at 130 Hz and 20 um)."""
+"""Ratio of the noise of time integration to its tolerance; the steps differ from period to period. Measured:
+at most 70 (p^7 at 130 Hz and 20 um)."""
 
 
 @dataclass(frozen=True)

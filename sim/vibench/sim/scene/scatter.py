@@ -27,7 +27,7 @@ class WindowScatter:
     """Scatter of the largest value in a window, from window to window."""
 
     relative: float
-    """Standard deviation of the largest value in a window, over its mean."""
+    """Standard deviation of the largest value in a window, divided by its mean."""
     blocks: int
     """Number of blocks from which the scatter was estimated."""
 

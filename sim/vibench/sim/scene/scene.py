@@ -68,7 +68,7 @@ class AutomaticDuration(Strict):
 
     window_s: float = PAPER_WINDOW_S
     longest_s: float = 300.0
-    """Longest simulated time; a motion that is still unclear then is undecided [s]."""
+    """Longest simulated time [s]; a motion that is still unclear then counts as undecided."""
     kind: Literal["automatic"] = "automatic"
 
     def __post_init__(self) -> None:
@@ -81,7 +81,7 @@ class Target(Strict):
     """Requested error or computing time, or both."""
 
     error: float | None = None
-    """Largest relative error of each response; None for the smallest that the time allows."""
+    """Largest relative error of each response; None for the smallest error that the time allows."""
     time_s: float | None = None
     """Limit of the computing time [s]; None for one minute."""
 

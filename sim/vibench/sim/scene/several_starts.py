@@ -275,7 +275,7 @@ class SeveralStarts:
 SAME = 1e-3
 """Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Ratio above which two chaotic motions differ: their difference over the 95 % limit of their scatter."""
+"""Two chaotic motions differ if their difference exceeds this multiple of their 95 % scatter limit."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
@@ -283,7 +283,7 @@ CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Return the starts grouped by motion; the clearest motion comes first and represents its group."""
+    """Return the starts grouped by motion; in each group the clearest one comes first and represents it."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -433,7 +433,7 @@ def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
 
 
 def _deviation(values: Sequence[float]) -> float | None:
-    """Return the standard deviation of values over their mean; None for a single value."""
+    """Return the standard deviation of values divided by their mean; None for a single value."""
     return float(np.std(values, ddof=1) / np.mean(values)) if len(values) > 1 else None
 
 

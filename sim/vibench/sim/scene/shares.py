@@ -128,7 +128,7 @@ class EscapeRate:
     """Rate at which chaos ends, estimated from several starts; its inverse is the mean lifetime."""
 
     rate_per_s: float
-    """Number of escapes from chaos over the total time in chaos [1/s]."""
+    """Number of escapes from chaos divided by the total time in chaos [1/s]."""
     low_per_s: float
     """One-sided lower 97.5 % confidence limit of the escape rate [1/s]; zero without escapes."""
     high_per_s: float

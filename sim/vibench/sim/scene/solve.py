@@ -77,7 +77,7 @@ Solver = Callable[[Scene], ScenePrediction] | InBatches
 def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
     """Solve a scene as planned, with error estimates.
 
-    Each of the four responses has a relative error; ``error_estimate`` is the largest. It is twice the
+    Each of the four responses has a relative error; ``error_estimate`` is the largest. An error is twice the
     measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, that
     run continues from the end until the transient has decayed; otherwise it begins at the start. If the two
     runs separate, any repeated run is a new random sample. The error is then the difference that two samples
@@ -103,7 +103,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
 
 def settle_scene(scene: Scene) -> ScenePrediction:
-    """Solve a scene as planned, without errors and without other starts.
+    """Solve a scene as planned, without error estimates and without other starts.
 
     The motion equals that of `solve_scene`, at a third of its computing time or less. Chaos is integrated as
     long as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
@@ -130,8 +130,8 @@ class SolvedScene:
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
     """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
-    The result of a scene does not depend on the other scenes. In chaos it is another random sample than that
-    of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
+    The result of a scene does not depend on the other scenes. In chaos it is a different random sample from
+    that of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
     """
     found: list[SolvedScene] = []
     together: list[Scene] = []

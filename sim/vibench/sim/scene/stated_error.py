@@ -26,8 +26,8 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the stricter run. It must be far below the error of collisions in closed form, which are more
-accurate than a hundredth of the tolerance of *quick*."""
+"""Tolerance of the stricter run. It must be far below the error of collisions in closed form; that error is
+below a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
@@ -35,16 +35,16 @@ SHORTER = 4
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
-"""Safety factor: stated error over measured error."""
+"""Safety factor: stated error / measured error."""
 ROUNDING = 1e-11
 """Relative rounding error of an exact result."""
 ROUNDED = 1e-13
-"""Offset of the start of the stricter run, over the drive amplitude. It is several times the accumulated
-rounding error of a run, because one offset shows only one sample of the effect of rounding."""
+"""Offset of the start of the stricter run, relative to the drive amplitude. It is several times the
+accumulated rounding error of a run, because one offset shows only one sample of the effect of rounding."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Signs of the offset of each coordinate; those of y and z are equal, so that p does not change."""
 SLOWEST_RATIO = 0.9
-"""Largest assumed ratio of successive changes of state, which means the slowest settling."""
+"""Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 FIRST_LOOK = 16
 """Number of drive periods before two runs are first compared; this number then doubles each time."""
 PARTED = 0.05
@@ -94,7 +94,7 @@ def stated_errors(
         Function that integrates other starts.
     """
     answer = seen.window.responses_m
-    # The stricter run may not repeat yet; its spectral lines then have another length, so add the leakage.
+    # If the stricter run does not repeat yet, its spectral lines cover another length: add the leakage.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
@@ -142,7 +142,7 @@ class _StrictRun:
     """Stricter run: the motion, integrated from its start with a smaller tolerance."""
 
     run: FollowedRun
-    """Stricter run, at the time at which it separated from the original run, else at the window's end."""
+    """Stricter run at the time when it separated from the original run, or at the window's end."""
     responses_m: Floats | None
     """Responses in the window [m], shape (4,); None if the two runs separate before it."""
     is_together: bool

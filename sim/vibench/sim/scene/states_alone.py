@@ -48,8 +48,8 @@ class StatesAlone:
     every
         Store every n-th state in `path`; None stores none.
     by_itself_s
-        Time after which the motion may join a batch [s], because errors made in a transient persist. It is a
-        whole number of drive periods, because batches begin at the end of a period.
+        Time [s] before which the motion may not join a batch, because errors made in a transient persist. It
+        is a whole number of drive periods, because batches begin at the end of a period.
     """
 
     def __init__(
@@ -193,6 +193,6 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Integrate each motion in a batch for its number of periods; return the motions that must go on."""
+    """Integrate each motion in a batch for its number of periods; return those that need more periods."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
     return [each for (each, _), stretch in zip(ready, found, strict=True) if each.note(stretch) is None]
