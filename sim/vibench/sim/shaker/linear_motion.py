@@ -90,7 +90,7 @@ def linear_motion(
         + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
         + shaker.suspension_stiffness_n_per_m
     )
-    # Output over input voltage of the amplifier, shape of ``s``.
+    # Ratio of output to input voltage of the amplifier, shape of ``s``.
     low_cut = 2 * np.pi * amplifier.low_cut_hz
     below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
     voltage = np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))

@@ -24,9 +24,9 @@ Gain = Callable[[FloatArray], ComplexArray]
 FINEST_STEP_HZ = 5e4
 """Lowest step rate [Hz]; the specimen's force on the table then has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""Upper end of the pass band over the sample rate; a cosine edge to half the sample rate follows."""
+"""Ratio of the pass band's end to the sample rate; a cosine edge to half the sample rate follows."""
 _MARGIN = 2048
-"""Samples filtered with a piece on each side of it; beyond them, impulse responses are below 1e-8."""
+"""Number of samples filtered on each side of a piece; beyond them, impulse responses are below 1e-8."""
 _PIECE = 1 << 15
 """Number of samples in a piece of the recording; a piece is filtered at once."""
 _BLOCK_S = 0.02
@@ -49,7 +49,7 @@ class DrivenTable:
     base_sensor: Gain = identity
     """Complex gain of the sensor of the base acceleration."""
     m0_sensor: Gain = identity
-    """Complex gain of the sensor of the m0 velocity; a delay is a falling phase."""
+    """Complex gain of the sensor of the m0 velocity; a delay appears as a falling phase."""
     base_low_cut_hz: float = 0.0
     """-3 dB frequency of the first-order AC coupling of the base channel [Hz]; 0 for DC coupling."""
 
@@ -159,7 +159,7 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return factors for spectral lines of ``size`` samples: to steps, or from steps through a sensor."""
+        """Return factors for the lines of ``size`` samples: for conversion to steps, or back via a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)

@@ -57,7 +57,7 @@ class LinearSweep(_Sweep):
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the phase in cycles at each time: start t + (stop - start) t^2 / (2 duration)."""
+        """Return the phase [cycles] at each time: start t + (stop - start) t^2 / (2 duration)."""
         return (self.start_hz + 0.5 * (self.stop_hz - self.start_hz) / self.duration_s * time_s) * time_s
 
     def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -73,7 +73,7 @@ class LogarithmicSweep(_Sweep):
     """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the phase in cycles: start (exp(g t) - 1) / g with g = ln(stop/start) / duration."""
+        """Return the phase [cycles]: start (exp(g t) - 1) / g with g = ln(stop/start) / duration."""
         growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
         return self.start_hz * np.expm1(growth * time_s) / growth
 
@@ -148,4 +148,4 @@ def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude
 
 
 WHOLE = 1e-9
-"""Relative tolerance within which a window contains a whole number of periods."""
+"""Relative tolerance within which a window counts as a whole number of periods."""

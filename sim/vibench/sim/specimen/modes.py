@@ -42,7 +42,7 @@ def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
 
 
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
-    """Return the transmissibility without contact: x, y, z and p over the base displacement.
+    """Return the transmissibility without contact: ratios of x, y, z and p to the base displacement.
 
     For x, y, z it is (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises ValueError
     when a frequency is negative or not finite.
@@ -56,7 +56,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
 
     Returns
     -------
-    Complex, shape (n, 4): x, y, z and p = y - z over U, for the time factor exp(+i w t).
+    Complex, shape (n, 4): x, y, z and p = y - z, divided by U, for the time factor exp(+i w t).
     """
     omega = angular_frequencies(frequency_hz)
     (m0, m1, m2), squared = specimen.masses, omega**2
@@ -247,7 +247,7 @@ PLACES = [X, Z, VX, VZ]
 
 
 class BoundMotion(NamedTuple):
-    """Motion while m1 sticks to m2: n modes (2 to 4) and the steady part; y is without the constant gap."""
+    """Motion while m1 sticks to m2: n modes (2 to 4) and the steady part; y excludes the constant gap."""
 
     modes: ModalForm
     """Modal form for x, y, z, vx, vy, vz; left eigenvectors are nonzero only at x, z, vx, vz."""

@@ -1,7 +1,7 @@
 """The 3-DOF vibro-impact specimen: masses, springs, dampers, gap and contact. SI units.
 
 Spring and damper (k0, c0) connect m0 to the base with displacement U, (k2, c2) connect m2 to m0, and (k1, c1)
-connect m1 to m2. m1 touches a stop on m2 where ``|p| = |y - z|`` reaches the gap. The coordinates (x, y, z)
+connect m1 to m2. m1 touches a stop on m2 when ``|p| = |y - z|`` reaches the gap. The coordinates (x, y, z)
 are the absolute displacements of m0, m1, m2 (Gong et al. 2025, eq. 1).
 """
 
@@ -127,7 +127,7 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""Matrix, shape (3, 2), from displacements (x, z) to (x, y, z) without the gap while m1 sticks to m2."""
+"""Matrix, shape (3, 2), that maps (x, z) to (x, y, z) while m1 sticks to m2; the gap is left out."""
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:

@@ -351,7 +351,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with the values of ``table``, without `about` and sources of the replaced values."""
+    """Return ``base`` with the values of ``table``, without `about` and the replaced values' sources."""
     replaced = {key for pair in ALTERNATIVES if table.keys() & pair for key in pair} | table.keys()
     replaced |= {"about"} if table else set()
     kept = {key: value for key, value in base.items() if key not in replaced}
