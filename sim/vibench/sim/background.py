@@ -24,7 +24,7 @@ from .operating_system.this import bound_memory, lower_priority
 
 NICE = 10
 MOST_BYTES = 6 << 30
-"""Memory limit of a worker process [bytes], where the operating system supports one."""
+"""Memory limit of a worker process [bytes], if the operating system supports such limits."""
 MOST_WAITING = 200
 """Number of unread messages at which a worker waits until `Pool.poll` reads them."""
 GRACE_S = 2.0
@@ -54,7 +54,7 @@ def ignore_progress(progress: Progress) -> None:
 
 
 def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
-    """Report that a stage begins; return the function that reports its finished and total amount of work."""
+    """Report the start of a stage; return a function that reports the stage's finished and total work."""
     observer(Progress(0, 0, note=note))
     return lambda done, of: observer(Progress(done, of, note=note))
 

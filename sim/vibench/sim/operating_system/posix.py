@@ -20,7 +20,7 @@ def open_to_write(path: Path) -> int:
 
 
 def open_for_all(path: Path) -> int:
-    """Open a lock file for all users, created if missing; return its descriptor.
+    """Open a lock file for all users, or create it if missing; return its descriptor.
 
     Raises OSError if the path is not a regular file with one name (for example a link or a pipe).
     """

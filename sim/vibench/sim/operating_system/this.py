@@ -116,7 +116,7 @@ def rename(unfinished: Path, final: Path) -> None:
     """Rename a file, replacing `final`; ignore a network folder's error if the file was renamed."""
     made = unfinished.stat()
     try:
-        os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
+        os.replace(unfinished, final)  # noqa: PTH105 - used with os.fsync
     except OSError:
         if not final.exists() or not os.path.samestat(made, final.stat()):
             raise

@@ -22,7 +22,7 @@ def open_to_write(path: Path) -> int:
 
 
 def open_for_all(path: Path) -> int:
-    """Open a lock file for all users, created if missing; return its descriptor."""
+    """Open a lock file for all users, or create it if missing; return its descriptor."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
     except PermissionError:  # another user's file can be locked if it is open for reading
