@@ -51,7 +51,7 @@ class Group:
     name: str
     """Prefix of these properties' names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], list[Any]]
-    """Function that returns the objects of a request. A query reads the first; a setting applies to all."""
+    """Function that returns the objects of a request. Get calls read the first; set calls apply to all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
     """Whether these properties are read-only while the task runs."""
@@ -259,7 +259,7 @@ GROUPS = {
 """Groups of properties, keyed by their part of the call names in the protocol."""
 
 
-# Tables from call to property, and from value to message
+# Tables that map calls to properties, and values to messages
 
 SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
 _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")

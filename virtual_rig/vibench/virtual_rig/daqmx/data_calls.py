@@ -61,7 +61,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
 
 def default_samples(task: Task) -> int:
-    """Return how many samples "all" means: those of a finite task, or the unread of a continuous task."""
+    """Return how many samples "all" means: the total of a finite task, or the unread of a continuous one."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -211,7 +211,7 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 
 
 def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:
-    """Read samples, converted and in the caller's layout; the caller's array limits "all" samples."""
+    """Read samples, converted, in the caller's layout; "all" means as many as fit the caller's array."""
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan

@@ -62,7 +62,7 @@ class AnalogInputs:
     iepe_currents_a: tuple[float, ...]
     """Possible excitation currents besides 0 [A]; empty if the inputs have no excitation."""
     terminals: tuple[TerminalConfiguration, ...]
-    """Possible couplings; the first is the default."""
+    """Possible terminal configurations; the first is the default."""
     untimed: SampleTimingType
     """Timing of a task without a sample clock; delta-sigma converters then use their default clock rate."""
     detects_overloads: bool = False
@@ -194,7 +194,7 @@ class Catalogue:
     def physical(
         self, names: str, side: Callable[[Device], tuple[str, ...]]
     ) -> tuple[tuple[str, Device], ...]:
-        """Return each channel in a list of names and ranges, with its device and as spelled by this device.
+        """Return each channel in a list of names and ranges, in its device's spelling, with the device.
 
         ``side`` returns the inputs or the outputs of a device. -200220, -200170 or -200096 for unknown names.
         """

@@ -154,7 +154,7 @@ def _wait(rig: "Rig", is_there: Callable[[], bool], deadline_s: float) -> bool:
 
 
 class OnDemandPace:
-    """FREE: samples exist when requested. Nothing waits or is lost, and runs are reproducible bit for bit."""
+    """Pace FREE: samples exist when requested. Nothing waits or is lost; runs are repeatable bit for bit."""
 
     loses_samples = False
 

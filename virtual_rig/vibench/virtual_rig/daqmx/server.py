@@ -44,7 +44,7 @@ class TokenCheck(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships wit
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)
         reason = (
-            f"this rig is served with a token: put what 'vibench serve-rig' printed into {TOKEN_VARIABLE}"
+            f"this rig is served with a token: set {TOKEN_VARIABLE} to the one 'vibench serve-rig' printed"
         )
         return grpc.unary_unary_rpc_method_handler(
             lambda _, context: context.abort(grpc.StatusCode.UNAUTHENTICATED, reason)

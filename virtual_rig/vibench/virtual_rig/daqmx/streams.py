@@ -75,7 +75,7 @@ class Stream:
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     def due(self, now_s: float) -> int:
-        """Return how many samples a stream without end has transferred until rig time ``now_s``."""
+        """Return how many samples a stream without end would have transferred by rig time ``now_s``."""
         return math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
 
 

@@ -80,7 +80,7 @@ class Task:
         self.timing = Timing()
         self.log: TdmsLog | None = None
         self.output_size = 0
-        """Size of the output buffer in samples per channel; if 0, as large as the first writes."""
+        """Size of the output buffer in samples per channel; 0 to fit the samples written before the start."""
         self.regeneration = RegenerationMode.ALLOW_REGENERATION
         self.inputs: list[InputChannel] = []
         self.outputs: list[OutputChannel] = []
@@ -163,7 +163,7 @@ class Task:
     def _awaited_terminal(self) -> str:
         """Terminal whose edge starts the task; empty if it begins without a trigger.
 
-        The sample clock of another task starts with that task, so it is treated like its start trigger.
+        Another task's sample clock starts with that task, so it is treated like that task's trigger.
         """
         if self.timing.trigger_source:
             return self.timing.trigger_source

@@ -171,7 +171,7 @@ def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Channel
 
 
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings without a mode that is not simulated: this can be switched off, but not on (-241)."""
+    """Return settings without a mode that is not simulated: such a mode cannot be switched on (-241)."""
     if wanted:
         raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)
@@ -234,7 +234,7 @@ def _ask_catalogue(generator: AFG1022, _: int) -> bytes:
 
 
 def load_command(header: str) -> Command:
-    """Return the command that declares the load; high impedance is infinite."""
+    """Return the command that declares the load; high impedance is an infinite load."""
     row = number(
         header, "IVI; drivers contradict each other", "declared_load_ohm", scpi.RESISTANCE_UNITS,
         lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,

@@ -73,7 +73,7 @@ _HIGHEST_FREQUENCY_HZ = {SINE: 25e6, SQUARE: 12.5e6, PULSE: 12.5e6, RAMP: 1e6, N
 
 
 def standard_shape(word: str) -> str | None:
-    """Return the short name of a shape without a memory; None for other words."""
+    """Return the short name of a shape that needs no waveform memory; None for other words."""
     return next((shape for known, shape in _WORDS.items() if mnemonic_matches(word, known)), None)
 
 
@@ -129,7 +129,7 @@ class ChannelSettings:
         return lowest, highest_frequency_hz(self.shape)
 
     def check(self) -> None:
-        """Refuse a peak beyond the output stage, and noise in a mode other than continuous (-221)."""
+        """Refuse a peak that the output stage cannot deliver, and noise in any mode but continuous (-221)."""
         is_moded_noise = self.mode is not RunMode.CONTINUOUS and self.shape == NOISE
         peak_v = abs(self.offset_v) + self.amplitude_vpp / 2
         if peak_v > OPEN_PEAK_V + _PEAK_ROUNDING_V or is_moded_noise:

@@ -18,7 +18,7 @@ _RANGE_ROUNDING = 1e-9
 Setter = Callable[..., None]
 """Function that executes a command, given instrument, channel and parameters."""
 Query = Callable[..., bytes]
-"""Function of instrument, channel and the parameters of a query, which returns the reply."""
+"""Function that returns the reply, given instrument, channel and the query's parameters."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def setting(
     show: Callable[[Any], bytes] = lambda is_on: b"1" if is_on else b"0",
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the command of a setting that ``get`` reads and ``put`` replaces; by default it is on or off."""
+    """Return the command of a setting that ``get`` reads and ``put`` replaces, on or off by default."""
 
     def write(generator: Any, channel: int, parameter: bytes) -> None:
         generator.configure(channel, put(generator.settings(channel), parse(parameter)))
@@ -205,7 +205,7 @@ class ScpiInstrument:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; if the read of the host times out, its next read receives this reply."""
+        """Delay the next reply; if the host's read times out, the host's next read receives this reply."""
         with self.lock:
             self._next_delay_s = delay_s
 
@@ -349,7 +349,7 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
 
 
 class _Session(socketserver.BaseRequestHandler):
-    """One client of the socket, whose bytes are collected until a message is complete and answered."""
+    """One client of the socket; its bytes are collected until a message is complete and can be answered."""
 
     server: ScpiSocket
 

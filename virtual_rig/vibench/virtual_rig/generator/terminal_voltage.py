@@ -70,7 +70,7 @@ class Spacing(StrEnum):
 
 @dataclass(frozen=True)
 class SweptPhase:
-    """One triggered sweep and a hold at the stop frequency; the start frequency before and after these."""
+    """One triggered sweep and a hold at the stop frequency; the start frequency applies before and after."""
 
     start_hz: float
     stop_hz: float
@@ -324,7 +324,7 @@ class Timeline:
         self._origin_s = 0.0
         self._interval_s = 0.0
         self._rendered = 0
-        """Samples since ``_origin_s``, all over intervals of the same length."""
+        """Number of samples since ``_origin_s``, all over intervals of the same length."""
         self._noise_index = 0
         self._noise_block = NO_BLOCK, np.empty(0)
         self._end_s = -np.inf
@@ -339,7 +339,7 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> tuple[float, float]:
-        """Return the time at which a command of ``time_s`` acts, in rig time and in the generator's own time.
+        """Return when a command sent at ``time_s`` acts, in rig time and in the generator's own time [s].
 
         A command does not act before the end of the rendered part.
         """

@@ -359,7 +359,7 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
     """Context that converts a device's OSError to the errors of PyUSB's own backends.
 
-    It is no generator: from Python 3.13 on, its frame would keep the handle of a session that failed to open.
+    A generator function would not do: from Python 3.13 on, its frame would keep a failed session's handle.
     """
 
     def __enter__(self) -> None:

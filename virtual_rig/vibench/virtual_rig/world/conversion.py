@@ -128,7 +128,7 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder [ohm]; an excitation current causes a voltage on it."""
+"""Output resistance of generator, divider and decoder [ohm]; excitation currents cause a voltage on it."""
 COMPLIANCE_V = 19.0
 """Voltage of an open input with excitation [V]."""
 OVER_RANGE = 1.02
@@ -154,7 +154,7 @@ class InputStage:
         return self._cables.get(self.configured.physical_channel, OPEN_INPUT)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Return volts at the converter, and which of them clip, for signals of shape (signals, steps)."""
+        """Return volts at the converter, and whether any clips, for ``signals`` of shape (signals, steps)."""
         offset_v, gain = _operating_point(self.configured, self.cable)
         signal = signals[self.cable.signal]
         match self.configured.coupling:

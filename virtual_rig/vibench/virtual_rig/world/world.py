@@ -94,7 +94,7 @@ _ROUNDING = 1e-6
 
 
 LOWEST_RATE_HZ = 500.0
-"""Lowest sample rate of a conversion, whose filter needs a tenth of a second of history [Hz]."""
+"""Lowest sample rate of a conversion [Hz]; at this rate, its filter needs 0.1 s of history."""
 HIGHEST_RATE_HZ = 250e3
 """Highest sample rate of a conversion [Hz]; samples at rates above the grid's are interpolated."""
 
