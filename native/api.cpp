@@ -229,7 +229,7 @@ VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, do
   });
 }
 
-// Returns a bound of |p| until the next touch [m]: the sum of the phasors' magnitudes. Infinite on a stop.
+// Returns a bound of |p| until the next touch [m]: the sum of the phasors' magnitudes. Infinite in contact.
 VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   if (tables == nullptr || state == nullptr || state->side != 0.0) return INFINITE;
   Clock<double> clock{state->clock_high, state->clock_low, 0.0};

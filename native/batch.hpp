@@ -1,11 +1,11 @@
 // Eight motions of one specimen in parallel, one per lane of a vector register (decision 0061). In flight, p
 // is the real part of a sum of four rotating phasors ("terms"). Lanes advance by grid steps, as in
-// flight.hpp, until at most one lane is clear of the stops. For the other lanes the touch, the collision (by
-// polynomials) and the first step after it are then computed under masks. A lane with a finished motion takes
-// the next motion of the batch. Other lanes can delay a motion, but never change its results.
+// flight.hpp, until at most one lane is clear of the stops. Then the touch, the collision (by polynomials)
+// and the first step after it are computed for the other lanes, under masks. A lane with a finished motion
+// takes the next motion of the batch. Other lanes can delay a motion, but never change its results.
 //
-// Observed motions: lines need only the moments of each collision's force. Peaks are rare. Bounds exclude
-// almost all steps and collisions; the others are observed alone, as in observe.hpp.
+// Observed motions: lines need only the moments of each collision's force. New peaks are rare, and bounds
+// exclude almost all steps and collisions. The rest are observed alone, as in observe.hpp.
 #pragma once
 #include "collision_fit.hpp"
 #include "observe.hpp"
@@ -22,11 +22,11 @@ constexpr int WAITING = 1;                // a march ends when at most this many
 constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch from a second-order guess
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
 constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
-constexpr double LONGEST_PART = 0.25;     // longest collision over the drive period, so that LONG terms suffice
+constexpr double LONGEST_PART = 0.25;     // longest collision / drive period, so that LONG terms suffice
 // Bound of the largest depth of a collision, in its units: a quadratic function of the acceleration at its
 // middle, plus a part proportional to the derivative of this acceleration. It is at most 0.7 % too large.
 constexpr double DEEPEST[3] = {1.005, 0.796, 0.16}, DEEPER_BY_CHANGE = -0.728;
-constexpr double SPARE = 2.0;             // factor on a bound of x for the force of a stop, which bends x little
+constexpr double SPARE = 2.0;             // factor on a bound of x: the force of a stop bends x a little
 constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
@@ -88,7 +88,7 @@ class BatchRun {
   void follow();
 
  private:
-  // States that are due, once per drive period. They are stored as terms until eight are computed together.
+  // States that are due, once per drive period. Stored as terms until eight states are computed together.
   struct DueStates {
     LanePhasor term[FLYING];
     Lanes later;  // due time minus time of the terms, zero or negative [s]
@@ -363,7 +363,7 @@ class BatchRun {
     return SlowContact::LEFT;
   }
 
-  // Moves the impulse of a contact in steps, which has the phase of the drive, to the lane's impulse.
+  // Moves the impulse of a contact computed in steps, which has the drive's phase, to the lane's impulse.
   void add_impulse(int lane, Observer &observer) {
     Phasor sum = observer.impulse * motion[lane]->tables->drive.start;
     impulse.re.set(lane, impulse.re[lane] + sum.re), impulse.im.set(lane, impulse.im[lane] + sum.im);
@@ -597,7 +597,7 @@ class BatchRun {
   }
 
   // Computes the variables of the polynomials: acceleration at the collision's middle, its derivatives, and
-  // u, in units of the collision. `scale` is side over speed, which normalises the rate of p to 1.
+  // u, in units of the collision. `scale` is side / speed, which normalises the rate of p to 1.
   INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
     for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
     variables[DERIVATIVES] = unit;

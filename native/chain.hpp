@@ -20,7 +20,7 @@ constexpr int MOST_STRETCHES = 100000;  // largest number of flights, contacts a
 // one for each CELLS_AS_ONE cells of the chain, is at most MOST_CUT. Otherwise contact steps cost less.
 constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
 constexpr double SOON = 1e-3;        // a touch in this first fraction of a window does not cut it
-constexpr double HAIR = 1e-12;       // a contact from a touch in this last part continues in the next window
+constexpr double HAIR = 1e-12;       // a contact that begins in this last part continues in the next window
 constexpr double ROUNDED_PIECE = 1e-9;  // a smaller remaining part of a piece of the drive is rounding error
 // Constants for steps under a power law, whose windows are short; see power_law.hpp.
 constexpr double FINER_FIT = 0.01, CLOSE_PLACE = 1e-3, CLOSEST_PLACE = 1e-15, CELL_FADING = 0.999;

@@ -17,7 +17,7 @@ constexpr double LONGEST_COLLISION = 0.4;  // limit of fastest rate times durati
 constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5
 constexpr double LEAST_TOLERANCE = 1e-7;  // sixteen points are not accurate enough for stricter tolerances
 constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
-constexpr double LAG = 3e-6;  // the slow terms of the force are recomputed while depths change by more
+constexpr double LAG = 3e-6;  // the slow terms of the force are recomputed if depths change by more
 
 // One collision. Coordinates are mirrored so that p is positive at either stop.
 template <class T> struct Collision {
@@ -62,7 +62,7 @@ INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last,
   return sum;
 }
 
-// Returns whether a correction is small enough to be the last; for duals its derivatives decide.
+// Returns whether a correction is small enough to be the last; for dual numbers, its derivatives decide.
 INLINE bool is_settled(const Vector<POINTS> &change, const Vector<POINTS> &, double close) {
   return total(change * change) <= close * close;
 }

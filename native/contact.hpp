@@ -25,7 +25,7 @@ struct YieldingForce {
 
 // ---- A contact
 
-constexpr double SLOWEST_TOUCH = 1e-12;  // least r at w = 0 [m/s]; all derivatives vanish at w = r = 0
+constexpr double SLOWEST_TOUCH = 1e-12;  // smallest r at w = 0 [m/s]; all derivatives vanish at w = r = 0
 constexpr double ROOT_FLOOR = 1e-6;      // added to the error scale of w [m^0.5]: a penetration of 1 pm
 constexpr double RATE_FLOOR = 1e-6;      // added to the error scale of r [m/s]
 constexpr double STANDARD_TOLERANCE = 3e-7;  // tolerance assumed by `foreseen_step`
@@ -53,9 +53,9 @@ INLINE double step_tolerance(double tolerance, const Specimen &s) {
 
 INLINE double step_scale(double tolerance) { return eighth_root(tolerance / STANDARD_TOLERANCE); }
 
-// Returns the longest accurate step, divided by the collision's time scale; `depth` is w over its largest
-// value. Steps must be half as long at the turning point, which the last error estimate cannot predict. The
-// values are from Hertz collisions, which are alike at all speeds. They are slightly short for linear stops.
+// Returns the longest accurate step, divided by the collision's time scale; `depth` is w / its largest value.
+// Steps must be half as long at the turning point, which the last error estimate cannot predict. The values
+// are from Hertz collisions, which are alike at all speeds. They are slightly short for linear stops.
 INLINE double foreseen_step(double depth, double rate) {
   if (rate > 0.0) return larger(1.02 - 0.95 * depth, 0.46);
   return depth > 0.93 ? 0.48 : depth > 0.65 ? 0.6 : 0.9;
@@ -162,8 +162,8 @@ template <class T, class Force> struct ContactSteps {
   }
 
   // Shortens the trial step to the zero of `off` within it, by Newton's method with a bracket. Decisions use
-  // only values, so these equal the values of a motion without derivatives to the last bit. A final
-  // correction adds the derivatives of the step length.
+  // only values, so values equal those of a motion without derivatives to the last bit. A final correction
+  // adds the derivatives of the step length.
   template <class Off> T land(const T &longest, double close, double slope_sign, const Off &off) {
     double low = 0.0, high = value_of(longest);
     T h = longest;

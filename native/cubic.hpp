@@ -11,7 +11,7 @@ constexpr int MOST_PHASES = 100000;  // largest number of flights and contacts i
 constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for the rounding error of an interval's length
 constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // length of a piece in steps of the last level
 constexpr int PIECE_ORDER = 16;  // number of series terms over a piece under a power law
-constexpr double TRY_TWICE = 5e-4;  // misfit over the allowed misfit, below which the next step is doubled
+constexpr double TRY_TWICE = 5e-4;  // ratio of misfit to allowed misfit below which the next step is doubled
 
 // ---- The base
 
@@ -92,11 +92,11 @@ struct CubicTables : Body {
   int64_t pieces;   // number of pieces of an interval
   double length;    // length of a piece [s]
   double across[6 + CUBIC][WIDE];  // motion at a piece's end per motion and force terms at its start
-  double bound_per_root_energy;    // largest |d2p/dt2| in flight, over sqrt(2 energy) [m/s^2 / J^0.5]
+  double bound_per_root_energy;    // largest |d2p/dt2| in flight / sqrt(2 energy) [m/s^2 / J^0.5]
   const CubicPowerTables *power;   // tables for a power law, stored after these tables; otherwise null
 };
 
-// Returns the largest |d2p/dt2| in flight, over sqrt(2 energy). In the coordinates sqrt(k) e and sqrt(m) v,
+// Returns the largest |d2p/dt2| in flight / sqrt(2 energy). In the coordinates sqrt(k) e and sqrt(m) v,
 // with elongations e of the springs, it is the norm of the coefficients of d2p/dt2.
 inline double bound_per_root_energy(const Body &t) {
   const Specimen &s = t.specimen;

@@ -11,10 +11,10 @@ constexpr double NEVER = -1.0;
 constexpr double TOUCH = 1e-12;              // a gap below this part of the clearance counts as closed
 constexpr double ROUNDING = 8.0 * EPSILON;   // a gap below this part of `reach` also counts as closed
 constexpr double JUST_SHORT = 0.999;         // rounding margin: factor on the earliest return to the stop
-constexpr double SHORTEST_ADVANCE = 1e-15;   // least advance [s], so that every search ends
+constexpr double SHORTEST_ADVANCE = 1e-15;   // shortest advance [s], so that every search ends
 constexpr int TIGHTER_AFTER = 4;             // number of advances after which a tighter bound saves time
 constexpr int PATIENCE = 400;                // number of advances after which p probably only grazes a stop
-constexpr double IMPATIENT = 1e-4;           // least advance after PATIENCE, as a part of the stretch
+constexpr double IMPATIENT = 1e-4;           // shortest advance after PATIENCE, as a part of the stretch
 constexpr int NEWTON_STEPS = 6;              // largest number of corrections of a touch; usually two
 
 struct ValueAndRate {
@@ -81,7 +81,7 @@ inline double first_contact(const double *series, double length, const Room &roo
   return NEVER;
 }
 
-// Returns the same as `first_contact`, for a length of at most LONGEST_TURN. If p provably has no extreme on
+// Like `first_contact`, for a length of at most LONGEST_TURN. If p provably has no extreme on
 // this stretch, p can only touch the stop ahead, and only once, so Newton's method is safe.
 inline double first_touch(const double *series, double length, const Room &room) {
   double change = room.bound * LONGEST_TURN;  // largest change of d2p/dt2 on such a stretch

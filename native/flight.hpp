@@ -7,7 +7,7 @@
 
 namespace vibench {
 
-constexpr int RUN_OF_STEPS = 512;  // steps by products between uses of exp; rounding stays below 1e-13
+constexpr int RUN_OF_STEPS = 512;  // steps by multiplication between uses of exp; rounding stays below 1e-13
 constexpr double LARGEST_BOUND = 1e150;  // above this bound squares overflow, and touches cannot be detected
 
 // Returns the drive's phasor at the clock time plus `later`.

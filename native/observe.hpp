@@ -27,7 +27,7 @@ inline double series_peak(double best, const double *series, double low, double 
   return best;
 }
 
-// Returns the same for the cubic with the given values and rates at both ends of a step.
+// Like `series_peak`, for the cubic with the given values and rates at both ends of a step.
 inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
   double rise = (last.value - first.value) / step;
   double series[AHEAD] = {first.value, first.rate, (3.0 * rise - 2.0 * first.rate - last.rate) / step,
@@ -50,7 +50,7 @@ template <int N> INLINE ValueAndRate value_and_rate(const PhasorSum<N> &sum) {
 }
 
 // Returns the largest magnitude of a displacement in a linear motion over `length` seconds; at least `best`.
-// Only grid steps with a bound above `best` are examined. An extreme is searched if the rate changes sign.
+// Only grid steps with a bound above `best` are examined. An extreme is sought if the rate changes sign.
 template <int N>
 inline double linear_peak(double best, const Phasor *shape, const Phasor *phasors, const Clock<double> &clock,
                           double length, const LinearTables &t, const Tables &tables) {

@@ -13,7 +13,7 @@ constexpr int LEVELS = 40;           // number of step lengths, usually with the
 constexpr int INSTANTS = GAUSS + 2;  // instants of an observed step: its start, its Gauss points, its end
 constexpr double LONGEST_POWER_TURN = 3.0;  // longest step times the fastest rate [rad]
 constexpr int FIRST_LEVEL = 8;       // level of the first step: a sixteenth of the longest step
-constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, over the tolerance; a
+constexpr double FIT = 1e4;  // allowed misfit of F's polynomial at a step's ends, in tolerances; a
                              // misfit is its relative effect on the motion. The error of the step is smaller
 constexpr double CLOSE_FORCE = 1e-2, CLOSEST_FORCE = 1e-14;  // iteration ends at a relative change below this
                                                              // part of the tolerance, or below this value
@@ -24,7 +24,7 @@ constexpr double WALL_TURN = 5.0;  // longest step times the rate of the stiffes
 constexpr double FADING = 0.98;    // decay factor per step of the recorded sizes of a motion
 constexpr double SMALLEST_PART = 1e-3;  // every displacement counts as at least this part of the largest
 constexpr double NOTHING_MOVES = 1e-150;
-constexpr double FINEST_FIT = 1e-10;  // least tolerance; a finer fit to a steep wall is below rounding
+constexpr double FINEST_FIT = 1e-10;  // smallest tolerance; a finer fit to a steep wall is below rounding
 
 INLINE double fit_tolerance(double tolerance, const Specimen &s) {
   return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
@@ -84,7 +84,7 @@ INLINE PowerForce power_force(const PowerTerms &law) {
 
 // ---- Coefficients of a step of given length
 
-// One coordinate at the points, per unit of each coordinate at the start and per unit of F at each point.
+// One coordinate at the points, as response to a unit of each coordinate at the start or of F at a point.
 struct AtPoints {
   double free[WIDE][GAUSS], gain[GAUSS][GAUSS];
 };
@@ -220,7 +220,7 @@ template <class T> struct PowerStep {
   }
 
   // Computes the derivatives of the trial step. With the law's slopes D, a change dp at the points satisfies
-  // (1 - gain D) dp = free du. The change of the motion follows from D dp like the motion from F.
+  // (1 - gain D) dp = free du. The change of the motion follows from D dp as the motion does from F.
   void differentiate(const StepNumbers &numbers) {
     if constexpr (is_dual<T>) {
       constexpr int M = int(sizeof motion.slope / sizeof motion.slope[0]);

@@ -81,7 +81,7 @@ STRUCTURE(Drive,
 
 // Tables of Hertz collisions (decision 0008) for every specimen, computed by `vibench.sim.engine`.
 STRUCTURE(CollisionShapes,
-  double shares[8][16][16];    // [m][k][i]: integral up to point i of (t_i - t)^m of a unit value at point k
+  double shares[8][16][16];    // [m][k][i]: integral to point i of (t_i - t)^m times point k's Lagrange polynomial
   double ends[16][8];          // [k][m]: the same integral up to the end
   double weights[16];          // quadrature weights of the points for an integral over the duration
   double heights[16];          // times of the points, divided by the duration
@@ -101,7 +101,7 @@ STRUCTURE(PowerTerms,
 // Coefficients of Gauss points on a step from 0 to 1 for every power law, computed by `vibench.sim.engine`.
 STRUCTURE(PowerShapes,
   double points[8], weights[8];
-  double shares[32][8][8];     // [m][k][i]: integral up to point i of (c_i - s)^m of a unit value at point k
+  double shares[32][8][8];     // [m][k][i]: integral to point i of (c_i - s)^m times point k's Lagrange polynomial
   double ends[32][8];          // [m][k]: the same integral up to the end
   double at_start[8], at_end[8];  // value of the polynomial at start and end, per value at each point
   double course[9][8];         // [k][m]: coefficient of (s - 1)^m per value at point k, or (last) at the end
@@ -238,7 +238,7 @@ STRUCTURE(Batch,
 STRUCTURE(Interpolation,
   Numbers samples;             // [channels][samples per channel]; signals are zero outside
   int64_t channels;
-  Numbers table;               // [phases + 3][64]: taps, from one phase before a sample to one past the next
+  Numbers table;               // [phases + 3][64]: taps, from one phase before a sample to one after the next
   Numbers positions;           // positions of the values, counted in samples from the first sample
   Numbers values;              // [channels][positions]: result
 )
@@ -301,9 +301,9 @@ STRUCTURE(Controller,
   int64_t harmonics;           // number of harmonics, both of the output and of the measurement
   int64_t remembered;          // number of states of the control law
   double step[64][64];         // state matrix of the control law
-  double inlet[64][2];         // matrix from inputs to states [1/V]
-  double output[64];           // row from states to output [V]
-  double direct[2];            // row from inputs to output
+  double inlet[64][2];         // matrix that maps inputs to states [1/V]
+  double output[64];           // row that maps states to the output [V]
+  double direct[2];            // row that maps inputs to the output
   double memory[64];           // states of the control law
   Phasor reference[2][20];     // coefficients before and after the glide, from the first harmonic on [V]
   Phasor sums[3][21];          // sums over the block for output, base and m0, from the mean on
@@ -335,7 +335,7 @@ STRUCTURE(LoadedShaker,
   int64_t impacts, bumps, limited_steps;  // numbers of contacts, steps in the rubber stops, clipped steps
 )
 
-// Connections between a controller and the analogue part: it samples means, and its output is delayed.
+// Connections of a controller to the analogue part. The controller samples means; its output is delayed.
 STRUCTURE(LoopCables,
   Controller *controller;
   LoadedShaker *shaker;        // shaker in this loop, which uses the same `drive`
@@ -411,7 +411,7 @@ STRUCTURE(MotionSmoother,
 STRUCTURE(ContactSearch,
   Numbers states;              // [samples][8]
   Numbers touched;             // [samples]: 0 for a step without contact
-  Numbers acceleration;        // base acceleration [m/s^2]; exceeds `states` by the longest contact
+  Numbers acceleration;        // base acceleration [m/s^2]; longer than `states` by the longest contact
   Numbers small_flow;          // [8][10]: step matrix of a substep
   Numbers stop;                // one `TrackedStop`
   double step;                 // [s]
@@ -446,7 +446,7 @@ STRUCTURE(ChainMotion,
   double tolerance;
   double fastest;              // largest rate of chain and drive [1/s]
   Numbers windows;             // [levels]: lengths of windows, from long to short [s]
-  Numbers clashes;             // [levels]: a window is too long if two cells this close may have contact
+  Numbers clashes;             // [levels]: a window is too long if cells within this distance may touch
   Drive drive;
   Numbers pieces;              // [pieces][8]: force of the base on the first m0 [N] instead of the drive, as
                                // a polynomial in the time since the start of each piece; or empty

@@ -64,8 +64,8 @@ inline double left_of(double (&rows)[6][6], int i, const Metric &metric) {
   return square_root(inner(rows[i], rows[i], metric));
 }
 
-// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. If a row is a linear
-// combination of earlier rows (an impact without rebound: two), it gets minus infinity and is set to an axis.
+// Makes rows orthonormal, and adds the logarithms of their divisors to `logarithms`. A row that depends
+// linearly on earlier rows (two after an impact without rebound) gets minus infinity, and is set to an axis.
 inline void orthonormalise(double (&rows)[6][6], int count, const Metric &metric, double *logarithms) {
   for (int i = 0; i < count; i++) {
     double whole = square_root(inner(rows[i], rows[i], metric)), length = left_of(rows, i, metric);

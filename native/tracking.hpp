@@ -12,7 +12,7 @@ constexpr double WATCHED_REACH = 2e-7;  // a step that comes this close to a sto
 
 enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // far from stops; near a stop, ends free; ends in contact
 
-// Matrix from the state, the recorded acceleration and its increase over a step to the state at its end.
+// Matrix from (state, recorded acceleration, its increase over a step) to the state at the step's end.
 typedef double StepFlow[TRACKED][TRACKED + 2];
 
 // One component of the state with its derivatives with respect to the state at the start of the step.

@@ -113,7 +113,7 @@ template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
 #endif
 }
 
-// Returns eight successive lanes of `from` and then `to`: from the last lane of `from`, or from its second.
+// Returns eight successive lanes of `from` and then `to`, beginning with the last or second lane of `from`.
 INLINE Vector<8> lanes_before(Vector<8> from, Vector<8> to) {
   return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 7, 8, 9, 10, 11, 12, 13, 14));
 }

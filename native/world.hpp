@@ -22,7 +22,7 @@ inline int64_t show(const Sensor &sensor) {
   return 0;
 }
 
-// Adds the controller's delayed output to the drive, from `begin` to its next sample. Returns `stop`.
+// Adds a controller's delayed output to the drive, from `begin` to the controller's next sample (`stop`).
 inline int64_t play_loop(LoopCables &loop) {
   int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
   double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
