@@ -1,6 +1,6 @@
 """Expected computing times on this machine, from previous runs or, for scenes with a target, a pilot run.
 
-A ledger stores, for every kind of run, mean and scatter of the logarithm of actual over planned time.
+A ledger stores, for every kind of run, mean and scatter of the logarithm of actual / planned time.
 """
 
 import atexit
@@ -30,9 +30,9 @@ from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 MEMORY = 20
 """Memory of the moving average, in runs: a run that is this many runs old keeps a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Limit on a run's logarithmic deviation from the mean of its kind, as its motion may be unusual."""
+"""Limit on a run's logarithmic deviation from the mean of its kind, because its motion may be unusual."""
 FEWEST = 3
-"""Fewest runs of a kind from which the scatter of their computing times is estimated."""
+"""Smallest number of runs of a kind from which the scatter of their computing times is estimated."""
 UNKNOWN_FACTOR = 10.0
 """Uncertainty factor of an expected computing time if no run of that kind is known."""
 LEAST_FACTOR = 1.5
@@ -43,7 +43,7 @@ SAVED_EVERY_S = 5.0
 
 @dataclass(frozen=True)
 class _Kind:
-    """Statistics of the logarithm of actual over planned time, for one kind of run."""
+    """Statistics of the logarithm of actual / planned time, for one kind of run."""
 
     runs: int = 0
     mean: float = 0.0

@@ -148,11 +148,11 @@ def classify(
 
 
 MOST_LOOKS = 4096
-"""Most states stored before the window: enough to detect that neighbouring motions diverge."""
+"""Largest number of states stored before the window; enough to detect diverging neighbouring motions."""
 LOOKS = 16
-"""Fewest checks for repetition before the window."""
+"""Smallest number of checks for repetition before the window."""
 LONGEST_SLICE = 1 << 16
-"""Most drive periods between two checks for repetition; limits the memory for stored states."""
+"""Largest number of drive periods between two checks for repetition; limits the memory for states."""
 
 
 class Lead:
@@ -193,7 +193,7 @@ SLICE_S, SLICE_PERIODS = 0.25, 4
 WINDOWS = 2
 """Number of windows in which a non-repeating motion is observed; the last one gives the responses."""
 DRIFT_SHARE = 0.25
-"""Share of the budget that a slow drift may use; its error estimate takes three times as long."""
+"""Share of the budget for integrating a slow drift; estimating its error takes three times as long."""
 
 
 class SettlingCourse:

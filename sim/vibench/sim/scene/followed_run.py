@@ -40,7 +40,7 @@ STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
-"""Number of steps as which one step with a tangent vector counts toward the step limit."""
+"""A step with a tangent vector counts as this many steps toward the limit of the number of steps."""
 
 
 def nominal_cost_s(
@@ -247,8 +247,8 @@ class FollowedRun:
     def _size(self) -> float:
         """Return the natural logarithm of the norm of the tangent vector; NaN without one.
 
-        The norm is the square root of its energy in the linear system, which only contact can increase. An
-        exchange between displacement and velocity therefore does not count as growth.
+        The norm is the square root of its energy in the linear system. Only contact can increase this energy.
+        An exchange between displacement and velocity therefore does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan
@@ -259,7 +259,7 @@ class FollowedRun:
 
 
 TRIES = 8
-"""Most drive periods to wait for one that ends without contact, so that a batch can begin there."""
+"""Largest number of drive periods to wait for one that ends without contact, where a batch can begin."""
 
 
 def follow_together(
@@ -377,8 +377,8 @@ def observe_window(
 ) -> ObservedWindow:
     """Observe a motion in a window that begins now and contains at least one drive period.
 
-    If the motion repeats after ``cycle`` drive periods, lines are taken over a multiple of ``cycle``, if the
-    window is long enough; this avoids leakage. If ``is_chaos`` returns True for the first parts, the tangent
+    If the motion repeats after ``cycle`` drive periods and the window is long enough, lines are taken over a
+    multiple of ``cycle``, which avoids leakage. If ``is_chaos`` returns True for the first parts, the tangent
     vector is propagated only at both ends of the window.
     """
     begins, start_s, frequency = run.copy(), run.time_s, run.drive.frequency_hz

@@ -87,10 +87,10 @@ def others_of(starts: Sequence[Start]) -> int | None:
 def next_size(
     starts: Sequence[Start], error: float | None, lead: float, most: float = 2.0
 ) -> tuple[int, int]:
-    """Return the numbers of starts and of windows per start that need the least simulated time next. Windows
-    save the time before the first window, ``lead`` (in window lengths). More starts reduce the part of the
-    variance that differs between starts, and the weight of the smallest and largest start. The variance falls
-    at most by a factor of ``most``, because it is not known well.
+    """Return the next numbers of starts and of windows per start, which need the least simulated time.
+    Windows save the time before the first window, ``lead`` (in window lengths). More starts reduce the part
+    of the variance that differs between starts, and the weight of the smallest and largest start. The
+    variance falls at most by a factor of ``most``, because it is not known well.
     """
     count, windows = len(starts), windows_of(starts)
     if count < FEWEST_STARTS:

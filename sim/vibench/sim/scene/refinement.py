@@ -56,7 +56,7 @@ FIRST_S, GRACE_S = 0.1, 0.05
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 BATCH_PARTS, MOST_TOGETHER = 8, 64
-"""Ratio of a part's nominal cost in a batch to that of a single motion, and most motions in a batch."""
+"""Ratio of a part's nominal cost in a batch to that of one motion, and largest number of motions."""
 LANES = 8
 """Number of motions that a batch integrates at the same time."""
 FIT_S = 0.03

@@ -20,7 +20,7 @@ from .prediction import MotionKind
 MOST_PERIODS = 32
 """Longest period of a motion that is detected, in drive periods."""
 FEWEST_BETWEEN = 8
-"""Fewest drive periods between two states that are compared to detect repetition."""
+"""Smallest number of drive periods between two states that are compared to detect repetition."""
 SLOWEST_RATIO = 0.99
 """Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 NEARLY = 0.01
@@ -199,9 +199,9 @@ FORGETTING = 8.0
 FEWEST_TIMES = 40.0
 """Ratio of the longest run to the longest decay time used; longer decay times are cut to that time."""
 MOST_STATES = 2_000_000
-"""Most drive periods in a window; the states of two windows, with a copy, take 300 MB."""
+"""Largest number of drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
-"""Fewest drive periods after which a non-repeating motion counts as being on its attractor."""
+"""Smallest number of drive periods after which a non-repeating motion counts as on its attractor."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
 """Relative distance from the periodic motion below which a motion counts as settled."""
 ROUNDING = 1e-10
@@ -291,7 +291,7 @@ def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
 
 
 def growth_of(stretches: Sequence[Stretch]) -> Growth:
-    """Return the growth of the tangent vector over those stretches in which one was propagated."""
+    """Return the growth of the tangent vector over the stretches in which it was propagated."""
     carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
     logarithms = np.array([stretch.growth for stretch in carried])
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))

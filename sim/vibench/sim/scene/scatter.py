@@ -19,7 +19,7 @@ from .shares import student_quantile
 COVERED = 0.975
 """Probability below the upper end of a symmetric 95 % interval."""
 FEWEST_BLOCKS = 4
-"""Fewest blocks of a run from which the scatter of Response I is estimated."""
+"""Smallest number of blocks of a run from which the scatter of Response I is estimated."""
 
 
 @dataclass(frozen=True)

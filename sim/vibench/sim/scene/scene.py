@@ -36,7 +36,7 @@ class Observable(StrEnum):
 
 
 MOST_PERIODS = 1e12
-"""Most drive periods of a run; times are then resolved to a ten-thousandth of a period."""
+"""Largest number of drive periods of a run; times are then resolved to a ten-thousandth of a period."""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ LEAST_SIZE = 1e-3
 LEAST_S = 1e-3
 """Smallest assumed computing cost of a run from one start [s]."""
 TOO_FEW = 4
-"""Fewest starts for which an ensemble of motions is computed."""
+"""Smallest number of starts for which an ensemble of motions is computed."""
 LASTING_S = 300.0
 """Mean lifetime above which chaos counts as lasting [s]; ten times the duration of the paper's runs."""
 
@@ -298,8 +298,8 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
 def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
     """Return the kind of a motion that several starts reached.
 
-    In weak or bursting chaos, the perturbations of most starts may not grow while observed. If they certainly
-    grow from one start, the total growth over all starts decides.
+    In weak or bursting chaos, the perturbations of most starts may not grow while observed. If growth is
+    certain from one start, the total growth over all starts decides.
     """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
     if group[0].period is None and any(each.growth.is_certain for each in group):
@@ -339,7 +339,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Kinds of motion that may still turn into another motion if the run is continued."""
 FEWEST_DRAWS = 3
-"""Fewest starts on one motion from which the scatter of Response I between starts is estimated."""
+"""Smallest number of starts on one motion from which the scatter of Response I is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion; None if unknown."""

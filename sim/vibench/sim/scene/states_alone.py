@@ -161,9 +161,9 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Longest time [s] and most drive periods between two checks of a batch; limited by the stored states."""
+"""Largest time [s] and number of drive periods between two checks of a batch; storage limits both."""
 HELD_STATES, FULL = 1 << 20, 16
-"""Most stored states of all motions in a batch, and number of motions that fill the SIMD registers."""
+"""Largest number of states stored for a batch, and number of motions that fill the SIMD registers."""
 
 
 def in_batches(several: Sequence[StatesAlone]) -> None:
