@@ -248,7 +248,7 @@ def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
 
 
 UPDATES_TO_HOLD = 10.0
-"""Fewest updates that a stabilising control loop needs while a perturbation grows by a factor e."""
+"""Number of updates that a stabilising control loop needs while a perturbation grows by a factor e."""
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:

@@ -144,7 +144,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
 
     Returns
     -------
-    Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U, for the time factor exp(+i w t).
+    Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell, divided by U, for exp(+i w t).
     """
     omega = angular_frequencies(frequency_hz)
     cells = [reduce_to_m0(cell, omega) for cell in chain.cells]

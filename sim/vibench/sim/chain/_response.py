@@ -55,7 +55,7 @@ class ChainResponse:
 
     @property
     def response_ii(self) -> Floats:
-        """Amplitudes of x, y, z, p at the drive frequency over the drive amplitude, shape (cells, 4)."""
+        """Amplitudes of x, y, z, p at the drive frequency, divided by A0, shape (cells, 4)."""
         return np.asarray(np.abs(self.lines_m) / self.drive.amplitude_m, dtype=np.float64)
 
 

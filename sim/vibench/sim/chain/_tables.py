@@ -131,7 +131,7 @@ def _stretches(motion: Table) -> tuple[Table, Table, Table]:
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Return bounds on dp/dt of other cells within a window after an impulse, over dp/dt of the struck cell.
+    """Return bounds on dp/dt of other cells / dp/dt of the struck cell, within a window after an impulse.
 
     Shape (REACH + 1,): entry d is the bound for cells at distance d; entry 0 is not used.
     """

@@ -19,7 +19,7 @@ from ._response import ChainResponse, chain_response
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
 """Approximate length of a response window [s], and smallest number of windows."""
 FEWEST_PAIRS, STUDENT = 8, 2.365
-"""Fewest pairs of windows for an error estimate, and Student's t (95 %) for this number."""
+"""Smallest number of pairs of windows for an error estimate, and Student's t (95 %) for this number."""
 TOLERANCE_PART = 0.1
 """Largest part of the requested error that may come from the integration."""
 TRIED_S, TRIED_PART = 1e-4, 0.1

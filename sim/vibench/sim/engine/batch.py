@@ -54,7 +54,7 @@ MOMENTS = 5
 POLYNOMIALS = 1 + MOMENTS
 MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
-"""Lowest and highest approach speed of the collision fit, divided by gap and fastest modal rate."""
+"""Lowest and highest approach speed of the collision fit, divided by gap times fastest modal rate."""
 HARDEST_PRESS = 0.24
 """Largest acceleration due to other springs in the collision fit, in units of approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
@@ -197,7 +197,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
 
 
 def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
-    """Return the integrals of F (T / 2 - t)^m from those of F (T - t)^m, shape (n, MOMENTS)."""
+    """Convert integrals of F (T - t)^m to integrals of F (T / 2 - t)^m, shape (n, MOMENTS)."""
     return np.stack(
         [
             sum(math.comb(m, j) * (-0.5 * length) ** (m - j) * ends[:, j] for j in range(m + 1))

@@ -21,7 +21,7 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Most time steps out of contact in a run: two days of the paper's motion, computed in seconds."""
+"""Limit of the number of time steps out of contact: two days of the paper's motion, computed in seconds."""
 MOST_IMPACTS = 1 << 26
 """Largest number of impacts in one run. Their times take up to 0.5 GB, used only as impacts occur."""
 SPARE_IMPACTS = 100

@@ -34,9 +34,9 @@ d/d(residual at the end); d(duration)/d(residuals); depths at the points; deriva
 respect to press, its rate, and forces through dampers and through springs."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to that of the
-polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from LASTS_BY on
-are derivatives of the duration, in the same order as the derivatives of the depths."""
+"""Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to the maximum of
+the polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from
+LASTS_BY on are derivatives of the duration, in the same order as the derivatives of the depths."""
 PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
 

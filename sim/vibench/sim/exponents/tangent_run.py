@@ -34,7 +34,7 @@ from ..specimen.stops import require_positive
 # test of the correlation of blocks at this and all longer lengths (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 FEWEST_BLOCKS = 16
-"""Fewest uncorrelated blocks; with fewer, a standard error is itself uncertain by more than 20 per cent."""
+"""Smallest number of uncorrelated blocks; with fewer, a standard error is uncertain by more than 20 %."""
 CONFIDENCE = 0.99
 """Confidence level of the test for correlation between neighbouring blocks."""
 
@@ -216,7 +216,7 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return the number of parts of an interval that keeps tangent vectors numerically independent."""
+    """Return the number of parts of an interval, enough to keep tangent vectors numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
@@ -246,7 +246,7 @@ CHANGED = 5.0
 """Smallest significant difference of mean growth before and after a change, in standard errors. It is larger
 than SURE, because the time of the change is chosen to make the difference largest."""
 FEWEST_INTERVALS = 32
-"""Fewest intervals before and after a change of sign of the exponent."""
+"""Smallest number of intervals before and after a change of sign of the exponent."""
 ALIGNING = 8
 """Number of intervals in which an initial tangent vector turns to the direction of fastest growth."""
 

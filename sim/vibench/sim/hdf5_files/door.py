@@ -10,9 +10,9 @@ from pathlib import Path
 import h5py
 
 MOST_OBJECTS = 20_000
-"""Most allowed links to groups and datasets in a file; a recording has about forty."""
+"""Largest allowed number of links to groups and datasets in a file; a recording has about forty."""
 MOST_ATTRIBUTES = 1_000
-"""Most allowed attributes of an HDF5 object; a channel of a recording has about twenty-five."""
+"""Largest allowed number of attributes of an HDF5 object; a channel of a recording has about 25."""
 DEEPEST = 32
 """Deepest allowed nesting of groups in a file."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
@@ -21,7 +21,7 @@ LARGEST_CHUNK_BYTES = 256_000_000
 LARGEST_RATIO = 1100
 """Largest ratio of declared to stored bytes; Deflate compresses at most 1030-fold (zlib's documentation)."""
 UNSTORED_BYTES = 1_000_000
-"""Largest size [bytes] that a dataset may declare beyond its stored data, for constant fill values."""
+"""Size [bytes] that a dataset may declare beyond its stored data, to allow for constant fill values."""
 OWN_FILTERS = frozenset(
     {
         h5py.h5z.FILTER_DEFLATE,

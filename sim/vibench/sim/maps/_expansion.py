@@ -70,7 +70,7 @@ class MapPoints(Points):
 
     @property
     def first_points(self) -> NDArray[np.int64]:
-        """Numbers of the points of the first lattice, for all initial states of each cell."""
+        """Point numbers of the first lattice, for all initial states of each cell."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
         return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)

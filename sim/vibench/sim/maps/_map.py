@@ -160,7 +160,7 @@ MOST_POINTS = 4_000_000
 MOST_STEP = 16
 """Largest default spacing of the first lattice, in grid steps."""
 FEWEST_STEPS = 8
-"""Fewest intervals of the first lattice on an axis; with fewer, most of the map would be interpolated."""
+"""Smallest number of intervals of the first lattice on an axis; with fewer, most cells are interpolated."""
 STARTS = "start"
 RANDOM = "random"
 
@@ -271,13 +271,13 @@ class Map(GridPlan):
         Observable.RESPONSE,
     )
     """Observables. "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each point, which
-    takes tens of times longer."""
+    takes tens of times as long."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy level of each point."""
     error: TargetError | None = None
-    """Requested relative error of each point, 0.01 or "1 %"; replaces the accuracy level."""
+    """Requested relative error of each point, such as 0.01 or "1 %"; replaces the accuracy level."""
     time_s: TargetTime | None = None
-    """Limit of the computing time per point, 2 or "2 s"; one minute if only an error is given."""
+    """Limit of the computing time per point, such as 2 or "2 s"; one minute if only an error is given."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
     """Length of the run, in drive periods, after which a motion counts as not repeating."""
     window_periods: Annotated[int, Field(ge=10)] = 200

@@ -200,7 +200,7 @@ IS_SIMPLER = 1e-7
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch has passed a mirrored motion or one of half the period, where it ends."""
+    """Return whether a branch has passed its end: a mirrored motion, or one of half the period."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -286,7 +286,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: if one end of the interval stays twice, halve its function value, so that it moves.
+        # Illinois method: if one end stays in place twice, halve its function value, so that it moves.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0

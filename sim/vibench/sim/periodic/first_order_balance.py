@@ -6,9 +6,9 @@ without the spring. The squared magnitude is an equation with a few powers of |P
 no branch is missed.
 
 `positive_zeros` finds all positive zeros of a sum of a few powers. Companion matrices would miss some, for
-example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: divided by its lowest
-power, a sum of m powers is monotone between the zeros of its derivative, which has m - 1 powers. The sum is
-evaluated in t = ln u, relative to its largest term, to avoid overflow.
+example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: a sum of m powers,
+divided by its lowest power, is monotone between the zeros of its derivative, which has m - 1 powers. The sum
+is evaluated in t = ln u, relative to its largest term, to avoid overflow.
 """
 
 import math

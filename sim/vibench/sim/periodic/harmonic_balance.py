@@ -348,7 +348,7 @@ class Balance:
 
     @property
     def response_i(self) -> Vector:
-        """Largest magnitude of every displacement and of p, over the drive amplitude, shape (n + 1,)."""
+        """Largest magnitude of every displacement and of p, divided by A0, shape (n + 1,)."""
         samples = grid_size(int(self.harmonics[-1]))
         each = np.column_stack([self.displacements, self.relative]).T
         return np.array([_largest(line, self.harmonics, samples) for line in each]) / self.amplitude_m

@@ -102,7 +102,7 @@ def phase_resonance_branch(
 ) -> Branch:
     """Follow the phase resonance of a mode along the level of the base, from a level without contact.
 
-    Return the branch over amplitude, which may turn back, with the frequency and multipliers of each motion.
+    Return the branch along the amplitude (it may turn back), with frequency and multipliers of each motion.
     Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its
     stops at this level, the linear motion does not have this phase exactly once in the band, or `of` is not a
     value of `PhaseReference`.

@@ -31,11 +31,11 @@ from .harmonic_balance import phasors_of, size_of
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
 # A mirrored motion has the opposite state half a drive period later. It is a fixed point of the half-period
-# map: integrate over half a period, then change all signs. The derivative by the state is exact, because
-# tangent vectors are integrated with the motion; it tends to infinity if an impact on a rigid stop approaches
-# grazing. Derivatives by frequency and amplitude are fourth-order central differences at reference accuracy,
-# with steps far above the integration error (1e-10) and far below the gap. They are accurate to five to seven
-# digits, which is enough for Newton's iteration, their only use.
+# map: integrate over half a period, then change all signs. The derivative with respect to the state is exact,
+# because tangent vectors are integrated with the motion; it tends to infinity if an impact on a rigid stop
+# approaches grazing. Derivatives by frequency and amplitude are fourth-order central differences at reference
+# accuracy, with steps far above the integration error (1e-10) and far below the gap. They are accurate to
+# five to seven digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
 """Step of the finite differences for derivatives by a drive parameter, relative to its value."""

@@ -1,7 +1,7 @@
 """Amplifier, coil and table under a voltage, simulated in steps with the specimen's force on the table.
 
 The specimen exerts a force on the table, so table and specimen are simulated together. A `LoadedShaker` is
-built from an `Amplifier`, a `Shaker` and a specimen. Its input is the mean voltage in each time step, its
+built from an `Amplifier`, a `Shaker` and a specimen. Its input is the mean voltage in each time step, and its
 outputs are means over each step (docs/decisions/0006-virtual-rig.md). The default amplifier does not change
 the voltage; use it for voltages recorded at the coil. `linear_motion` returns the motion under sine voltages
 in closed form, with impacts to first order. SI units.

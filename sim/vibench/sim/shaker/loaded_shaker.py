@@ -218,7 +218,7 @@ class LoadedShaker:
 
     @property
     def gain(self) -> float:
-        """Output voltage of the amplifier over input voltage; may be changed between calls of `move`."""
+        """Ratio of output to input voltage of the amplifier; may be changed between calls of `move`."""
         return float(self.structure["gain"])
 
     @gain.setter

@@ -28,7 +28,7 @@ _PASS_PART = 0.45
 _MARGIN = 2048
 """Number of samples filtered on each side of a piece; beyond them, impulse responses are below 1e-8."""
 _PIECE = 1 << 15
-"""Number of samples in a piece of the recording; a piece is filtered at once."""
+"""Number of samples in a piece of the recording; each piece is filtered in one call."""
 _BLOCK_S = 0.02
 """Length of the blocks after which impacts are counted [s]."""
 
@@ -134,7 +134,7 @@ class _Resampling:
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
     def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the last sample of each piece of the recording, and the mean voltages of its time steps."""
+        """Yield the end sample of each piece of the recording, and the mean voltages of its time steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
         length = ceil(_PIECE / block) * block

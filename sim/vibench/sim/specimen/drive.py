@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .stops import Strict, require_positive
 
 FEWEST_SAMPLES = 4
-"""Fewest samples of a sampled drive: a not-a-knot cubic spline needs four points."""
+"""Smallest number of samples of a sampled drive: a not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
 """Allowed base amplitudes [m]. Squares of smaller ones underflow; larger ones are typing errors."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12

@@ -80,7 +80,7 @@ def _check_of(schema: Any) -> Callable[[object], object] | None:
 
 
 def _with_checks(schema: Any) -> Any:
-    """Return the core schema with strict types (only numbers for numbers) and checked lengths of lists."""
+    """Return the core schema; number fields accept only numbers, and lengths of lists are checked."""
     match schema:
         case {"type": "bool"}:
             return {**schema, "strict": True}

@@ -135,7 +135,7 @@ NUMBERS = {
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
 }
-"""Columns by the field of `ScenePrediction` whose value they store."""
+"""Columns, keyed by the field of `ScenePrediction` that they store."""
 
 
 def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] = ()) -> Column:
@@ -152,13 +152,13 @@ FOUND_NUMBERS = {
     "error_estimate": _of_motion("found_error", REAL, "estimated relative error of this motion's responses"),
     "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }
-"""Columns by the field of `FoundMotion` whose value they store."""
+"""Columns, keyed by the field of `FoundMotion` that they store."""
 FOUND_SHARE = {
     "share": _of_motion("found_share", REAL, "share of starts that reach this motion"),
     "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
     "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
 }
-"""Columns by the field of `Share` whose value they store."""
+"""Columns, keyed by the field of `Share` that they store."""
 ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "number of starts with sensitive dependence on the start"),
     "requested_motion": Column("found_asked", WHOLE, "1", "index of the motion from the requested start"),
@@ -166,7 +166,7 @@ ENSEMBLE_NUMBERS = {
     "scatter": Column("scatter_of_starts", REAL, "1", "relative standard deviation of Response I"),
     "followed_s": Column("followed_in_all", REAL, "s", "total simulated time of all starts"),
 }
-"""Columns by the field of `Ensemble` whose value they store."""
+"""Columns, keyed by the field of `Ensemble` that they store."""
 ESCAPE_NUMBERS = {
     "rate_per_s": Column("escape_rate", REAL, "s-1", "rate at which chaos dies out"),
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
@@ -174,7 +174,7 @@ ESCAPE_NUMBERS = {
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
     "chaotic_s": Column("chaotic_time", REAL, "s", "total simulated time in chaos of all starts"),
 }
-"""Columns by the field of `EscapeRate` whose value they store."""
+"""Columns, keyed by the field of `EscapeRate` that they store."""
 OTHERS = (
     Column(MOTION, WHOLE, "", "kind of the final motion", _meanings(MotionKind)),
     Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),

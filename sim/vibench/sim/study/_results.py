@@ -78,7 +78,7 @@ def _sessions(file: "h5py.File") -> tuple[Session, ...]:
 
 
 def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
-    """Raise ValueError unless the axes and columns of a file are those of its plan."""
+    """Raise ValueError unless the axes and columns of a file match its plan."""
     for axis in plan.axes:
         kept = [each.decode() if isinstance(each, bytes) else each for each in file[axis.name][...].tolist()]
         if kept != list(axis.values):
@@ -92,7 +92,7 @@ def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
 
 
 CHECKED = 50
-"""Approximate number of points whose digests are checked when a file is opened, in 0.02 s."""
+"""Approximate number of points whose digests are checked (in 0.02 s) when a file is opened."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:

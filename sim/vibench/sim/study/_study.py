@@ -232,9 +232,9 @@ class Study(GridPlan):
     """Processor time per point [s] for integrating chaos further and, with sensitive dependence on the start,
     for other starts."""
     error: TargetError | None = None
-    """Requested relative error of each point, 0.01 or "1 %"; replaces accuracy, duration and budget."""
+    """Requested relative error of each point, such as "1 %"; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Limit of the computing time per point, 2 or "2 s"; one minute if only an error is given."""
+    """Limit of the computing time per point, such as 2 or "2 s"; one minute if only an error is given."""
 
     @model_validator(mode="after")
     def _target_stands_alone(self) -> Self:
