@@ -183,7 +183,7 @@ TASK_CALLS: Mapping[str, TaskCall] = {
 
 Listener = Iterator[Any]
 _BY_OTHERS = math.inf
-"""Rig time [s] that stands for an event which only other calls can cause."""
+"""Stands for the rig time [s] of an event that only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:

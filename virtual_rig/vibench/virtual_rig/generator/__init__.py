@@ -2,5 +2,5 @@
 
 The simulation has the instrument's commands, settings, waveform memories and status. Its output is a timeline
 of signals on its own clock, so block sizes do not affect the samples. Sources are the IVI driver tkafg1k,
-public drivers and measurements; it was not compared with the lab's unit. Neither cable nor world is imported.
+public drivers and measurements, but not the lab's unit. Neither cable nor world is imported.
 """

@@ -106,7 +106,7 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Make the other channel follow this channel's frequency, or no longer follow it."""
+        """Make the other channel follow this channel's frequency, or stop following it."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)

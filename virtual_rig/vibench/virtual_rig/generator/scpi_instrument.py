@@ -160,7 +160,7 @@ class ScpiInstrument:
     ----------
     clock
         Function that returns the rig time of a command's arrival [s]. It is called outside the instrument's
-        lock, as it may take a lock that is held while the output is rendered.
+        lock, because it may need a lock that is held during rendering.
     identity
         Reply to ``*IDN?``.
     commands
@@ -210,7 +210,7 @@ class ScpiInstrument:
             self._next_delay_s = delay_s
 
     def corrupt_next_reply(self) -> None:
-        """Corrupt the next reply: change every second byte, starting with the first, but not its end."""
+        """Corrupt the next reply: change every second byte, from the first, but keep the last byte."""
         with self.lock:
             self._next_is_corrupted = True
 

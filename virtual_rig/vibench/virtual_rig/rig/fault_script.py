@@ -158,7 +158,7 @@ class RigFaults:
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
-        A fault of one call that reads samples applies to all such calls, because a driver may use any one.
+        A fault of one call that reads samples applies to all such calls, because a driver may use any.
         """
         calls = _READS if call in _READS else (call,)
         return self._until(self._daq.faults.add(code, *calls))

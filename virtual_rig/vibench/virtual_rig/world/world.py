@@ -148,7 +148,7 @@ class World:
         specimen: Specimen | None = None,
         loop: ClosedLoop | None = None,
     ) -> None:
-        """Create a world; ``specimen`` replaces the rig's, ``loop`` is a controller beside the generator."""
+        """Create a world; ``specimen`` replaces the rig's; ``loop`` is a controller besides the generator."""
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
