@@ -36,7 +36,7 @@ class CurvePoint:
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method estimates its own error; if not, ``error`` is measured from the refined result."""
+    """Whether the method estimates its own error; if not, ``error`` is its distance to the refined result."""
     is_chosen: bool = False
     """Whether `refine_scene` returns this result for the scene's requested error and time."""
 

@@ -19,7 +19,7 @@ OTHER_DIFFERS = 1.0
 """Assumed relative difference in response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
 PADDING = 8.0
-"""Number of starts at which the smallest and the largest one, counted twice, double the squared error."""
+"""Counting the smallest and largest response twice doubles the squared error for this number of starts."""
 TINY = 1e-300
 MOST_FREEDOM = 200
 """Degrees of freedom above which Student's t hardly changes."""

@@ -73,7 +73,7 @@ LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
-"""Number of checks of the run from another start before the run's window begins."""
+"""Number of checks of a run that begins from another start, before its window."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""

@@ -222,7 +222,7 @@ class Pace:
     forgetting_s: float
     """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """Decay time of the slowest mode, not limited by the longest run [s]; for undamped modes, the limit."""
+    """The same without the limit [s]; an undamped mode gets the limit, because it has no decay time."""
     sharpness: Sharpness
     nearly: Sharpness
     """Tolerances of the least accurate level, for motions that are nearly settled."""
