@@ -16,10 +16,10 @@ STEADY = 2e-3
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25
-"""For periods above one: largest variance at equal phase, relative to the variance of all points."""
+"""For periods n above one: largest variance of points n apart, relative to the variance of all points."""
 _BLOCKS = 10
 _DRIFT = 5.0
-"""Largest drift [standard errors]; 1 settled record in 250 exceeds it (4 slopes, 8 degrees of freedom)."""
+"""Largest drift [standard errors]; 1 of 250 settled records exceeds it (4 slopes, 8 degrees of freedom)."""
 
 _STEADY_SCATTER = 0.9
 """Minimum ratio of the smaller to the larger scatter of the two halves of a settled record."""
@@ -67,7 +67,7 @@ def shortest_period(points: Points) -> int | None:
 
     To test period n, every nth point is compared over the whole record, because slow changes are small from
     one period to the next. In addition to their noise, these points may scatter by 0.2 % of the orbit
-    (unsteady drive). If n exceeds one, half of the total scatter is a further limit.
+    (unsteady drive). If n exceeds one, their scatter must also be below half of the total scatter.
     """
     by_noise = (_NOISE_MARGIN * points.noise) ** 2
     allowed = by_noise + STEADY**2
@@ -85,8 +85,8 @@ def shortest_period(points: Points) -> int | None:
 def drift(points: Points) -> float:
     """Return the largest trend of the points' mean or scatter over a record, in standard errors.
 
-    A line is fitted to the values of the record's tenths, and its slope divided by its standard error. A
-    scatter of 0.2 % of the orbit is tolerated as unsteadiness of the drive.
+    A line is fitted to the values of ten equal parts of the record, and its slope is divided by its standard
+    error. A scatter of 0.2 % of the orbit is tolerated as unsteadiness of the drive.
     """
     blocks = np.array_split(points.value, _BLOCKS)
     place = np.linspace(-0.5, 0.5, _BLOCKS)
@@ -103,7 +103,7 @@ def drift(points: Points) -> float:
 
 
 def slow_share(points: Points) -> float:
-    """Return the variance of the means of the record's tenths, relative to the variance of the points."""
+    """Return the variance of the means of ten parts of the record, relative to the variance of the points."""
     means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _BLOCKS)])
     whole = float(np.sum(np.var(points.value, axis=0)))
     return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0

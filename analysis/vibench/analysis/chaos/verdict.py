@@ -52,7 +52,7 @@ class Rotation:
 
 
 def rotation(points: Reals) -> Rotation:
-    """Fit a closed curve, the harmonics of one frequency, to the points of a section.
+    """Fit a closed curve, a sum of harmonics of one frequency, to the points of a section.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def begin_of_last_motion(points: Points) -> int:
     """Return the index at which the last motion of a record starts; 0 if the motion never changes.
 
     Each block of the record is tested for repetition within its noise. One change of the result means that a
-    transient ended or a motion was lost. Several changes mean chaos with calm intervals, which counts as one
-    motion.
+    transient ended or a motion was lost. Several changes mean chaos with periodic intervals, which counts as
+    one motion.
     """
     count = len(points.value)
     edges = np.linspace(0, count, max(min(_BLOCKS, count // _SHORTEST_BLOCK), 1) + 1).astype(int)
@@ -140,7 +140,7 @@ CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
 """Required distance below the surrogates' mean [standard deviations]; a rank test alone errs once in 40."""
 _ASYMMETRIC = 2.5
-"""Minimum `margin` of the time symmetry; with noise, one of two coordinates exceeds it in 4 % of cases."""
+"""Minimum `margin` of the time symmetry; in 4 % of cases, noise in one of two coordinates exceeds it."""
 _SURELY = 3.0
 """Distance of an exponent's lower bound below its estimate, in standard deviations of the estimate."""
 _DELAYS = 3
@@ -243,8 +243,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     if count - before < FEWEST:
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
-    # A settled motion repeats at the end, however long its transient was. An irregular end or a long period
-    # may itself be a transient: a decay into noise rotates about a point.
+    # A motion that repeats at the end is settled, however long its transient was. An irregular end or a long
+    # period may itself be a transient, such as a decay into noise, which rotates about a point.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _no_verdict(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")
@@ -364,8 +364,8 @@ def _verdict(
 ) -> MotionVerdict:
     if not noise_test.is_valid:
         return _no_verdict(
-            f"the spectra of surrogate signals are {100 * noise_test.spectrum_error:.0f} % off, so linear "
-            "noise cannot be excluded; record longer",
+            f"the spectra of surrogate signals are wrong by {100 * noise_test.spectrum_error:.0f} %, so "
+            "linear noise cannot be excluded; record longer",
             evidence,
         )
     if not noise_test.rejects_linear_noise:

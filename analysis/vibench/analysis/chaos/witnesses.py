@@ -52,7 +52,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     last
         Only points before this index are used, so that both points of a pair have successors.
     floor
-        Neighbours closer than this are skipped, because noise dominates.
+        Neighbours closer than this are skipped, because noise dominates their distance.
     """
     tree = cKDTree(points[:last])
     wanted = np.arange(last)
@@ -97,7 +97,7 @@ FEWEST_PAIRS = 50
 
 @dataclass(frozen=True, eq=False)
 class Divergence:
-    """Growth of the distance of initially neighbouring points, from its mean logarithm after each step."""
+    """Growth of the distance between points that start close together: its mean logarithm after each step."""
 
     first: int
     last: int
@@ -105,7 +105,7 @@ class Divergence:
     exponent: float
     """Slope of the fitted line [1/step]; NaN if no line was fitted."""
     sd_exponent: float
-    """Scatter of the slope between tenths of the record."""
+    """Standard error of the slope, from its scatter between ten parts of the record."""
 
     @property
     def is_resolved(self) -> bool:
@@ -268,7 +268,7 @@ class SurrogateTest:
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
     least_margin: float = 0.0
-    """Minimum `margin` that rejects linear noise; a smaller margin may be chance."""
+    """Minimum `margin` that rejects linear noise; a smaller margin may occur by chance."""
 
     @property
     def margin(self) -> float:
@@ -278,7 +278,7 @@ class SurrogateTest:
 
     @property
     def p(self) -> float:
-        """Probability that linear noise has as small a statistic as the series (one-sided rank test)."""
+        """Probability that linear noise gives a statistic as small as the series (one-sided rank test)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 

@@ -79,7 +79,7 @@ class Curve(Tabular):
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies and bounds at up to ``columns`` points, because areas are slow to draw."""
+        """Return frequencies and bounds at up to ``columns`` points, because filled areas draw slowly."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -171,7 +171,7 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 of these."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance [half widths]): at most n peaks, the mode's own included, lie this close to a mode."""
+"""Pairs (n, distance [half widths]): at most n peaks, including the mode's own, lie this close to a mode."""
 _CROWD_RISE = 0.3
 """Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01

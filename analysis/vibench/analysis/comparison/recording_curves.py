@@ -117,7 +117,7 @@ class AnalysisOptions(FrozenModel):
     """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
     alone driven by the recorded base motion. It takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
-    """Estimator; noise on the base biases h1, noise on the response biases h2, and neither biases drive."""
+    """Estimator: noise on the base biases 'h1', noise on the response biases 'h2', neither biases 'drive'."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
     """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
     window: Window = Window.HANN
