@@ -51,11 +51,11 @@ class BranchLine(Tabular):
     frequency_hz: Reals
     amplitude_m: Reals
     response_i: Reals
-    """Largest |x|, |y|, |z| and |p| over the drive amplitude, shape (n, 4)."""
+    """Largest |x|, |y|, |z| and |p|, divided by the drive amplitude, shape (n, 4)."""
     response_ii: Reals
-    """Amplitude of x, y, z and p at the drive frequency, over the drive amplitude, shape (n, 4)."""
+    """Amplitude of x, y, z and p at the drive frequency, divided by the drive amplitude, shape (n, 4)."""
     states: Reals
-    """x, y, z, vx, vy, vz at the drive's time zero, shape (n, 6) [m, m/s]."""
+    """x, y, z, vx, vy, vz at time zero of the drive, shape (n, 6) [m, m/s]."""
     multiplier_real: Reals
     """Floquet multipliers over the period of the motion, largest first, shape (n, 6)."""
     multiplier_imaginary: Reals
@@ -226,7 +226,7 @@ class BranchDiagram(Tabular):
 
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """Flags, for each branch, of the motions that the bench can hold; None without a bench."""
+        """For each branch, whether the bench can hold each of its motions; None without a bench."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 

@@ -58,10 +58,10 @@ class BranchRequest(SpecimenChoice):
     stop: PositiveFloat = 600.0
     """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     error: TargetError | None = None
-    """Error of every motion relative to the fundamental of p, 0.01 or "1 %"; 1e-4 by default. Shooting always
-    reaches 1e-8; harmonic balance uses as many harmonics as needed."""
+    """Error of each motion relative to the fundamental of p, such as 0.01 or "1 %"; 1e-4 by default. Shooting
+    always reaches 1e-8; harmonic balance uses as many harmonics as needed."""
     time_s: TargetTime | None = None
-    """Time limit of the search, 20 or "20 s"; the result contains the branches found by then."""
+    """Time limit of the search, such as 20 or "20 s"; the result contains the branches found by then."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of the harmonic balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8
@@ -186,7 +186,7 @@ MOST_BINS = 100
 
 
 def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple[float, float], ...]:
-    """Return pairs of frequency [Hz] and amplitude [m] of a sweep or of steps, ascending, 100 at most.
+    """Return up to 100 pairs of frequency [Hz] and base amplitude [m] of a sweep or stepped sine, ascending.
 
     Raises NotEnoughData when the drive had fewer than two frequencies.
 

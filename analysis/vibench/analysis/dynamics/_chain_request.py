@@ -59,10 +59,10 @@ class ChainRequest(SpecimenChoice):
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every accuracy."""
     error: TargetError | None = None
-    """Requested relative error of transmissions under a steady sine, 0.01 or "1 %"; sets accuracy and
-    times."""
+    """Requested relative error of transmissions under a steady sine, such as 0.01 or "1 %"; determines the
+    accuracy and the times."""
     time_s: TargetTime | None = None
-    """Computing time of each run under a steady sine, 2 or "2 s"; one minute by default."""
+    """Computing time of each run under a steady sine, such as 2 or "2 s"; one minute by default."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:

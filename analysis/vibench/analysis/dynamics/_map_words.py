@@ -93,7 +93,7 @@ def map_caption(results: MapResults) -> str:
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return a specimen's name and how it differs from the shipped one of that name, or from the paper's."""
+    """Return a specimen's name and its differences from the shipped specimen of that name, or the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
