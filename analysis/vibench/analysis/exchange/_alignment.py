@@ -16,7 +16,7 @@ from ._source_channel import SECONDS, SourceChannel
 from ._times import TIME_UNITS, agrees
 
 _MOST_REPEATED = 100
-"""Maximum number of samples by which times may go back; beyond it, another record begins."""
+"""Maximum number of samples by which times may go back; a larger step means that another record begins."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Alignment:
 
     rate_hz: float
     places: int
-    """Length of the axis in sample intervals: from the earliest sample to the last common one."""
+    """Length of the axis in sample intervals: from the earliest sample to the last that all channels have."""
     pieces: tuple[tuple[Piece, ...], ...]
     """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]

@@ -1,7 +1,7 @@
 """Pack a folder of recordings as a Research Object Crate, a zip file for a data repository.
 
 In RO-Crate 1.1, ``ro-crate-metadata.json`` describes every file. For recordings it also contains the
-excitation, the reason for the end, channels, units and software.
+excitation, the reason why the run ended, channels, units and software.
 """
 
 import hashlib
@@ -66,8 +66,8 @@ def pack_folder(
     facts
         Licence, authors and their organisation, title.
     untrusted
-        Reasons not to trust recordings, keyed by path below the folder, from `vibench.acquisition.campaign`'s
-        ``verify_recordings``. Such recordings are packed unchanged, with a remark in the description.
+        Reasons not to trust recordings, keyed by path relative to the folder, as ``verify_recordings`` of
+        `vibench.acquisition.campaign` returns them. Such recordings are packed unchanged, with a remark.
     observer
         Receives the number of bytes packed since the last call.
 

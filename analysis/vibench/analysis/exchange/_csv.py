@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Read a date in the order (day or month first) nearest to the last date; return False if invalid."""
+        """Read a date, day or month first, whichever is nearer to the last date; return False if invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -116,7 +116,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 LONGEST_HEAD = 200
 """Maximum number of heading lines of a text file."""
 DELIMITERS = (";", "\t", "|", ",", None)
-"""Separators in order of trial; None means blanks. With all but the comma, commas are decimal marks."""
+"""Separators in order of trial; None means blanks. Unless commas separate, they are decimal marks."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
@@ -332,9 +332,9 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 
 
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
-    """Return labels and units from one heading row or from one row each; empty texts if not stated.
+    """Return labels and units from one heading row or two separate rows; empty texts if not stated.
 
-    Raises ValueError for a row with fewer units than columns, because their columns are unknown.
+    Raises ValueError for a row with fewer units than columns, because it is unknown which columns have them.
     """
     for line in head:
         cells = [each.strip() for each in layout.cells(line.strip())]
@@ -372,7 +372,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[Sequence[tuple[str, float]]]:
-    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), and then those of all columns."""
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), then the facts of all columns."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:

@@ -1,4 +1,4 @@
-"""Part of a recording to export, and its metadata for formats that cannot store them."""
+"""Part of a recording to export, and its metadata in a separate file if the format cannot store them."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence

@@ -207,7 +207,7 @@ def export_functions(
     excerpt
         Excerpt from which the functions were estimated.
     functions
-        Functions in the order of writing; requested after the format and the path are checked.
+        Functions in the order of writing; computed only after the format and the path are checked.
     to
         Export format that can store functions.
     path

@@ -73,7 +73,7 @@ def _readers(file: h5py.File) -> Iterator[tuple[SourceChannel, Read]]:
 
 
 def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int) -> Reals:
-    """Read samples along an axis of a dataset; ``row`` is the place along the other axis of a 2-D dataset."""
+    """Read samples along an axis of a dataset; ``row`` is the index along the other axis of a 2-D dataset."""
     dataset = file[name]
     place: list[int | slice] = [row] * dataset.ndim
     place[axis] = slice(start, stop)
@@ -147,7 +147,7 @@ def _facts_above(group: h5py.Group, known: dict[str, Facts]) -> Facts:
 
 
 def _value(dataset: h5py.Dataset) -> Any:
-    """Return a single value, or MATLAB texts (stored as letter codes, in cells as references to these)."""
+    """Return a single value, or MATLAB texts (stored as character codes, or as references to such codes)."""
     if dataset.size > MOST_LETTERS or dataset.size == 0:
         return None
     match dataset.attrs.get("MATLAB_class"):

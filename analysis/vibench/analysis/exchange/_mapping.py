@@ -27,7 +27,7 @@ KNOWN_ROLES = {
 _NO_UNIT = {"", "-", "1", "none", "None"}
 """Texts that mean "no unit" in a file."""
 _LARGEST_CORRECTION = 0.2
-"""Largest relative difference between a scale and the file's unit; a larger one contradicts the unit."""
+"""Largest accepted relative difference between the given scale and the size of the file's unit."""
 
 
 def _is_another_quantity(file_unit: str) -> bool:

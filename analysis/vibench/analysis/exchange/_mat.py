@@ -38,7 +38,7 @@ from ._times import stated_times
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #
 # Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". After a header of 128 bytes, each element has
-# a tag (type, bytes) and data padded to eight bytes. A matrix has several elements, a compressed element one.
+# a tag (type, bytes) and data padded to eight bytes. A matrix contains several elements, compressed data one.
 
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
@@ -223,7 +223,7 @@ def _all_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def _named_facts(struct: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the values in all structs inside a struct, with the name of their struct: ``"v_unit"``."""
+    """Yield the values in all structs inside a struct, named by struct and field, such as ``"v_unit"``."""
     for name, value in struct.items():
         if isinstance(value, dict):
             yield from (

@@ -108,7 +108,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
         if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
-            # It is clear which times belong to a channel only if its channels follow each time column.
+            # It is clear which times belong to a channel only if each time column precedes its channels.
             order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
             is_clear = order[0] and not any(one and two for one, two in pairwise(order))
             if not (source.are_in_order and is_clear):
@@ -119,7 +119,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
 
 
 def _rank(time: SourceChannel, channel: SourceChannel, *, is_named: bool) -> tuple[bool, bool, int]:
-    """Return a key that ranks how likely times belong to a channel; all zero if they do not."""
+    """Return a key that ranks how likely it is that times belong to a channel; all zero if they do not."""
     if time.samples != channel.samples:
         return False, False, 0
     is_above = _group(channel).startswith(_group(time))

@@ -53,7 +53,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
         counts: dict[str, dict[int, int]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep each segment's properties and sample counts; npTDMS keeps the last and the sum."""
+            """Keep each segment's properties and sample counts; npTDMS keeps the last ones and the sum."""
 
             _segment = 0
 
@@ -87,7 +87,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
 
 
 def _unlike_segments(counts: Mapping[str, Mapping[int, int]]) -> Iterator[tuple[str, str]]:
-    """Yield path and segments of channels that are as long as others, but are divided in another way.
+    """Yield path and segments of channels as long as other channels but divided into different segments.
 
     Channels may share all segments, follow one another, or take turns.
     """

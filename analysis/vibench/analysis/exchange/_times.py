@@ -1,4 +1,4 @@
-"""Read sample rates, start times and axes of time that a file states or contains."""
+"""Read sample rates, start times and time axes that a file states or contains."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -59,15 +59,15 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Relative distance of irregular intervals from multiples of the usual one, and their allowed share."""
+"""Minimum relative distance of irregular intervals from multiples of the usual one, and allowed share."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 3
 """Minimum number of differing intervals to recognize rounding; fewer could be due to regular losses."""
 _JITTER, _OUTLIERS = 0.04, 0.03
-"""Largest range of jitter that rounding does not explain [sample intervals]; ignored share on each side."""
+"""Largest allowed range of jitter beyond rounding [sample intervals]; share of outliers on each side."""
 _COARSE_SPREAD = 1.25
-"""Largest range of the deviations of coarse times from a line, in last digits; lost samples exceed it."""
+"""Largest range of deviations of coarse times from a line [last digits]; lost samples exceed this range."""
 _RISING = 0.9
 """Minimum share of non-negative intervals in a channel of times."""
 _BIN = 512
@@ -75,7 +75,7 @@ _BIN = 512
 _LAST = 64
 """Number of time stamps from which the resolution is determined."""
 _LEAST_RISING = 64
-"""Minimum number of evenly rising values at which a channel not named time counts as times."""
+"""Minimum number of evenly rising values for a channel to count as times without a name that means time."""
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
@@ -217,7 +217,7 @@ def is_time_of(name: str, label: str) -> bool:
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
-    """Return whether a column named like times contains times; "t" and "temps" may be other quantities."""
+    """Return whether a column contains times, as its name suggests; "t" may also mean a temperature."""
     if found is not None and (channel.unit or found["unit"]):
         return True
     steps = np.diff(np.sort(first))
@@ -306,7 +306,7 @@ def _begin(block: Reals) -> "_Scan | None":
         rounding = float(np.quantile(rising, 0.01)) if is_repeated else digit
         return _Scan(mean, rounding, is_inferred=True)
     are_many_lost = bool(np.count_nonzero(~is_near) > many)
-    # Intervals of 1.04 digits, rounded to one digit, look like one lost sample in 25. Lost samples move all
+    # Intervals of 1.04 last digits, rounded to one, look like one lost sample in 25. Lost samples move all
     # later times away from a line; rounding moves each time by half a digit at most.
     off = np.abs(intervals[~is_near] - typical)
     is_digit = off.size >= _LEAST_ROUNDED and 0.9 * float(np.min(off)) < digit
@@ -405,7 +405,7 @@ class _Scan:
         slope, offset = 0.0, float(np.mean(distance))
         if np.ptp(places):
             fitted = np.polyfit(places / span, distance, 1)
-            # In a short file, a line through few extremes may be worse than the line from first to last.
+            # In a short file, a line fitted to few extremes may be worse than one from the first to the last.
             if np.ptp(distance - fitted[0] * places / span) < np.ptp(distance):
                 slope, offset = float(fitted[0]), float(fitted[1])
         off = distance - slope * places / span - offset
@@ -446,7 +446,7 @@ def _time_fault(runs: list[tuple[int, int]], samples: int, span: float) -> str:
 def restarts(
     starts_s: Mapping[int, float], rate_hz: float | None, samples: int
 ) -> tuple[tuple[tuple[int, int], ...], str]:
-    """Return the runs (as in `TimeAxis`) of a channel with several start times, and a contradiction or ""."""
+    """Return the runs (see `TimeAxis`) of a channel with several start times, and a contradiction if any."""
     runs = [(0, 0)]
     first_s = next(iter(starts_s.values()), 0.0)
     for (_, before_s), (sample, start_s) in pairwise(starts_s.items()):

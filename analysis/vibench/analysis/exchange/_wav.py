@@ -75,7 +75,7 @@ UNKNOWN_SIZE = 2**32 - 1
 def open_wav(path: Path) -> Iterator[Source]:
     """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped except for 24 bits.
 
-    Floats of at most 1 are fractions of full scale too, as audio programs write them.
+    Floats from -1 to 1 are fractions of full scale too, as audio programs write them.
 
     Raises ValueError when the file is not WAV, or is compressed or truncated.
     """
