@@ -23,7 +23,7 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
             where=found.differs.tolist(),
             transform=axes.get_xaxis_transform(),
             color=style.COLLIDING,
-            label="they differ",
+            label="the sweeps differ",
         )
         for curve, jumps, colour, line, label in (
             (found.up, up.jumps, style.LEVELS[0], "-", "up"),

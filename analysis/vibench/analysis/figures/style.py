@@ -56,9 +56,9 @@ _EDGE = 1e-3
 """Relative margin at both ends of a frequency axis; measured frequencies differ from round values by ppm."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratio of the ends below which a frequency axis is linear, and ratio below which it has ticks at 3 and 7."""
+"""Ratios of the axis ends below which a frequency axis is linear, and below which it has more ticks."""
 _FEW_DECADES = (1.5, 0.5)
-"""On an axis with fewer decades than this, some, or all, ticks between powers of ten have labels."""
+"""Numbers of decades below which some, and below which all, ticks between powers of ten have labels."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
@@ -122,7 +122,7 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None
 
 
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
-    """Give ``axes`` a logarithmic frequency axis with ticks at 20, 50, 100; a narrow band stays linear."""
+    """Give ``axes`` a logarithmic frequency axis with ticks at 20, 50, ...; a narrow band stays linear."""
     axes.set_xlim(low_hz * (1 - _EDGE), high_hz * (1 + _EDGE))
     if high_hz < _LINEAR_BELOW * low_hz:
         return
@@ -136,7 +136,7 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Give ``axes`` a logarithmic magnitude axis; in a narrow range, more than powers of ten are labelled."""
+    """Give ``axes`` a logarithmic magnitude axis; a narrow range also has labels between powers of ten."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))

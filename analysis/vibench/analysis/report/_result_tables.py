@@ -55,8 +55,8 @@ def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
             for each in results
             for budget in budgets_of(each)
         ),
-        f"± is the expanded uncertainty, k = {COVERAGE:g}, of all that is stated, combined as in JCGM "
-        "100:2008; each column is a standard uncertainty over the value. Contributions that the hardware "
+        f"± is the expanded uncertainty, k = {COVERAGE:g}, of all stated contributions, as in JCGM "
+        "100:2008; each column is a relative standard uncertainty. Contributions that the hardware "
         "configuration does not state are not included. Chance: difference between repeated runs.",
     )
 
@@ -112,7 +112,7 @@ def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
         "Frequencies with collisions in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
         tuple(row for each in sweeps for row in _collision_rows(each)),
-        "Bounds lie between the nearest interval clearly without collisions and the first or last clearly "
+        "Bounds are the nearest interval clearly without collisions and the first or last interval clearly "
         "with collisions. The end is random, and differs between runs. "
         "The motion that a sweep follows depends on its direction and on its first frequency.",
     )
