@@ -1,4 +1,4 @@
-"""Fit the gap to the onset of collisions, where the linear relative motion equals the gap."""
+"""Find the gap from the onset of collisions, where the linear relative motion equals the gap."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ def _narrowest(found: Sequence[Onset], linear: Specimen) -> FittedValue:
 
 
 def fit_gap(sweeps: Sequence[SweepAnalysis], linear: Specimen, fit: SpecimenFit | None = None) -> FittedValue:
-    """Return the gap from the onset of collisions with the narrowest bounds.
+    """Return the gap with the narrowest bounds among the onsets of collisions.
 
     Raises NotEnoughData when no sweep enters a colliding region.
 
@@ -163,9 +163,9 @@ def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onse
     """Yield the onset at every frequency that has dwells with and without collisions.
 
     The lower bound is the largest relative motion without collisions at which m0 moves as predicted, as
-    masses may also collide smoothly. The upper bound is the smallest linear motion with collisions that
-    cannot persist from a higher level or another frequency. As collisions disturb the base, this linear
-    motion is scaled from the largest dwell without collisions, in proportion to the generator amplitude.
+    masses may also collide smoothly. The upper bound is the smallest linear motion of a colliding dwell,
+    unless its collisions may persist from a higher level or another frequency. As collisions disturb the
+    base, it is scaled from the largest dwell without collisions, in proportion to the generator amplitude.
     """
     rest = list(dwells)
     while rest:

@@ -21,8 +21,8 @@ LEAST_RELATIVE_SD = 1e-4
 _LEAST_CLEAR = 10.0
 """Smallest ratio of a line's magnitude to the median scatter nearby, so that ln(magnitude) is normal.
 
-The line's own scatter is estimated from few averages. Using it would select lines whose scatter is small by
-chance, and refuse a correct model.
+The line's own scatter is estimated from few averages. With it, lines whose scatter is small by chance
+would be selected, and a correct model refused.
 """
 _NEIGHBOURS = 31
 """Number of neighbouring spectral lines for the median scatter."""
@@ -41,7 +41,7 @@ _STEP = 1e-6
 _HOPELESS = 5.0
 """Multiple of the chi square limit above which no weighting of lines can make a fit valid."""
 _MOST_STEPS = 60
-"""Maximum number of evaluations of a fit; fits of a further mode that the data lack have no optimum."""
+"""Maximum number of evaluations of a fit; a fit of a further mode has no optimum if no such mode exists."""
 
 Model = Callable[[Specimen, Reals, Reals], Complexes]
 """Function of specimen, frequencies [Hz] and further parameters that returns m0 / base."""
@@ -130,7 +130,7 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Return the specimen with these parameters, each limited to `_MOST_OFF`."""
+        """Return the specimen with these parameters, each limited to `_MOST_OFF` from its start value."""
         begun = self.start[: len(self.free)]
         values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
@@ -177,7 +177,7 @@ def lines_of(
 ) -> Lines:
     """Select the spectral lines well above their scatter; raises NotEnoughData if too few are left.
 
-    The magnitudes of a fitted specimen, if given, replace the measured ones, so that noise has no effect.
+    The magnitudes of a fitted specimen, if given, replace the measured ones, so that noise selects no lines.
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz

@@ -84,7 +84,7 @@ def fit_specimen(
     """Fit linear parameters to magnitude and phase, weighted by the scatter of the lines.
 
     The scatter is estimated from few averages, so Student's likelihood is used. A fit is refused if its chi
-    square exceeds the value that a correct model exceeds once in a thousand times. A refused fit has no
+    square exceeds the value that a correct model exceeds in one of a thousand cases. A refused fit has no
     values but a ranking of assumptions that may be wrong.
 
     Raises InvalidRequest when no parameter is free, or for parameters that no linear transmission determines
@@ -142,7 +142,7 @@ def not_linear(nominal: Specimen, sentence: str) -> SpecimenFit:
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance due to the clock error, which scales frequencies, and times inversely."""
+    """Return the covariance due to the clock error, which scales frequencies, and scales times inversely."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

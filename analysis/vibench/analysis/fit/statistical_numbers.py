@@ -21,7 +21,7 @@ from .specimen_fit import SpecimenFit
 
 # Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.
 #
-# Parameters are drawn from a box (one range each), and a run is simulated for each. Each parameter is
+# Parameters are drawn from a box (their ranges), and each draw is simulated in one run. Each parameter is
 # regressed on the statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The
 # posterior is the prediction for the observed statistics plus leave-one-out errors. Its intervals have the
 # stated coverage for parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman
@@ -55,7 +55,7 @@ class Posterior:
     draws: Reals
     """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics relative to the furthest run; infinite if bounds miss the range."""
+    """Distance of the observed statistics relative to the furthest run; infinite for values out of range."""
 
     @property
     def fits(self) -> bool:
@@ -384,7 +384,7 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
 
 
 def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Raise UnusableData if the rms base acceleration of a first run differs from the recorded one."""
+    """Raise UnusableData if the rms base acceleration of a first run is far from the recorded one."""
     first = made.draws.draw(made.specimen, made.rng)
     seen, drawn = (float(np.std(each[0])) for each in (measured, first))
     if not 1 / _LIKELY < seen / drawn < _LIKELY:

@@ -56,7 +56,7 @@ class Suspect:
     mends: bool
     """Whether the model fits when this assumption is dropped."""
     behind: float
-    """Twice the log likelihood ratio to the best suspect (0 for itself), plus ln(values) per parameter."""
+    """Twice the log likelihood ratio to the best suspect, with a penalty of ln(data values) per parameter."""
 
     @property
     def may_be_it(self) -> bool:

@@ -132,7 +132,7 @@ class UpdatedSpecimen(Tabular):
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit, without values if its overlay in ``results`` disagrees with the fitted noise."""
+        """Return the fit; drop its values if its overlay in ``results`` disagrees with the recorded noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]
