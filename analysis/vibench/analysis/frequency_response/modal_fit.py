@@ -98,7 +98,7 @@ _LEAST_NOISE = 0.02
 
 @dataclass(frozen=True)
 class Leakage:
-    """Effect of the window, its overlap and its length on a transmission."""
+    """Effect of the window, overlap and length of segments on a transmission."""
 
     segment_s: float
     window: Window
@@ -133,7 +133,7 @@ class Leakage:
         line
             Line numbers in ascending order.
         value, spread
-            Transmission at these lines, and standard deviation of its real or imaginary part, an upper limit.
+            Transmission at these lines, and upper limit of the scatter (sd) of its real or imaginary part.
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
@@ -231,7 +231,7 @@ _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
 """If two modes are closer than this [half-power bandwidths], their bounds are widened for a third mode."""
 _EDGE = 1e-3
-"""Distance from a bound, relative to the search reach, below which a fit has found no minimum."""
+"""A fit that ends closer than this to a bound, relative to the search reach, has found no minimum."""
 
 
 class Lines:
@@ -370,7 +370,7 @@ class _Sums:
 
     def misfit_rates(self, poles: Reals) -> Reals:
         """Return the derivatives of the residual with respect to each pole."""
-        # Although the factors depend on the poles, the gradient is the same (Kaufman 1975, BIT 15, 49-57).
+        # The dependence of the factors on the poles leaves the gradient unchanged (Kaufman 1975, BIT 15, 49).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)
@@ -446,7 +446,7 @@ def modal_fit(
         nearby = float(np.sum(squares[about])) / beside
         # Errors due to ringing also correlate with conjugates of other errors, which at most doubles the
         # variance of a fitted value.
-        # Motion left from the hit before changes neighbouring lines together; the jackknife includes it.
+        # Motion that remains from an earlier hit shifts all lines together; the jackknife includes this.
         least = 1.0 if band.settings.decay_per_s is None else 0.0
         widened = max(least, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])

@@ -33,7 +33,7 @@ _CONVERGED = 1e-9
 _LARGEST_OFFSET = 200e-6
 """Largest relative offset between two clocks, for oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
-"""Minimum power of the mean period over the mean power of all periods, for a drive that repeats."""
+"""Minimum ratio of the power of the mean period to the mean power of a period, for a drive that repeats."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Largest ratio of a line's deviation to the median if it is used to find a drift; only above `_SMALL`."""
+"""Largest ratio to the median of a deviation used to find a drift; applies only above `_SMALL`."""
 
 
 class Scatter(StrEnum):

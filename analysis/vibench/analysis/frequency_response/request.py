@@ -114,7 +114,7 @@ def parse_view(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> Frequen
     known = {each.value: each for each in Quantity}
     if len(words) > _ABOVE_AND_BELOW or any(word not in known for word in words):
         raise InvalidRequest(
-            f"the quantity {text!r} is not known; give those of m0 and base, such as velocity/acceleration; "
+            f"the quantity {text!r} is not known; give one for m0 and base, such as velocity/acceleration; "
             f"known are {', '.join(known)}"
         )
     found = FrequencyResponseView(response=known[words[0]], base=known[words[-1]])
@@ -203,7 +203,7 @@ class FrequencyResponseRequest:
 
 
 def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
-    """Return the longest segment that still leaves this many independent averages of a whole record.
+    """Return the longest segment for which a whole record gives this many independent averages.
 
     K segments count as at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples contain K
     segments of N / (1 + (K - 1) (1 - overlap)).

@@ -189,8 +189,8 @@ _ROWS = ("drive", "response", "reference")
 class FrequencyResponseSums:
     """Averages for the transmission of a record that arrives in blocks, in constant memory.
 
-    Blocks have the rows drive, response and, for the
-    drive-referenced estimator, reference.
+    Blocks have a row for the drive, one for the response
+    and, for the drive-referenced estimator, one for the reference.
     """
 
     def __init__(
