@@ -129,7 +129,7 @@ def _at_stops(rows: Reals) -> Flags:
 
 
 def _blocks(motion: PreparedMotion) -> Iterator[tuple[int, int, int]]:
-    """Yield overlapping blocks: first sample to filter, first to keep, and end of the filtered samples."""
+    """Yield overlapping blocks: first sample to filter, first sample to keep, and end of the block."""
     block, overlap = (round(each * motion.sample_rate_hz) for each in (_BLOCK_S, _OVERLAP_S))
     for begin in range(0, motion.samples, block):
         end = min(begin + block + overlap, motion.samples)

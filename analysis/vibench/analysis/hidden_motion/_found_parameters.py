@@ -32,9 +32,9 @@ _FITTING_LEVEL = 1.6
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts of gaps found without a contact model, in standard deviations, tried if tracking fails."""
 _LARGEST_SD = 0.5
-"""Largest standard deviation of a determined parameter, relative to the description's."""
+"""Largest standard deviation of a determined parameter, relative to that of the described value."""
 _WIDE = 3.0
-"""Standard deviation of the wide prior, which replaces the narrow one, relative to the description's."""
+"""Ratio of the wide prior's standard deviation, used in place of the narrow one, to the described value's."""
 _FAR = 3.0
 """Largest standard deviation of a determined parameter, relative to the narrow prior."""
 _SETTLED = 1.0
