@@ -145,7 +145,7 @@ def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[
 
 
 def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the reach of each column: the longest period in its part and the two next to it [columns]."""
+    """Return the reach of each column: the longest period in its part and both adjacent parts [columns]."""
     is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
     reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
     beside = np.pad(reach, 1, mode="edge")

@@ -98,7 +98,7 @@ _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
 """Minimum ratio of final to initial drive amplitude in a point's samples; a lower ratio is a ramp-down."""
 _STEEPEST_POWER = 2
-"""Largest power of frequency that the voltage of a sweep follows (constant displacement)."""
+"""Largest exponent of frequency to which a sweep's voltage is proportional (constant displacement)."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def sine_point(
     Parameters
     ----------
     window
-        Samples in physical units; only the newest that are needed are used.
+        Samples in physical units; only as many of the newest as needed are used.
     rows
         Row numbers of drive, base acceleration and response.
     quantity

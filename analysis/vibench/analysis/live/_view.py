@@ -32,7 +32,7 @@ _SPAN_S = 78e-6
 _DAMPING_TIME_S = 2e-5
 """Damping time of the springs at m0: ratio of the acceleration step to the change of its slope."""
 _CONTACT_S = 30e-6
-"""Duration of a contact, which is 20 to 40 us."""
+"""Assumed duration of a contact; contacts last 20 to 40 us."""
 _APART_S = 100e-6
 """Distance [s] below which two kinks are counted as one."""
 _LEAST_FRESH_S = 20e-3
@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise, and its value if normal; impacts affect higher quantiles."""
+"""Quantile of |noise| that measures the noise, and its value for unit normal noise; impacts change others."""
 
 
 class ImpactCounter:
