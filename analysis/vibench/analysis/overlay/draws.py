@@ -177,7 +177,7 @@ class PlayedVoltage:
 
     Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each line of
     each frame, a Wiener filter estimates the part that drove the shaker; the uncertain rest is random in each
-    draw. Draws scatter by the voltage's uncertainty, without the power of converter noise.
+    draw. Draws scatter by the uncertainty of this estimate, not by all of the converter noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
@@ -266,7 +266,7 @@ CLOCK_TOLERANCE = 50e-6
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
 """Lead-in before the simulated part, fade-in at the start of the lead-in, faded tail after the part [s]."""
 _NOISE = 0.15
-"""Uncertainty (± natural logarithm) of a channel's noise, estimated in its quietest part."""
+"""Uncertainty of the natural logarithm of a channel's noise, estimated in its quietest part."""
 _MORE = 3
 _SEED = 17
 _BLOCK = 1 << 17

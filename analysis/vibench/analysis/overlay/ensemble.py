@@ -23,7 +23,7 @@ MIXED = -1
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the limit of |z|; if all values are within it after half of the draws, the others are omitted."""
+"""Share of the limit of |z|; if all values are within it after half of the draws, no more are made."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -229,7 +229,7 @@ def largest_of_chance(largest: Reals) -> float:
 
     ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
     distribution with their mean and deviation. It is widened, because few draws determine these poorly:
-    otherwise 2 % of 16 draws would exceed it, and 5 % of five. The factor is fitted to simulations.
+    otherwise it would be exceeded in 2 % of cases with 16 draws, and in 5 % with five. The factor is fitted.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)

@@ -109,7 +109,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starting points: data determine products of parameters better than parameters."""
+    """Search from several starting points, as the data determine mainly products of the parameters."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)

@@ -127,7 +127,7 @@ def similarity(
     """
     if not np.array_equal(reference.frequency_hz, model.frequency_hz):
         raise InvalidRequest(
-            "the curves have different frequencies; interpolate one at the other's frequencies with Curve.at"
+            "the curves have different frequencies; interpolate one of them with SimilarityCurve.at"
         )
     if not threshold > 0.0:
         raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")

@@ -286,7 +286,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Maximum number of points of both models together; more take hours and cannot be distinguished."""
+"""Maximum number of points of both models together; more take hours, and a plot cannot resolve them."""
 
 
 class Exponent(StrEnum):
