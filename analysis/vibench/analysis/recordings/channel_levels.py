@@ -45,7 +45,7 @@ class ChannelLevel:
 
     @property
     def share_of_range(self) -> float:
-        """Peak of the channel over full scale."""
+        """Peak of the channel divided by full scale."""
         return self.peak / self.full_scale
 
     @property
@@ -113,7 +113,7 @@ _COUNTED = 2**16 + 1
 _TOPS = (0.1, 0.03, 0.01)
 """Heights of the examined peak tops relative to the peak."""
 _FLAT = 0.88
-"""Share of a top's samples in its upper half: 0.71 for smooth, 0.84 for straight, 1 for clipped peaks."""
+"""Minimum share of a clipped top's samples in its upper half; 0.71 for smooth, 0.84 for straight peaks."""
 _FLAT_VALUE = 0.4
 """Minimum share of the samples in a clipped peak's upper half that have the clipped value."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
@@ -122,7 +122,7 @@ _FEWEST_STEPS = 40
 _GAP, _GAP_IN_TOP = 0.01, 0.15
 """Largest empty range of values in a smooth, well sampled peak, relative to the heights of peak and top."""
 _AS_FREQUENT = 0.4
-"""Largest number of samples at one value below a clipped peak, over the number of clipped samples."""
+"""Largest number of samples at one value below a clipped peak, relative to the number of clipped samples."""
 
 
 def _lasting(bins: Reals) -> tuple[int, int]:
@@ -172,9 +172,9 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
-    """Return whether a signal stays near a value for long, such as a free body before a hit, in an envelope.
+    """Return whether an envelope stays near a value for long, such as that of a free body before a hit.
 
-    A constant value other than zero, such as that of a saturated amplifier, is no rest if it is the only one.
+    If a signal has only one value, it counts as rest only at zero: a saturated amplifier is also constant.
     """
     is_near = np.maximum(abs(lower - value), abs(upper - value)) < _REST[0] * np.nanmax(
         upper - np.nanmin(lower)
