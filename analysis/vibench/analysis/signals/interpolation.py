@@ -23,7 +23,7 @@ _PHASES = 512
 
 
 def _weights_of_phases() -> Reals:
-    """Return the windowed sinc at every tap, from one phase before a sample to one phase behind the next."""
+    """Return the windowed sinc at every tap, from one phase before a sample to one phase after the next."""
     fraction = np.arange(-1, _PHASES + 2, dtype=np.float64) / _PHASES
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))

@@ -134,7 +134,7 @@ _SLOW = 0.5
 _ONCE = 0.5
 """Share of the variance at one cycle per record above which the change may continue after the record."""
 _TREND = 2.0
-"""Square of a trend over its variance below which it counts as random; chance exceeds this in 14 %."""
+"""Ratio of a squared trend to its variance below which it counts as random; chance exceeds it in 14 %."""
 _BEYOND = 3.0
 """Ratio of the remaining decay to the observed scatter if the record covers a tenth of the decay."""
 

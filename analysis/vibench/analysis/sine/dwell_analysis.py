@@ -43,7 +43,7 @@ _LEAST_RISE = 0.01
 
 @dataclass(frozen=True)
 class Section:
-    """Poincaré points, displacement and velocity at one phase of every drive period, with the orbit."""
+    """Poincaré points (displacement and velocity at one phase of every drive period), and the orbit."""
 
     drive_hz: float
     phase_rad: float

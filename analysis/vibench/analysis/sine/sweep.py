@@ -115,7 +115,7 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Relative difference of the largest Response II from linear simulation up to which the two agree."""
+"""Relative difference up to which the largest Response II agrees with the linear simulation."""
 _LINES = 1 << 15
 """Number of frequencies at which linear motion is computed at once."""
 _BRIDGE_PERIODS = 3.0

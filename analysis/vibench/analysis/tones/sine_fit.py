@@ -70,7 +70,7 @@ _SEARCH = 0.2
 
 @dataclass(frozen=True)
 class FittedSine:
-    """Fitted sine amplitude cos(2 pi frequency_hz t + phase_rad), with t = 0 at the first sample."""
+    """Fitted sine: amplitude * cos(2 pi frequency_hz t + phase_rad), with t = 0 at the first sample."""
 
     frequency_hz: float
     sd_frequency_hz: float

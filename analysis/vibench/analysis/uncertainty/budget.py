@@ -23,7 +23,7 @@ RESULT_PATTERNS: Mapping[str, str] = {
     "response_i": r"\bResponse I\b",
     "response_ii": r"\bResponse II\b",
 }
-"""Name patterns of quantities that can end a recording, by result; see `vibench.acquisition.plan.Until`."""
+"""Name patterns of quantities that can end a recording, keyed by result; `vibench.acquisition.plan.Until`."""
 
 
 class Cause(StrEnum):

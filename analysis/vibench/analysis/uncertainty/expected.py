@@ -274,7 +274,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield, for some parts, three times [s]: as needed for all targets, to the first check, as planned."""
+    """Yield three durations [s] of some parts: needed for all targets, up to the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return

@@ -27,7 +27,7 @@ _SHAPE_VARIANCE = 0.5633
 """Variance of the shape k estimated from n maxima, times n (Hosking, Wallis and Wood 1985, for k = 0)."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Random errors that only draws of the twin can state: of a maximum, or of a 0.1 s interval of a sweep."""
+"""For random errors that only draws of the twin give: of a maximum, or of a 0.1 s interval of a sweep."""
 _ENDS = 2
 """Number of intervals at each end of a sweep; a largest value there depends on where intervals begin."""
 _PEAKED = 1.05
