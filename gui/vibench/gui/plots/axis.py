@@ -77,7 +77,7 @@ TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """Smallest distance between numbers on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Special tick spacing from which `tickStrings` recognises ticks without a number."""
+"""Special tick spacing by which `tickStrings` recognises ticks without a number."""
 _WIDE = "2000"
 """Text as wide as the widest number on a logarithmic horizontal axis, with margins."""
 

@@ -109,7 +109,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for unseen in ("top", "right"):
-            # Otherwise pyqtgraph updates the label of the invisible axis at every change of the range.
+            # Unlink invisible axes: pyqtgraph would update their labels at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
             # Paint the axes before the grid, because painting the axes determines the ticks for the grid.
@@ -162,7 +162,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self
 
     def keep_numbers(self) -> "Plot":
-        """Show numbers on the horizontal axis even of an empty plot, because a plot above shares the axis."""
+        """Show numbers on the horizontal axis of an empty plot too, because a plot above shares the axis."""
         self._blanked = (self.up,)
         self.across.blank(Blankness.WRITTEN)
         return self

@@ -196,7 +196,7 @@ class FilesPage(Page):
         QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)
-        hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
+        hint = "Computing the plot…" if self._opened.samples else "This recording contains no samples."
         self.pictures.show_recording(RecordingOverview(self._opened, levels), hint)
         self._pictured.show(self._opened.path)
         self._say_view()
@@ -321,8 +321,8 @@ class FilesPage(Page):
             (self._view, 1),
             self._markers,
             push_button("Show &all", "Show the whole recording (Home)", self.time_histories.show_all),
-            push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)),
-            push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)),
+            push_button("Zoom &in", "Show a shorter time range (+)", lambda: self.time_histories.zoom(0.5)),
+            push_button("Zoom o&ut", "Show a longer time range (-)", lambda: self.time_histories.zoom(2.0)),
         )
         heading = row((self._title, 1), self._compare, self._export, self._note)
         viewer = column(heading, self._facts, (self.pictures, 1), bar)

@@ -146,7 +146,7 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
         self.specimen.addItem(_ANOTHER, "")
         self.specimen.activated.connect(self._choose_specimen)
         self.find_numbers = tick_box(
-            "Find its numbers",
+            "Find its parameters",
             "Estimate gaps, m1, springs, dampers and contact law from the visible collisions",
             lambda _is_on: self._ask(),
         )
@@ -215,7 +215,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         self.highest.setCurrentIndex(_USUAL)
         self.line_width = Choice()
         for width_hz in _WIDTHS_HZ:
-            self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
+            self.line_width.addItem("automatic" if width_hz is None else f"{width_hz:g} Hz", width_hz)
         self.caption = ElidedLabel(rank="second")
         self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
         for plot in self._plots.values():

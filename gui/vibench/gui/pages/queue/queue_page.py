@@ -166,7 +166,7 @@ class QueuePage(Page):
         )
         self.unattended = QCheckBox("Unattended")
         self.unattended.setToolTip(
-            "Ticked: the engine keeps limits, ramps and recordings without the window; use 'vibench watch' "
+            "Ticked: the engine records and enforces all limits without the window; use 'vibench watch' "
             "and 'vibench stop'.\nNot ticked: the drive ramps down when the window does not respond."
         )
         self.unattended.setChecked(True)

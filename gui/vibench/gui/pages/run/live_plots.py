@@ -398,7 +398,7 @@ class HiddenMotionPlot(QWidget):
         shade = np.minimum(_SHADES * error / worth, _SHADES - 1).astype(int) if p.size else np.empty(0)
         for number, curve in enumerate(self.forecast):
             here = np.flatnonzero(shade == number)
-            # Each piece of the forecast begins at the last point of the piece before, to leave no gap.
+            # Each piece of the forecast begins at the last point of the previous piece, to leave no gap.
             part = slice(max(here[0] - 1, 0), here[-1] + 1) if here.size else slice(0, 0)
             curve.setData(time_s[part], p[part])
 

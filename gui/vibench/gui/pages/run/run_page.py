@@ -186,7 +186,7 @@ class WatchCard(QGroupBox):
         if run is None or not is_running or not averages:
             self._begun = 0
         else:
-            # While the next average settles, the status still has the number of the average before.
+            # While the next average settles, the status still has the number of the previous average.
             self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
         self.reject_button.setEnabled(self._begun > 0)
         self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
@@ -355,7 +355,7 @@ class RunPage(Page):
             test, reason = f"{measurement.name} ({kind.label})", ""
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The button with the focus was just hidden. Otherwise Qt would move the focus to the next list.
+            # The focused button was just hidden; without this, Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._measurement
