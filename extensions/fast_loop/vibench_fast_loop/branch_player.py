@@ -27,7 +27,7 @@ _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
 """Largest standard errors at the end of a measurement. For the base's fundamental and harmonics, they are
 relative to the tolerance; for m0, to m0 itself."""
 _ROUGHLY = 0.15
-"""Largest standard error of the base, relative to its distance from the level if this distance is large."""
+"""Largest standard error of the base motion far from the level, relative to its distance from the level."""
 _DRIFT = 3.0
 """Largest difference between the two halves of the settled blocks, in standard errors."""
 _REMEMBERED = 0.8
@@ -36,7 +36,7 @@ _REMEMBERED = 0.8
 
 @dataclass(frozen=True, eq=False)
 class LoopLook:
-    """Response of base and m0 to a setting: means over blocks of periods, from the first harmonic on."""
+    """Response of base and m0 to a setting: harmonics as means over blocks, starting with the first."""
 
     base_m: Coefficients
     m0_m: Coefficients

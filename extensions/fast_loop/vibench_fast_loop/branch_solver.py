@@ -32,7 +32,7 @@ class LoopSetting:
 
     frequency_hz: float
     reference_v: Coefficients
-    """Coefficients from the first harmonic on [V], shape (harmonics,). The first is real, which fixes the
+    """Coefficients of the harmonics [V], shape (harmonics,). The first coefficient is real, which fixes the
     phase."""
 
 

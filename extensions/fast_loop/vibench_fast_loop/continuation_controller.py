@@ -58,7 +58,7 @@ _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 _BELOW = 5.0
 """Distance of the first coefficient's initial value below the model's value, in steps."""
 _ABOVE = 8.0
-"""Distance of this initial value above the model's value (then about three times as large), in steps."""
+"""For an approach from above: distance of the initial value above the model's (about threefold), in steps."""
 _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps], and largest base harmonics, relative to the
 level, that allow it. Both are small, because a motion with impacts is easily lost."""

@@ -63,7 +63,7 @@ class FastLoop:
         return np.array([loop_transfer(self.plant, self.law, k * frequency_hz) for k in orders])
 
     def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
-        """Return displacements of base and m0 from the first harmonic on [m], shapes (blocks, orders).
+        """Return the harmonics of the displacements of base and m0 [m], shapes (blocks, orders).
 
         A sample is the mean since the previous sample, which delays it by half a step and attenuates it
         slightly; both effects are corrected.
@@ -197,7 +197,7 @@ def branch_hold(
 ) -> BranchHold | None:
     """Return how stable a law makes the model's branch at one base level, of amplitude ``level_m`` [m].
 
-    ``plant`` and ``law`` are as known to the host computer; the specimen has no rigid stops. The branch
+    ``plant`` and ``law`` are those that the host assumes; the specimen has no rigid stops. The branch
     starts at ``start_hz`` and stays in ``range_hz``. ``begin`` is the approach to the level: from rest, or
     from three times the level, which finds motions with impacts. Without stops, the start is from rest. The
     frequency first changes in the direction ``way``. A motion counts as held up to the multiplier

@@ -35,11 +35,11 @@ class LinearLaw:
     step: Table
     """Matrix that maps the memory to its next state, shape (n, n)."""
     inlet: Table
-    """Matrix from samples to the next memory state, shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    """Matrix that maps the samples to the next state, shape (n, 2), per m/s2 of the base and m/s of m0."""
     output: Table
     """Matrix that maps the memory to the output voltage, shape (1, n) [V]."""
     direct: Table
-    """Matrix from samples to output voltage, shape (1, 2), volts per m/s2 of the base and per m/s of m0."""
+    """Matrix that maps the samples to the output, shape (1, 2), volts per m/s2 of the base and m/s of m0."""
 
 
 def design_law(plant: SampledPlant) -> LinearLaw:
@@ -59,7 +59,7 @@ def design_law(plant: SampledPlant) -> LinearLaw:
 
 
 def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
-    """Return the law of two gains with the lowest cost in `design_law`, for controllers limited to such laws.
+    """Return the law of two gains with the lowest cost (see `design_law`), for controllers limited to it.
 
     ``u = -(kp s + kd d)`` for one sample s and its low-pass filtered rate ``d += a ((s - before) / step -
     d)``, where ``a = step / (tau + step)``. Gains and tau minimise the expected cost (W. S. Levine and M.
@@ -150,7 +150,7 @@ def loop_multiplier(
         Slopes dF/dp [N/m] and dF/d(dp/dt) [N s/m] of the stops' force along the motion, at the middle of each
         part of each sample, shape (samples * parts,).
     periods
-        Number of periods covered by the slopes; their number of samples must be (nearly) whole.
+        Number of periods covered by the slopes; together they contain a (nearly) whole number of samples.
     parts
         Number of parts per sample; contacts are shorter than a sample.
     """

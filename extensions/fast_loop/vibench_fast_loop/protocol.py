@@ -58,7 +58,7 @@ class LoopProgram(FrozenModel):
 
     frequency_hz: PositiveFloat
     reference_v: tuple[Pair, ...] = Field(min_length=1, max_length=MOST_HARMONICS)
-    """Coefficients from the first harmonic on, as real and imaginary part [V]."""
+    """Coefficients of all harmonics, the first harmonic first, as real and imaginary part [V]."""
     feedback: LoopFeedback | None = None
     """Feedback law; None for no feedback. An unchanged law keeps its memory."""
     glide_s: NonNegativeFloat = 0.1
@@ -79,14 +79,14 @@ class LoopState(StrEnum):
 
 
 class LoopBlock(FrozenModel):
-    """Fourier coefficients of one block of periods, as real and imaginary part [V], from the mean on."""
+    """Fourier coefficients of one block of periods, as real and imaginary part [V]; the mean comes first."""
 
     end_s: float
     """End of the block on the clock of the controller [s]."""
     steady: bool
     """Whether the program stayed the same during the block."""
     output: tuple[Pair, ...]
-    """Output voltage of program and law together, from the mean on [V]."""
+    """Output voltage of program and law together, starting with the mean [V]."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
