@@ -12,7 +12,7 @@ LONGEST_PERIOD = 32
 _TABLE = 2
 """Number of dimensions of an array of Poincaré points, whose shape is (drive periods, coordinates)."""
 STEADY = 2e-3
-"""Scatter allowed in a steady motion's points, relative to the orbit, because real drives fluctuate."""
+"""Scatter of the points allowed in a steady motion, relative to the orbit, because real drives fluctuate."""
 _NOISE_MARGIN = 1.5
 """Largest ratio of measured to expected scatter of the points that is attributed to noise."""
 _REPEATED = 0.25

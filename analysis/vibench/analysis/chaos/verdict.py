@@ -34,7 +34,7 @@ _EXPLAINED = 0.02
 """Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Noise of the points raises the limit `_EXPLAINED` to at most this value."""
+"""Largest value to which noise of the points may raise the limit `_EXPLAINED`."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -197,7 +197,7 @@ class MotionVerdict(Tabular):
         """Lower bound on the largest Lyapunov exponent of a chaotic motion; None if unresolved.
 
         Noise and the finite size of the motion reduce the estimate by an unknown amount, up to a half. Points
-        that scatter for other reasons diverge as well.
+        that scatter for reasons other than chaos diverge as well.
         """
         parting = self.evidence.divergence
         if self.kind is not MotionKind.CHAOTIC or parting is None or not parting.is_resolved:
@@ -220,7 +220,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     Parameters
     ----------
     points
-        Points of all drive periods; repetition is tested on all points, shape on the last 3000.
+        Points of all drive periods; all are tested for repetition, the last 3000 for the shape.
     drive_hz
         Drive frequency, to convert exponents per period to exponents per second.
     seed

@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""Up to 4 times this number of nearest points are searched for one that is distant in time."""
+"""A quarter of the largest number of nearest points that are searched for one distant in time."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -86,9 +86,9 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Neighbours' distance over the typical distance, above which the attractor's size limits growth."""
+"""Ratio of neighbours' distance to typical distance above which the attractor's size limits the growth."""
 _ABOVE_NOISE = 3.0
-"""Minimum ratio of the neighbours' distance to the noise for a point of the line fit."""
+"""Minimum ratio of the neighbours' distance to the noise at the steps to which the line is fitted."""
 _SHORTEST_FIT = 3
 """Minimum number of steps for fitting a line to the divergence."""
 _BLOCKS = 10
@@ -209,8 +209,8 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     """Apply the 0-1 test to a series with one value per drive period.
 
     Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
-    oscillatory term removed (eqs. 3.1 to 3.6). It mistakes noise for chaos, and an oversampled chaotic flow
-    for regular motion, so it is never used alone.
+    oscillatory term removed (eqs. 3.1 to 3.6). It takes noise for chaos, and an oversampled chaotic flow for
+    regular motion, so the test is never used alone.
 
     Raises NotEnoughData when the series is too short.
 
@@ -249,7 +249,7 @@ def _correlation(series: Reals, frequency: float) -> float:
 
 
 SURROGATES = 39
-"""Number of surrogates; linear noise has the smallest statistic of 40 with probability 1/40 = 0.025."""
+"""Number of surrogates; with probability 1/40 = 0.025, linear noise has the smallest of all statistics."""
 _DELAYS, _NEIGHBOURS = 4, 10
 """Number of values in a delay vector, and number of similar vectors that predict the next value."""
 _ITERATIONS = 200
@@ -272,7 +272,7 @@ class SurrogateTest:
 
     @property
     def margin(self) -> float:
-        """Distance of the statistic below the surrogates' mean, in their standard deviations."""
+        """Distance of the statistic below the surrogates' mean, in standard deviations of the surrogates."""
         away = float(np.mean(self.surrogates)) - self.statistic
         return away / max(float(np.std(self.surrogates, ddof=1)), np.finfo(np.float64).tiny)
 
@@ -321,7 +321,7 @@ def prediction_error(series: Reals) -> float:
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
     4.2), mean over neighbours. The error is far below 1 for a deterministic series, near 1 otherwise. With
-    one neighbour or fewer delays, more chaotic motions with impacts remained undecided.
+    one neighbour or fewer delays, more of the chaotic motions with impacts remained undecided.
     """
     pasts, next_values = delay_vectors(series, _DELAYS)[:-1], series[_DELAYS:]
     # Delay vectors that overlap in time are not neighbours.
@@ -333,7 +333,7 @@ def prediction_error(series: Reals) -> float:
 
 
 def time_symmetry(series: Reals) -> float:
-    """Return minus the rms, over lags of 1 to 4, of the skewness of a series' increments.
+    """Return the negative rms, over lags of 1 to 4, of the skewness of a series' increments.
 
     Linear noise is symmetric in time, also after a static nonlinearity; dissipative chaos rarely is
     (Schreiber and Schmitz, Physica D 142 (2000) 346, section 5).

@@ -70,12 +70,12 @@ class Curve(Tabular):
 
     @property
     def lower(self) -> Reals:
-        """Magnitude minus two standard deviations of its logarithm, at least a tenth of the magnitude."""
+        """Lower bound, two standard deviations below ln(magnitude), but at least a tenth of the magnitude."""
         return np.asarray(self.magnitude * np.exp(-self._reach))
 
     @property
     def upper(self) -> Reals:
-        """Magnitude plus two standard deviations of its logarithm, at most ten times the magnitude."""
+        """Upper bound, two standard deviations above ln(magnitude), but at most ten times the magnitude."""
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
@@ -87,7 +87,7 @@ class Curve(Tabular):
 
     @property
     def _reach(self) -> Reals:
-        """Half width of the bounds of ln(magnitude), limited to ln 10 so that they do not fill the figure."""
+        """Half width of the bounds of ln(magnitude), at most ln 10: wide bounds would fill the figure."""
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Curve":
@@ -194,7 +194,7 @@ class CurvePeak:
 
     @property
     def damping_ratio(self) -> float | None:
-        """Half the width over the peak's frequency, which is the damping ratio of a single linear mode."""
+        """Half the width divided by the peak's frequency: the damping ratio of a single linear mode."""
         width_hz = self.half_power_width_hz
         return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
 

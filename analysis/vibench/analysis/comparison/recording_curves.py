@@ -115,7 +115,7 @@ class AnalysisOptions(FrozenModel):
 
     model: Model = Model.LEFT_OUT
     """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
-    alone driven by the recorded base motion. It takes seconds to minutes per recording."""
+    alone driven by the recorded base motion. A simulation takes seconds to minutes per recording."""
     estimator: Estimator = Estimator.DRIVE
     """Estimator: noise on the base biases 'h1', noise on the response biases 'h2', neither biases 'drive'."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
