@@ -64,7 +64,7 @@ class ChainRun(Tabular):
     over_hz: Reals
     """Frequencies of the transmission, shape (m,); a single frequency under a steady sine."""
     transmission: Reals
-    """Amplitude of x of m0 over the base amplitude at each frequency, shape (m, cells)."""
+    """Ratio of the amplitude of x of m0 to the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
     """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
     largest_m: Reals
@@ -132,7 +132,7 @@ class ChainAnswer(Tabular):
         return np.linspace(top / LINES, top, LINES)
 
     def linear_transmission(self, cells: int) -> Reals:
-        """Return |displacement of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
+        """Return |displacement of m0 / U| without contact, at `linear_hz`, shape (LINES, cells)."""
         return np.asarray(np.abs(chain_transmissibility(self.request.chain(cells), self.linear_hz)[:, :, 0]))
 
     @property

@@ -170,7 +170,7 @@ class ExponentSpectrum(Tabular):
 
     @property
     def largest_sum_difference(self) -> float:
-        """Largest relative difference of a sum of exponents from `dampers_per_s`; NaN if not elastic."""
+        """Largest relative difference of a sum of exponents from `dampers_per_s`; NaN for inelastic laws."""
         if not self.request.is_elastic:
             return math.nan
         known = [abs(each.sum_difference) for each in self.points if math.isfinite(each.sum_difference)]
