@@ -372,7 +372,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[Sequence[tuple[str, float]]]:
-    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), then the facts of all columns."""
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), then the common facts."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:

@@ -30,7 +30,7 @@ Facts = tuple[tuple[str, Any], ...]
 
 @contextmanager
 def open_hdf5_source(path: Path) -> Iterator[Source]:
-    """Open a file; channels are 1-D datasets, and rows or columns of 2-D ones, named ``"/data#1"``, ...
+    """Open a file; channels are 1-D datasets, and rows or columns of 2-D datasets (``"/data#1"``, ...).
 
     CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Files that refer to data in other
     files (external links and storage, virtual datasets) are refused unless external data are allowed.
@@ -88,7 +88,7 @@ def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int
 
 
 def _mark_unwritten(dataset: h5py.Dataset, axis: int, start: int, values: Reals) -> None:
-    """Replace samples of chunks that were never written, which HDF5 returns as a fill value, by NaN."""
+    """Replace samples of chunks that were never written by NaN; HDF5 returns a fill value for them."""
     length, corner = dataset.chunks[axis], [0] * dataset.ndim
     for corner[axis] in range(start - start % length, start + len(values), length):
         if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:

@@ -38,7 +38,7 @@ from ._times import stated_times
 # The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
 #
 # Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". After a header of 128 bytes, each element has
-# a tag (type, bytes) and data padded to eight bytes. A matrix contains several elements, compressed data one.
+# a tag (type, bytes) and data padded to eight bytes. A matrix consists of elements, as does compressed data.
 
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15

@@ -169,7 +169,7 @@ class SourceChannel:
 Read = Callable[[int, int], Reals]
 """Function that returns the samples of one channel between two indices, shape (stop - start,).
 
-Samples are scaled as the file states, and NaN if lost.
+Samples are scaled as the file states; lost samples are NaN.
 """
 
 

@@ -53,7 +53,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
         counts: dict[str, dict[int, int]] = {}
 
         class _StatementsReader(TdmsReader):  # type: ignore[misc] # npTDMS has no types
-            """Keep each segment's properties and sample counts; npTDMS keeps the last ones and the sum."""
+            """Keep each segment's properties and sample counts; npTDMS keeps only the last and the total."""
 
             _segment = 0
 

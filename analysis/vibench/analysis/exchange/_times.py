@@ -55,7 +55,7 @@ _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03
 SAME_RATE = 1e-4
 """Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
-"""Largest spread of times around an even axis for its rate to count as exact, in sample intervals."""
+"""Largest spread of times around an even axis whose rate counts as exact [sample intervals]."""
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
@@ -75,12 +75,12 @@ _BIN = 512
 _LAST = 64
 """Number of time stamps from which the resolution is determined."""
 _LEAST_RISING = 64
-"""Minimum number of evenly rising values for a channel to count as times without a name that means time."""
+"""Minimum number of evenly rising values that count as times in a channel whose name does not mean time."""
 TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 FARTHEST = 2**40
-"""Largest gap between two times that is counted, in sample intervals."""
+"""Largest counted gap between two times [sample intervals]."""
 _DATENUM = (693_000, 770_000)
 """Range of MATLAB's ``datenum`` (days since the year 0) that is taken as a date: 1897 to 2108."""
 _LONGEST_PAUSE = 10
@@ -293,7 +293,7 @@ def _begin(block: Reals) -> "_Scan | None":
     rising = intervals[intervals > 0]
     if not rising.size or np.count_nonzero(intervals >= 0) < _RISING * intervals.size or block.size < 2:
         return None
-    # A lost sample doubles an interval. If samples can be counted, rounding lengthens it by at most a third.
+    # A lost sample doubles an interval; rounding lengthens one by at most a third if samples can be counted.
     typical = float(np.median(rising[rising <= 1.4 * np.quantile(rising, _SINGLE)]))
     is_near = np.abs(intervals / typical - 1) <= _OFF
     # Repeated and coarse times have intervals of zero, which lost samples do not explain.

@@ -306,9 +306,9 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
 # Layout: SDRC universal dataset 58, records 1 to 12, function types 4 (frequency response function), 6
 # (coherence) and 9 (power spectral density), double precision. Frequencies have six digits, so lines are
 # written as evenly spaced only if six digits represent the first line and the spacing. Modal programs expect
-# even lines that begin at a multiple of their spacing. A frequency response or coherence at multiples of
-# another spacing is therefore interpolated to the nearest six-digit spacing. All other lines are written with
-# their frequencies.
+# evenly spaced lines that begin at a multiple of their spacing. A frequency response or coherence at
+# multiples of another spacing is therefore interpolated to the nearest six-digit spacing. All other lines are
+# written with their frequencies.
 
 _COMPLEX_DOUBLE = 6
 _COLOUR = 11
