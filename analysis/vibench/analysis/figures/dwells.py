@@ -73,7 +73,7 @@ def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
 
 
 def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Return time relative to the end of the window [s] and x [m] for its last 12 drive periods."""
+    """Return the last 12 drive periods of the window: time before the end [s] (negative), and x [m]."""
     rate = response.displacement.sample_rate_hz
     count = round(_ZOOM_PERIODS / response.drive.frequency_hz * rate)
     time_s: Reals = (np.arange(count, dtype=np.float64) - count) / rate

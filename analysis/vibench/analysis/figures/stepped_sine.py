@@ -115,7 +115,7 @@ def _draw_simulated(
 def _caption(
     analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
 ) -> str:
-    """Return the caption, with the agreement if there is a simulation."""
+    """Return the caption, with the agreement of the simulation if there is one."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if overlay is None:
