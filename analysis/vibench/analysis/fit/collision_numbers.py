@@ -95,7 +95,7 @@ class CollisionNumbers:
 
     @property
     def contradictions(self) -> tuple[str, ...]:
-        """Parameters that differ from the described value by more than their bounds are wide, worst first."""
+        """Parameters that differ from the description by more than the width of their bounds, worst first."""
         apart = [
             (abs(each.value - each.described) / (each.high - each.low), *each.row)
             for each in self.determined

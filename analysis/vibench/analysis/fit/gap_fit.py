@@ -21,7 +21,7 @@ from .specimen_fit import SpecimenFit
 _M0, _RELATIVE = 0, 3
 """Columns of m0 and p in `base_transmissibility`."""
 _MOST_APART = 0.03
-"""Largest |ln| of the ratio of measured to linear motion of m0; smooth motion with contact exceeds it."""
+"""Largest |ln(measured / linear motion of m0)| without contact; smooth motion with contact exceeds it."""
 _STEP_HZ = 0.02
 """Frequency step [Hz] for the curvature of the transmissibility: 1 % of the narrowest resonance."""
 _STEP = 1e-4
@@ -94,7 +94,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
         if hz.size < _LEAST_INTERVALS or sweep.collisions.is_unexplained[before].any():
             continue
         apart = _apart(motion.response_ii[before], np.abs(swept_response(linear, hz, rate)[:, _M0]))
-        # Fit a line over frequency below the collisions, because they disturb the base motion.
+        # Fit a line to A0 over frequency before the collisions, because collisions disturb the base motion.
         line = np.polynomial.Polynomial.fit(hz, a0_m, 1)
         drive_sd = float(np.median(motion.sd_drive_amplitude_m[before] / a0_m))
         near = np.append(edge.frequency_hz, np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS))
@@ -165,7 +165,7 @@ def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onse
     The lower bound is the largest relative motion without collisions at which m0 moves as predicted, as
     masses may also collide smoothly. The upper bound is the smallest linear motion of a colliding dwell,
     unless its collisions may persist from a higher level or another frequency. As collisions disturb the
-    base, it is scaled from the largest dwell without collisions, in proportion to the generator amplitude.
+    base, this motion is scaled from the largest dwell without collisions by the generator amplitude.
     """
     rest = list(dwells)
     while rest:

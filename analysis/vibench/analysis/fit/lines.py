@@ -282,8 +282,8 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _FitEnd) -> Lin
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
-    # The scatter is estimated, so the likelihood is Student's t. Its slope has the variance (spread + 2) /
-    # spread times its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
+    # The scatter is estimated, so the likelihood is Student's t. The variance of its slope is (spread + 2)
+    # / spread times its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
     squared = lines.misfit(lines.residuals(found.x, allowed.model))
     slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
     slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]

@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Return one parameter of a specimen; if the damping times of its links differ, link 0 counts."""
+    """Return one parameter of a specimen; the damping time is that of link 0, even if other links differ."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:

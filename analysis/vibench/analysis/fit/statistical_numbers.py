@@ -33,11 +33,11 @@ _MARGIN = 1.25
 """Ratio of the half width of the next box to the largest error of the regression."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
-"""Number of principal components of the statistics in which the observed statistics are checked."""
+"""Number of principal components of the statistics along which the observed statistics are checked."""
 _FAR = 1.05
-"""Largest distance of the observed statistics, relative to the furthest run, for a model that fits.
+"""Largest distance of the observed statistics, relative to that of the furthest run, if the model fits.
 
-A correct model exceeds the furthest of n runs at most once in n + 1 times. The margin allows for small
+A correct model exceeds the furthest of n runs in at most one of n + 1 cases. The margin allows for small
 differences between rig and recording.
 """
 
@@ -256,7 +256,7 @@ def _spread(values: Reals) -> Reals:
 
 
 def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
-    """Return harmonics of the velocity over its rms, relative to the phase of the base's fundamental."""
+    """Return harmonics of velocity / rms velocity, with phases relative to the base's fundamental."""
     turn = np.exp(-2j * np.pi * drive_hz / rate_hz * np.arange(motion.shape[1]))
     tapered = motion * np.hanning(motion.shape[1])
     base = np.vdot(turn.conj(), tapered[0]) / motion.shape[1]
@@ -270,7 +270,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range as factors; the gaps are expressed by geometric mean and sqrt(upper / lower)."""
+"""Search range of each parameter as a factor; gaps: geometric mean and sqrt(upper / lower)."""
 _WIDEST = 0.5
 """Largest width of bounds relative to the search range; wider bounds leave a parameter undetermined."""
 _LIKELY = 2.0
