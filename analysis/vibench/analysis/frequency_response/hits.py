@@ -40,7 +40,7 @@ class Hits:
     """Index of the first sample of each segment."""
     segment_samples: int
     left_out: int
-    """Number of hits whose segment is cut short by the next hit or by the end."""
+    """Number of hits whose segment is cut short by the next hit or by the end of the record."""
 
 
 def find_hits(

@@ -126,7 +126,7 @@ class Leakage:
         )
 
     def ringing_sd(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the standard deviation of a line's real or imaginary part due to ringing, along dH/df.
+        """Return the scatter (sd) of a line's real or imaginary part due to ringing, with the phase of dH/df.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ class Lines:
     Parameters
     ----------
     band
-        Transmission of the lines; its standard deviation gives the weights.
+        Transmission at the lines; its standard deviation gives the weights.
     chosen
         Flags of the lines to fit, shape (lines,).
     """
@@ -311,7 +311,7 @@ class Lines:
 
 
 def mode_shapes(frequency_hz: Reals | Complexes, poles: Reals) -> Complexes:
-    """Return two functions per mode for a fit with real factors, shape (lines, 2 modes), of order one.
+    """Return two functions per mode for a fit with real factors, shape (lines, 2 modes), of size about one.
 
     2 zeta / (1 - r^2 + 2 i zeta r) and i r times this, with r = w / w0; `poles`: ln(w0 / 2 pi), ln(zeta).
     """

@@ -74,7 +74,7 @@ def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetiti
 
 
 def whole_periods(samples: int, period_samples: float) -> int:
-    """Return the number of whole periods in a record; the last period may lack a thousandth."""
+    """Return the number of whole periods in a record; the last period may be a thousandth too short."""
     return int(np.floor(samples / period_samples + _SHORTFALL))
 
 

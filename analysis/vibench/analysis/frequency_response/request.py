@@ -140,7 +140,7 @@ class FrequencyResponseRequest:
 
     estimator: Estimator = Estimator.DRIVE
     noise_ratio: float | None = None
-    """For hv: noise density of m0's velocity over the noise density of the base's acceleration [s2]."""
+    """For hv: ratio of the noise densities of m0's velocity and of the base's acceleration [s2]."""
     resolution_hz: float | None = None
     """Noise bandwidth of a spectral line, which sets the segment length."""
     segment_s: float | None = None

@@ -112,7 +112,7 @@ def scattered_resonances(
 
 
 def _largest_change(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
-    """Return the largest standard deviation: from the fit, the realisations or the choice of fit.
+    """Return the largest of three standard deviations: of the fit, between realisations, between fits.
 
     Joint and single fits differ more than realisations do, so the jackknife compares only fits over similar
     numbers of lines.

@@ -57,7 +57,7 @@ class FrequencyResponseSettings:
     confidence: float
     """Probability that the bounds of a line contain the true value."""
     noise_ratio: float | None = None
-    """For hv: noise density of the response over noise density of the drive."""
+    """For hv: ratio of the noise densities of response and drive."""
     delay_s: float = 0.0
     """Delay of the response channel behind the drive channel [s], removed from the phase."""
     decay_per_s: float | None = None

@@ -61,7 +61,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     sizes = _sizes(np.where(known, variance, 0.0)[around], shapes[:, around])
     places, middles = np.arange(value.size), firsts + (lines - 1) / 2
     smooth = sum(np.interp(places, middles, size) * shape for size, shape in zip(sizes, shapes, strict=True))
-    # Student's t: a squared deviation over a variance with n degrees of freedom averages n / (n - 2).
+    # Student's t: squared deviation / variance with n degrees of freedom has the mean n / (n - 2).
     wider = lines * freedom / (lines * freedom - 2)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(known, np.sqrt(wider * smooth / (gain * power)), np.nan)
