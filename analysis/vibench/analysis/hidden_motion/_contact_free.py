@@ -176,7 +176,7 @@ def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
 
 
 def _interpolate(values: Reals, slopes: Reals, t: float) -> float:
-    """Interpolate between two samples by the cubic with their values and slopes (per sample)."""
+    """Interpolate between two samples by the cubic that has both values and slopes (per sample)."""
     (a, b), (da, db) = values, slopes
     return float(
         a * (1 + 2 * t) * (1 - t) ** 2 + da * t * (1 - t) ** 2 + b * t**2 * (3 - 2 * t) + db * t**2 * (t - 1)
@@ -195,7 +195,7 @@ class FreeGap:
 
 @dataclass(frozen=True, eq=False)
 class _GapLine:
-    """Straight line fitted to |p| at the centre of contacts over the impulse to the power 0.8."""
+    """Straight line fitted to |p| at the centre of contacts against impulse^0.8."""
 
     gaps: tuple[FreeGap | None, FreeGap | None]
     residuals: Reals

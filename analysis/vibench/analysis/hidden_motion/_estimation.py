@@ -72,7 +72,7 @@ def estimate(
     first: int,
     stop: int,
 ) -> Estimate | str:
-    """Estimate parameters between two samples of a motion; return a sentence with the reason on failure.
+    """Estimate parameters between two samples of a motion; on failure, return the reason as a sentence.
 
     ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
     """
@@ -201,7 +201,7 @@ class _Search:
 # dampers follow from the flights, gaps from the positions of impacts, the loss from speeds at impacts.
 
 _TELLING_LOSS = 0.15
-"""Smallest loss [s/m] for which speeds at impacts are more accurate than the description."""
+"""Smallest loss [s/m] that speeds at impacts determine more accurately than the description does."""
 _LAW_UNKNOWN = 0.3
 """Relative error of a penetration depth computed with the described contact law."""
 _FREE_S = 3.0

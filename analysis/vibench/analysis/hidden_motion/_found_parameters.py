@@ -24,7 +24,7 @@ from ._tracking_model import TrackedSpecimen
 _STRETCH_S = 1.2
 """Length of the part of the motion in which each restart searches for parameters [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Number of restarts; in a short motion their parts overlap and only their start values differ."""
+"""Number of restarts; in a short motion, their stretches overlap and only the start values differ."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6

@@ -267,7 +267,7 @@ def hidden_motion(
 ) -> HiddenMotion:
     """Estimate the relative motion of m1 and its collisions from base acceleration and m0's velocity.
 
-    The method without a contact model estimates the force on m1 as an unknown, from the linear parameters.
+    The method without a contact model estimates the unknown force on m1 from the linear parameters.
     Tracking uses an extended Kalman filter and a smoother with seven states of the motion and the error of
     the accelerometer; flight is computed exactly. Equations: docs/hidden-motion.md.
 
@@ -276,8 +276,8 @@ def hidden_motion(
     recording
         Recording of base acceleration and m0's velocity at 10 kHz or more (51.2 kHz to find the law).
     specimen
-        Description; m0, m2 and k1 must be exact, the rest within a few per cent. By default the description
-        in the recording.
+        Description of the specimen, by default from the recording; m0, m2 and k1 must be exact, the rest
+        within a few per cent.
     start_s, stop_s
         Stretch of the recording [s]; by default all of it.
     numbers

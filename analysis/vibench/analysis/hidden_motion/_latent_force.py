@@ -18,7 +18,7 @@ from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES
 
 _PEAK_BAND_HZ = 4500.0
-"""Frequency band of the force, a compromise between the width of a collision and noise."""
+"""Bandwidth in which peaks of the force are sought: a compromise between short collisions and noise."""
 _WINDOW_S = 6e-5
 """Half width of a window around a peak of the contact force [s]."""
 _PEAK_OVER_MEDIAN = 6.0

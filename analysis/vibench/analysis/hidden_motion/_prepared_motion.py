@@ -23,9 +23,9 @@ _PIECE = 1 << 19
 _LEAST_NOISE = 1e-6
 """Minimum noise of a channel relative to its signal, because the Kalman filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
-"""Median over mean of a periodogram line of white noise, which is exponentially distributed."""
+"""Ratio of median to mean of a periodogram line of white noise, which is exponentially distributed."""
 _DARK_MARGIN = 8
-"""Samples on each side of a drop-out that the correction filter mixes with it (weight above 1 %)."""
+"""Samples on each side of a drop-out that the correction filter mixes with the drop-out (weight > 1 %)."""
 LOWEST_RATE_HZ = 10_000.0
 """Lowest sample rate [Hz] at which collisions of 0.05 ms are visible."""
 
