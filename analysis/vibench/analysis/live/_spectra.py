@@ -205,7 +205,7 @@ class DensityPicture:
 
     request: SpectrogramRequest
     unit: str
-    """Unit of the channel; densities are in decibels over 1 unit²/Hz."""
+    """Unit of the channel; densities are in decibels relative to 1 unit²/Hz."""
     time_s: tuple[float, float]
     """Left and right edge [s since the first sample of the recording]."""
     frequency_hz: tuple[float, float]

@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise, and its value for unit normal noise; impacts change others."""
+"""Quantile of |noise| that measures the noise (impacts affect higher ones); its value for unit noise."""
 
 
 class ImpactCounter:
