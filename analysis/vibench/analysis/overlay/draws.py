@@ -84,7 +84,7 @@ def _white(samples: Reals) -> float:
 
 
 _COMPARED_HZ = (100.0, 2000.0)
-"""Band in which drive noise is visible in the base motion; a table has further resonances above it [Hz]."""
+"""Band in which drive noise is visible in the base motion, below further resonances of a table [Hz]."""
 _MEDIAN_SD = 1.44
 """Relative standard deviation of the median of N exponentially distributed values, times sqrt(N)."""
 _HANN_LINES = 1.5
@@ -254,7 +254,7 @@ class PlayedVoltage:
 
 
 DRAWS, MOST_DRAWS = 16, 1000
-"""Usual and largest number of draws of a colliding motion; 16 draws determine the 95 % band to a fifth."""
+"""Usual and largest number of draws of a colliding motion; 16 draws determine the 95 % band to 20 %."""
 FIRST_DRAWS = 8
 """Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4

@@ -284,7 +284,7 @@ class CurveDifference(Tabular):
     frequency_hz: Reals
     decibel: Reals
     standard_errors: Reals
-    """ln(measured / simulated) over the combined standard deviation; infinite if the latter is zero."""
+    """ln(measured / simulated) divided by the combined standard deviation; infinite if that is zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
         """Return the ratios at the points flagged by ``kept``."""
@@ -323,7 +323,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""Interval [s]; if the motion ends within it in all runs, the cause is common, such as the record's end."""
+"""If the motion ends within this interval [s] in all runs, the cause is common, such as the record's end."""
 
 
 @dataclass(frozen=True)

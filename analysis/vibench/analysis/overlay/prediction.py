@@ -66,7 +66,7 @@ def predict(
     duration_s: float = PREDICTION_S,
     approach: Approach = Approach.REST,
 ) -> ResponsePrediction:
-    """Simulate a sine at each frequency, from rest in parallel or in sequence like a sweep.
+    """Simulate a sine at each frequency: in parallel from rest, or in sequence like a sweep.
 
     Parameters
     ----------

@@ -151,7 +151,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return base acceleration over voltage, times s, as for a ratio of velocity to acceleration."""
+    """Return base acceleration / voltage, multiplied by s as in a ratio of velocity to acceleration."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     plan = analysis.excitation

@@ -80,7 +80,7 @@ class Similarity(Tabular):
 
     frequency_hz: Reals
     difference: Reals
-    """|log10(model) - log10(reference)| over |log10(reference)| (eq. 6); NaN if either is missing."""
+    """|log10(model) - log10(reference)| / |log10(reference)| (eq. 6); NaN if either is missing."""
     logarithm_of: LogarithmOf
     threshold: float
     rate: float
