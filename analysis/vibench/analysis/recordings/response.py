@@ -76,7 +76,7 @@ _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = Ma
         DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
-"""Kernel, and factor ``about``: beyond an end, samples are about * end sample - mirrored sample."""
+"""Kernel, and factor ``about``: the assumed signal beyond an end is about * end sample - mirrored sample."""
 
 
 @dataclass(eq=False)

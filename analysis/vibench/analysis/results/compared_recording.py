@@ -113,7 +113,7 @@ def recorded_response(path: Path, kinds: Collection[CurveKind] = (CurveKind.RESP
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Return base amplitude over frequency of a result; empty for other kinds or a single frequency."""
+    """Return a result's base amplitude at each frequency; empty for other kinds or a single frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
             try:

@@ -39,7 +39,7 @@ class _ChannelsSoFar(RecordedChannels):
 
     stretch: int = 1
     samples_so_far: int = 0
-    """Number of samples up to the requested time: of the stretch, or of all realisations."""
+    """Number of samples of the stretch, or of all realisations together, up to the requested time."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Return the stretches up to the requested time."""
