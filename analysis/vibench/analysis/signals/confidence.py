@@ -33,7 +33,7 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 
 
 def standard_uncertainty(values: Reals | Complexes) -> float:
-    """Return the standard uncertainty of the mean of a few values; twice this covers 95 % of cases.
+    """Return the standard uncertainty of the mean of a few values; twice this value covers 95 % of cases.
 
     It is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008, G.3.2). For
     complex values it applies to the real and to the imaginary part separately.

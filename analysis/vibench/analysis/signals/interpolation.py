@@ -92,7 +92,7 @@ def sizes_with_maxima(samples: Reals) -> Reals:
 
 
 def _vertices(before: Reals, middle: Reals, after: Reals) -> tuple[Reals, Reals]:
-    """Return place (0 is the middle) and value of maxima of parabolas through three points."""
+    """Return position (0 is the middle point) and value of the maxima of parabolas through three points."""
     slope, bend = (after - before) / 2, before + after - 2 * middle
     at = np.clip(-slope / np.minimum(bend, -np.finfo(np.float64).tiny), -1.0, 1.0)
     return at, middle + at * slope / 2

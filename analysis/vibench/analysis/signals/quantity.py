@@ -55,7 +55,7 @@ _EDGE_PERIODS = 6
 _ROW_SAMPLES = 1024
 """Number of samples of a steady line per computed exponential; products cost a tenth of an exponential."""
 hann = lru_cache(maxsize=4)(np.hanning)
-"""Hann window of a length, shared by all lines of a signal and by all draws; do not change its values."""
+"""Hann window of a given length, shared by all lines and all draws; do not change its values."""
 
 
 def derivative_factor(frequency_hz: Reals, power: int) -> Complexes:

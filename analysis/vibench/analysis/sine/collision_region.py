@@ -31,11 +31,11 @@ _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _RISE = 1.2
-"""Ratio of the residual to that of the interval before, above which impacts must excite it."""
+"""Ratio of the residual to that of the previous interval; above it, impacts must excite the residual."""
 _ALONE = 10.0
 """Ratio of the residual to noise, distortion and ringing above which one interval may have impacts."""
 _UNLIKE = 2.0
-"""Ratio of Response II to that without contact, or its inverse, above which an interval may have impacts."""
+"""Factor between Response II and that without contact above which an interval may have impacts."""
 _QUIET = 0.7
 """Ratio of the residual to noise, distortion and ringing below which an interval has no impacts."""
 _VOTE_S = 1.0
@@ -52,7 +52,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: the nearest intervals clearly without collisions and clearly with impacts, not ringing."""
+    """Bounds: the nearest intervals that certainly have no collisions, and certainly impacts, not ringing."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Collisions(Tabular):
     """Flags of intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
     """Flags of intervals with a residual above the noise and distortion of the sensors, shape (intervals,).
-    In contrast, the threshold takes rattling during a whole sweep for noise."""
+    The threshold, in contrast, mistakes rattling during a whole sweep for noise."""
     too_fast_hz: tuple[tuple[float, float], ...]
     """Frequency ranges in which collisions are not determined, because ringing may hide them."""
     noise_rms: float
@@ -198,7 +198,7 @@ def _merged_runs(flags: Flags, gap: int) -> list[tuple[int, int]]:
 
 
 def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
-    """Move the ends of a colliding run, blurred by the majority vote, to the split with fewest errors."""
+    """Move the ends of a run, which the majority vote blurs, to where they contradict the fewest flags."""
     half = votes // 2 + 1
     low = max(0, first - half)
     begin = low + _best_split(above[low : min(first + half, last) + 1])
@@ -207,7 +207,7 @@ def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int
 
 
 def _best_split(part: Flags) -> int:
-    """Return the first interval of a region: fewest flags before and fewest gaps after it."""
+    """Return the first interval of a region: the sum of flags before it and gaps after it is smallest."""
     before = np.concatenate(([0], np.cumsum(part)[:-1]))
     after = np.cumsum(~part[::-1])[::-1]
     return int(np.argmin(before + after))
@@ -228,7 +228,7 @@ def _region(
 
 
 def _edge(sweep: SweptMotion, edge: int, outside: int, inside: int) -> Edge:
-    """Return an edge, bounded by a quiet interval outside and one with impacts inside."""
+    """Return an edge, bounded by a quiet interval outside and an interval with impacts inside."""
     quiet_hz, clear_hz = (float(sweep.frequency_hz[at]) for at in (outside, inside))
     half_hz = 0.5 * abs(sweep.sweep_rate_hz_per_s) * sweep.interval_s
     return Edge(

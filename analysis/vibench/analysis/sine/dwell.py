@@ -33,7 +33,7 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Limit of the residual relative to the noise in silence; a silence is shorter than a mode's ring-down."""
+"""Largest ratio of residual to noise in silence for noise; a silence is shorter than a mode's ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
@@ -130,21 +130,21 @@ _LEAST_CYCLES = 4.0
 """Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks that ten random blocks exceed in one of a hundred records."""
+"""Correlation of neighbouring blocks; in one of a hundred records, ten random blocks exceed it by chance."""
 _ONCE = 0.5
-"""Share of the variance at one cycle per record above which the change may continue after the record."""
+"""Share of the variance at one cycle per record; above it, the change may continue after the record."""
 _TREND = 2.0
 """Ratio of a squared trend to its variance below which it counts as random; chance exceeds it in 14 %."""
 _BEYOND = 3.0
-"""Ratio of the remaining decay to the observed scatter if the record covers a tenth of the decay."""
+"""Ratio of a decay's remaining part to its observed scatter, if the record covers a tenth of the decay."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    0 if the parts scatter at random, because their standard error then suffices; otherwise at least half the
-    change of a line through the parts. NaN if a change of more than 0.2 % is incomplete at the end of the
-    record, because its final value is unknown.
+    It is 0 if the parts scatter at random, because their standard error then suffices; otherwise at least
+    half the change of a line through the parts. It is NaN if a change of more than 0.2 % is incomplete at the
+    end of the record, because the final value is unknown.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        # Outside the window a step may be continued by a copy, whose joint would disturb the interpolation.
+        # A copy may continue a step outside the window; the joint would disturb the interpolation there.
         response_i=float(np.max(sizes_with_maxima(motion)[is_clear])) / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,

@@ -36,7 +36,7 @@ _CLEAR_MOTION = 0.8
 """Minimum share of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Largest deviation of noise maxima from their median, in median deviations; bursts deviate more."""
+"""Largest deviation of noise maxima from their median, relative to the median deviation; bursts exceed it."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
@@ -305,7 +305,7 @@ def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
 def measured_dwell(
     channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...], longest_s: float = WINDOW_S
 ) -> DwellResponse:
-    """Analyse the last ``longest_s`` of a dwell, or all of a shorter one."""
+    """Analyse the last ``longest_s`` of a dwell, or all of a shorter dwell."""
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, base, response = read_whole(channels, stretch)
     rate = channels.sample_rate_hz
@@ -344,7 +344,7 @@ COLUMN_HZ = 1.0
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Return centre [Hz] and largest amplitude over A0 of each column of the spectrum."""
+    """Return centre [Hz] and largest amplitude, divided by A0, of each column of the spectrum."""
     spectrum = response.spectrum
     width = max(1, round(COLUMN_HZ / spectrum.spacing_hz))
     first = max(1, round(5.0 / spectrum.spacing_hz))

@@ -26,7 +26,7 @@ _DEGREE, _EXPLAINED = 4, 0.06
 """Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
 the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""
 _LARGER = 2.0
-"""Smallest ratio of a jump to the largest step that the linear specimen has nearby."""
+"""Smallest ratio of a jump to the largest step nearby in the response of the linear specimen."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -268,9 +268,9 @@ class Hysteresis(Tabular):
     down: Reals
     """Response II of the up sweep and of the down sweep."""
     differs: Flags
-    """Flags of points where the sweeps differ by more than 1.5 dB, averaged over 2 % of the band."""
+    """Flags of points where the sweeps, averaged over 2 % of the band, differ by more than 1.5 dB."""
     pairs: tuple[tuple[Jump, Jump], ...]
-    """Pairs of opposite jumps: (up sweep, nearest in the down sweep)."""
+    """Pairs of opposite jumps: (jump of the up sweep, nearest jump of the down sweep)."""
 
     @property
     def widths_hz(self) -> tuple[tuple[float, float, float], ...]:

@@ -78,7 +78,7 @@ class SteppedResponse(Tabular):
     """Relative standard uncertainty of Response I due to slow change; NaN if unknown."""
     phase_rad: Reals
     left_out: int
-    """Number of steps that were incomplete, lost samples or had drop-outs."""
+    """Number of steps that were incomplete, or had lost samples or drop-outs."""
 
 
 def stepped_response(
@@ -122,8 +122,8 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     inside = line[edge:-edge]
     # Remove sensor drift: it would jump where the record is continued, and integration amplifies jumps.
     data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
-    # Outside the step, frequency or level differ, and integration would include them. Instead, continue the
-    # sine exactly, and the rest by copies.
+    # Samples outside the step have another frequency or level, and would affect the integration. Replace
+    # them: continue the sine exactly, and the rest by copies.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     response += line - inside[places]

@@ -30,7 +30,7 @@ from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
-"""Margin around the drive's band relative to its ends; the outer half is the filter's edge."""
+"""Margin on each side of the drive's band, relative to the band's end; its outer half is a filter edge."""
 _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
@@ -117,9 +117,9 @@ _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
 """Relative difference up to which the largest Response II agrees with the linear simulation."""
 _LINES = 1 << 15
-"""Number of frequencies at which linear motion is computed at once."""
+"""Largest number of frequencies at which linear motion is computed in one batch."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge in which a bridging error of three times the motion decays to 2 %."""
+"""Periods of the lower band edge in which a bridging error decays from 3 times the motion to 2 % of it."""
 _ROOM = 1.1
 """Factor on the length of the longer intervals, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
@@ -347,7 +347,7 @@ class SweepSums:
     def _evaluate(
         self, delay_s: float, linear: Transmission | None
     ) -> tuple[SweptMotion, Reals, Reals, DrivePhase]:
-        """Return the motion, x of shape (intervals, samples) [m], the velocity [m/s] and the drive phase."""
+        """Return results, displacement x (intervals, samples) [m], velocity [m/s] and drive phase."""
         self._parts.append(self._decimator.finish())
         whole = np.concatenate(self._parts, axis=1)
         self._parts.clear()
@@ -440,7 +440,7 @@ class SweepSums:
 
     def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
         """Return the velocity [m/s] without contact due to the recorded acceleration of the base [m/s2]."""
-        # Padded, so that ringing after the end does not wrap around to the start.
+        # Pad with zeros, so that ringing after the end does not wrap around to the start.
         padded = fft.next_fast_len(2 * base.size, real=True)
         frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
         low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz

@@ -73,7 +73,7 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
 
 
 _NEAR = 12
-"""Largest number of intervals between a jump and the start or end of collisions to which it belongs."""
+"""Largest distance, in intervals, between a jump and the start or end of collisions that it marks."""
 
 
 _BEHIND_STEPS = 1.5
@@ -145,7 +145,7 @@ def _without_contact(specimen: Specimen | None) -> Transmission | None:
 
 
 def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
-    """Add the sweep and the samples before and after it; return the start of the analysed part [s]."""
+    """Pass the sweep and its neighbouring samples to ``sums``; return the start of the analysed part [s]."""
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     rate = channels.sample_rate_hz
     # If samples before or after the sweep are missing, an end of the sweep replaces them.

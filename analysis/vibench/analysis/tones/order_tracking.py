@@ -118,7 +118,7 @@ def track_signals(
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
     """Return exp(i order phase) for each order.
 
-    Rational orders are computed as powers of one phasor: a product costs a tenth of a sine and a cosine.
+    Rational orders are powers of one phasor: a product takes a tenth of the time of a sine and a cosine.
     """
     fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
     if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):

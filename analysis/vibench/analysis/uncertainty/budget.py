@@ -168,7 +168,7 @@ class ChannelSd:
 
     @property
     def scale_sd(self) -> float:
-        """Stated relative standard deviation of response over base; 0 if none."""
+        """Stated relative standard deviation of the ratio response / base; 0 if none is stated."""
         stated = [each.relative for each in (*self.response, *self.base) if each.relative is not None]
         return float(np.sqrt(np.sum(np.square(stated))))
 

@@ -206,10 +206,10 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
-    specimen. For a sine, they are both Responses over at most 5 s. Their random error is the scatter of three
-    simulated runs, analysed like recordings; it is not stated if the runs settle on different motions.
-    Scatter falls with the square root of the time. Other kinds of plan, and rigs without a channel for the
-    motion of m0 or the base's acceleration, have no expected results.
+    specimen. For a sine, they are both Responses over at most 5 s. The random error of a Response is the
+    scatter of three simulated runs, analysed like recordings; it is not stated if the runs settle on
+    different motions. It falls with the square root of the time. Other kinds of plan, and rigs without a
+    channel for the motion of m0 or for the acceleration of the base, have no expected results.
 
     Parameters
     ----------
@@ -243,16 +243,16 @@ def recorded_s(measurement: Measurement) -> float:
 
 
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict the recorded time of a measurement with `until`, total of all parts [s].
+    """Predict the total recorded time of all parts of a measurement with `until` [s].
 
-    A part ends at a check of its bounds, or at its planned time at the latest. None if the scatter is
-    unknown beforehand, or without `until`.
+    A part ends at a check of its bounds, or at its planned time at the latest. None if the scatter cannot be
+    predicted, or the plan does not set `until`.
     """
     return _in_all(measurement, rig, end_s)
 
 
 def time_to_wishes_s(measurement: Measurement, rig: Rig) -> float | None:
-    """Predict the recorded time until all targets are reached, total of all parts [s].
+    """Predict the total recorded time of all parts until all targets are reached [s].
 
     None if the time cannot be predicted, or no time is long enough.
     """
@@ -313,13 +313,13 @@ def needed_s(expected: tuple[ExpectedResult, ...], until: Until) -> float | None
 
 
 def end_s(need_s: float, first_s: float, longest_s: float) -> float:
-    """Return the time of the first check that is not before ``need_s``, at most ``longest_s`` [s]."""
+    """Return the time of the first check at or after ``need_s``, at most ``longest_s`` [s]."""
     looks = np.ceil(np.log(min(max(need_s, first_s), longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)
     return float(min(first_s * LOOK_FACTOR ** max(0.0, looks), longest_s))
 
 
 def until_checks(facts: RecordingFacts) -> Iterator[Check]:
-    """Compare the recorded time of a measurement with `until` to its prediction."""
+    """Compare the recorded time of a measurement that sets `until` with the predicted time."""
     notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
     if not notes:
         return

@@ -27,9 +27,9 @@ _SHAPE_VARIANCE = 0.5633
 """Variance of the shape k estimated from n maxima, times n (Hosking, Wallis and Wood 1985, for k = 0)."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""For random errors that only draws of the twin give: of a maximum, or of a 0.1 s interval of a sweep."""
+"""Stands for a random error that only draws of the twin give: of a maximum or a 0.1 s interval of a sweep."""
 _ENDS = 2
-"""Number of intervals at each end of a sweep; a largest value there depends on where intervals begin."""
+"""Number of intervals at each end of a sweep where a largest value depends on where the intervals begin."""
 _PEAKED = 1.05
 """Ratio of Response I to Response II above which the motion in a step is not a sine."""
 _FEWEST_PERIODS = 20.0
@@ -174,7 +174,7 @@ def sd_of_largest(maxima: Reals) -> float:
     """Return the standard deviation of the largest of maxima with a generalised extreme value distribution.
 
     With their shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
-    largest of n values is n^-k times the scale of one: smaller for a bounded motion, equal otherwise. The
+    largest of n values is n^-k times the scale of one: smaller for a bounded motion, else equal (k = 0). The
     estimate of k is lowered by its standard error, because a k that is too large gives too small a bound.
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
