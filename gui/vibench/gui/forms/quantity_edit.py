@@ -47,7 +47,7 @@ def quantity_text(value: float, unit: str) -> str:
         if UNITS.chosen_units.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
-            # Do not show the SI unit: a number that replaces the text would be read in it, such as in metres.
+            # Do not show the SI unit: a number typed over the text would be read in it, say as metres.
             return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()

@@ -24,7 +24,7 @@ class Scale(Enum):
     LOGARITHMIC = auto()
 
     def position(self, value: float) -> float:
-        """Return the coordinate at which pyqtgraph draws a value: its decimal logarithm, if logarithmic."""
+        """Return the coordinate at which pyqtgraph draws a value: on a logarithmic axis, its logarithm."""
         return log10(value) if self is Scale.LOGARITHMIC else value
 
     def value_at(self, drawn: float) -> float:

@@ -260,7 +260,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().enableAutoRange()
 
     def turn_scale(self) -> None:
-        """Toggle the vertical axis between linear and logarithmic, except below an image with fixed rows."""
+        """Toggle the vertical axis between linear and logarithmic, unless an image has fixed its rows."""
         if any(isinstance(item, pg.ImageItem) for item in self.getPlotItem().items):
             return
         is_linear = self.scales[1] is Scale.LINEAR

@@ -339,7 +339,7 @@ class MapsPage(Page):
 
 
 def _legend_entry(name: str, colour: str) -> str:
-    """Return a coloured square and a name; the frame shows squares that have the background's colour."""
+    """Return a coloured square and a name; a frame makes a square in the background's colour visible."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
