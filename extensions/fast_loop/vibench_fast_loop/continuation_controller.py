@@ -48,7 +48,7 @@ _MOST_TRIES = 8
 _FIRST_TRIES = 30
 """Number of attempts for the first point, where the model without stops may be inaccurate."""
 _NEAR = 0.3
-"""Largest relative error of the level at which the unknowns of the first motion are varied one by one."""
+"""Relative error of the level up to which the unknowns of the first motion are varied one by one."""
 _SHORTEST_STEP = 1 / 64
 """Shortest step, as a fraction of the step in the plan."""
 _GROWTH, _EASY = 1.5, 3
@@ -60,14 +60,14 @@ _BELOW = 5.0
 _ABOVE = 8.0
 """For an approach from above: distance of the initial value above the model's (about threefold), in steps."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Largest decrease of the first coefficient per try [steps], and largest base harmonics, relative to the
-level, that allow it. Both are small, because a motion with impacts is easily lost."""
+"""Largest decrease of the first coefficient per try [steps], allowed only while the base harmonics are at
+most this fraction of the level. Both are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
 """Bounds on the slope (change of base level per step of first coefficient) on the way to the level."""
 _LEAST_CHANGE = 0.01
 """Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Fractions of the tolerance for fundamental and harmonics; small, because folds move with the level."""
+"""Fractions of the tolerance used for fundamental and harmonics; small, because folds move with the level."""
 _BEND_HZ = 0.05
 
 
@@ -158,8 +158,8 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
 def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
     """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
-    The derivatives with respect to frequency and first coefficient change most. Those with respect to
-    harmonics follow from joint changes; near a fold they can make the equations unsolvable.
+    The derivatives with respect to frequency and first coefficient change most. Those with respect to the
+    harmonics are estimated from joint changes, and near a fold can make the equations unsolvable.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):

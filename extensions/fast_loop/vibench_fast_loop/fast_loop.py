@@ -167,7 +167,7 @@ _PERIODS, _WHOLE = range(1, 41), 2e-5
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Number of points per period for the slope of the spring force, without stops and with stops."""
 _PART_S = 1e-6
-"""Longest part of a control step with a constant slope of the stops' force [s]; 1 % of a contact."""
+"""Longest part of a step in which the slope of the stops' force is constant [s]; 1 % of a contact's time."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels, relative to the required level, through which a motion with impacts is reached."""
 

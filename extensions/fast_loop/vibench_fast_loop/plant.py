@@ -131,7 +131,7 @@ class SampledPlant:
         return rows
 
     def _stretch(self, start_s: float, stop_s: float) -> tuple[Table, Vector]:
-        """Return the transition over a part of a step, with the oldest delayed voltage and then the next."""
+        """Return the transition over a part of a step: the oldest delayed voltage acts, then the next."""
         late_s = self.timing.latency_s - max(self.waiting - 1, 0) * self.timing.step_s
         change_s = min(max(late_s, start_s), stop_s)
         matrix, newest = np.eye(self.size), np.zeros(self.size)
