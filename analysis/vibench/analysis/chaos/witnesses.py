@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""A quarter of the largest number of nearest points that are searched for one distant in time."""
+"""At most four times this number of nearest points are searched for one that is distant in time."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
