@@ -202,7 +202,7 @@ STRETCHES = 400
 """Maximum number of equal parts of a whole run; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, it is also limited to this share of the time simulated before."""
+time was requested, the averaging time is at most this share of the time simulated before."""
 SWEEP_PARTS = 120
 """Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12

@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """If an error or time is requested, refuse unsteady drives and options that it determines."""
+        """If an error or time is requested, refuse unsteady drives and options that are derived from it."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:
