@@ -116,7 +116,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 LONGEST_HEAD = 200
 """Maximum number of heading lines of a text file."""
 DELIMITERS = (";", "\t", "|", ",", None)
-"""Separators in order of trial; None means blanks. Unless commas separate, they are decimal marks."""
+"""Separators in order of trial; None means blanks. A comma that is not a separator is a decimal mark."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
 UNIT_CELL = re.compile(
     r"[\[(].*[\])]|-|%|min|h|(?:[mnu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"

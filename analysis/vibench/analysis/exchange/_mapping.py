@@ -31,7 +31,7 @@ _LARGEST_CORRECTION = 0.2
 
 
 def _is_another_quantity(file_unit: str) -> bool:
-    """Return whether a unit is of motion or force; a scale cannot convert it to another quantity."""
+    """Return whether a unit is one of motion or force, which a scale cannot convert to another quantity."""
     return any(size_of_unit(file_unit, each) is not None for each in ("m", "m s-1", "m s-2", "N"))
 
 
@@ -68,7 +68,7 @@ class ChannelMapping(FrozenModel):
     ``m0_acceleration``, ``m0_displacement``, or any other."""
     quantity: str = ""
     unit: str = ""
-    """Unit of the value in UDUNITS notation; known for the channels that an analysis needs."""
+    """Unit of the value in UDUNITS notation; may be left out for the channels that an analysis needs."""
     file_unit: str = ""
     """Unit of the numbers in the file, if it is missing or wrong there: ``"g"``, ``"mm/s"``, ``"V"``."""
     scale: float | str | None = None
@@ -170,7 +170,7 @@ class ImportMapping(FrozenModel):
     sample_rate_hz: PositiveFloat | None = None
     """Sample rate; needed if the file does not state it exactly (HDF5, universal files)."""
     time: Literal["file", "even"] = "file"
-    """``"even"``: samples are simultaneous and even at ``sample_rate_hz``; ignores times in the file."""
+    """``"even"`` ignores times in the file: channels are sampled together, evenly at ``sample_rate_hz``."""
     time_unit: Literal["s", "ms", "us"] | None = None
     """Unit of the times in the file, if it is missing or wrong there."""
     origin: Origin | None = None

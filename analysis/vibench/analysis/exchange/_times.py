@@ -59,7 +59,7 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Minimum relative distance of irregular intervals from multiples of the usual one, and allowed share."""
+"""Smallest relative distance of irregular intervals from multiples of the usual one; their largest share."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 3
