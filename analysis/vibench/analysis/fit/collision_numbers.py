@@ -115,7 +115,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
 def track_recordings(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
-    The second result is the reason if no recording can be tracked (then the first is None), else empty.
+    If no recording can be tracked, the first result is None and the second the reason, else empty.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -145,7 +145,7 @@ def numbers_from_statistics(
 ) -> tuple[CollisionNumbers | None, str]:
     """Return parameters by comparing statistics of the first suitable recording with simulated specimens.
 
-    The second result is the reason if no recording is suitable (then the first is None), else empty.
+    If no recording is suitable, the first result is None and the second the reason, else empty.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
