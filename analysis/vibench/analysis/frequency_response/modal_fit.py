@@ -126,14 +126,14 @@ class Leakage:
         )
 
     def ringing_sd(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the scatter (sd) of a line's real or imaginary part due to ringing, with the phase of dH/df.
+        """Return the scatter of each line due to ringing: size is the sd of one part, phase is that of dH/df.
 
         Parameters
         ----------
         line
             Line numbers in ascending order.
         value, spread
-            Transmission at these lines, and upper limit of the scatter (sd) of its real or imaginary part.
+            Transmission at these lines, and upper limit of the sd of its real or imaginary part.
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
         most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)

@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Largest ratio to the median of a deviation used to find a drift; applies only above `_SMALL`."""
+"""Largest ratio of a deviation used to find a drift to the median deviation; applies only above `_SMALL`."""
 
 
 class Scatter(StrEnum):
