@@ -34,7 +34,7 @@ _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 _LARGEST_SD = 0.5
 """Largest standard deviation of a determined parameter, relative to that of the described value."""
 _WIDE = 3.0
-"""Ratio of the wide prior's standard deviation, used in place of the narrow one, to the described value's."""
+"""Standard deviation of the wide prior, which replaces the narrow one, over that of the described value."""
 _FAR = 3.0
 """Largest standard deviation of a determined parameter, relative to the narrow prior."""
 _SETTLED = 1.0

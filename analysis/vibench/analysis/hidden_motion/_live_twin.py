@@ -40,7 +40,7 @@ from ._tracking_model import STATES, tracked_specimen
 # Each block of 0.1 s is within the usual level or outside it. Page's test (CUSUM, Biometrika 41, 100, 1954)
 # sums the log likelihood ratio of two hypotheses: half of the blocks are outside, or one in a hundred. If at
 # most one in a hundred is outside without a change, the mean time between false alarms is at least
-# exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). The threshold makes it `FALSE_ALARM_S`.
+# exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). This time is set to `FALSE_ALARM_S`.
 # Five consecutive blocks outside raise an alarm.
 
 BLOCK_S = 0.1
