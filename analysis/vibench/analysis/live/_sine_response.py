@@ -98,7 +98,7 @@ _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
 """Minimum ratio of final to initial drive amplitude in a point's samples; a lower ratio is a ramp-down."""
 _STEEPEST_POWER = 2
-"""Largest exponent of frequency to which a sweep's voltage is proportional (constant displacement)."""
+"""Largest n in a sweep whose voltage is proportional to frequency^n (constant displacement)."""
 
 
 @dataclass(frozen=True)
