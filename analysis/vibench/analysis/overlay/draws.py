@@ -34,7 +34,7 @@ _BLOCK_S = 0.05
 _BLOCKS = 200
 """Number of blocks in which noise is estimated, in addition to the first 1 s and the last 1 s."""
 _BAND = (0.2, 0.4)
-"""Frequency band, relative to the sample rate, that shows channel noise without modes."""
+"""Frequency band, relative to the sample rate, that contains channel noise but no modes."""
 _ALIKE = 6.0
 """Blocks whose power is within this many standard deviations of the lowest count as equally quiet."""
 

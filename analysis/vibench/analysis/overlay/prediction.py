@@ -75,8 +75,8 @@ def predict(
     amplitude_m
         Base amplitude A0, one value for all points or one per point [m].
     accuracy
-        Quick by default: in chaos, Response I scatters by more than the error of any accuracy, and free
-        flight is exact at every level.
+        Quick by default, because free flight is exact at every level and, in chaos, the scatter of Response I
+        exceeds the error of every level.
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
