@@ -111,7 +111,7 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
 _COUNTED = 2**16 + 1
 """Number of bins over the input range, used to find flat tops."""
 _TOPS = (0.1, 0.03, 0.01)
-"""Heights of the examined peak tops relative to the peak."""
+"""Heights of the tops of peaks that are examined for clipping, relative to the height of the peak."""
 _FLAT = 0.88
 """Minimum share of a clipped top's samples in its upper half; 0.71 for smooth, 0.84 for straight peaks."""
 _FLAT_VALUE = 0.4
