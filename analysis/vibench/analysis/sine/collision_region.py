@@ -52,7 +52,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: the nearest intervals that certainly have no collisions, and certainly impacts, not ringing."""
+    """Bounds: the nearest interval certainly without collisions, and the nearest certainly with impacts."""
 
 
 @dataclass(frozen=True)
