@@ -129,8 +129,8 @@ def limits(results: CampaignResults) -> Iterator[str]:
         if lows_hz:
             yield (
                 f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "
-                "the lowest drive frequency). Simulations from it lack slower motion of the base, and "
-                "simulated impacts do not move the recorded base."
+                "the lowest drive frequency). Simulations driven by it lack slower motion of the base, and "
+                "their impacts do not move the base."
             )
         if any(each.driven.by_voltage for each in runs):
             yield (
