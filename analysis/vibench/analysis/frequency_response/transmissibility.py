@@ -21,7 +21,7 @@ _FEWEST_FREEDOM = 4.0
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
-"""Minimum of a variance or a shape, relative to the mean of its neighbours."""
+"""Lower limit of variances and shapes, relative to the mean of their neighbours."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
