@@ -111,7 +111,7 @@ def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
-    # Value at zero of a line through (ahead, y): weights and their variance.
+    # Weights that give the value at zero of a line through (ahead, y), and their variance.
     basis = np.column_stack((np.ones(_SIDE), ahead))
     solver = np.linalg.pinv(basis)
     variance = float(np.linalg.inv(basis.T @ basis)[0, 0])
