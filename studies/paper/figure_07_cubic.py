@@ -1,4 +1,4 @@
-"""Fig. 7: the cubic and the piece-wise model at four amplitudes, with similar frequencies shaded."""
+"""Fig. 7: the cubic and the piece-wise model at four amplitudes, and the frequencies where both agree."""
 
 import numpy as np
 

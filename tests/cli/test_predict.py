@@ -49,7 +49,7 @@ def test_a_requested_lyapunov_exponent_is_given_with_its_error(output_of):
     assert 0 < point["lyapunov_error_per_s"] < 30
 
 
-def test_a_prediction_prints_a_table_and_reasons(output_of):
+def test_a_prediction_prints_a_table_and_the_reason_for_its_method(output_of):
     printed = output_of("predict", "--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT)
     assert "Responses I and II" in printed
     assert "\n300 Hz: event driven. No stop is touched, but the transient has not decayed" in printed

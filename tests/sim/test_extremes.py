@@ -219,7 +219,7 @@ def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceler
 
 
 @pytest.mark.parametrize("duration_s", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
-def test_elastic_rigid_stops_conserve_energy_over_any_number_of_impacts(duration_s):
+def test_elastic_impacts_on_rigid_stops_conserve_energy_however_many_they_are(duration_s):
     specimen = gong2025(damping_time_s=0.0, contact="rigid:1")
     start = np.array([2e-5, 0.0, -4e-5, 0.5, 0.25, -0.9])
     run = integrate(

@@ -112,7 +112,7 @@ def test_raw_counts_scale_back_to_volts(daq):
     np.testing.assert_allclose(counts * step_v, closed_form((1,), 0, 50), atol=step_v)
 
 
-def test_a_waveform_contains_name_unit_times_and_samples(task):
+def test_a_waveform_contains_its_name_its_unit_its_times_and_its_samples(task):
     waveforms = task.read_waveform(64)
     np.testing.assert_allclose([w.scaled_data for w in waveforms], closed_form((1, 2, 3), 0, 64), atol=1e-9)
     later = task.read_waveform(10)[0].timing

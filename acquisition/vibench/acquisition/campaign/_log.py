@@ -169,7 +169,7 @@ class StatusLine(ClosedOnLeaving):
         self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
-        # A status line that a full disk cannot store must not end a measurement.
+        # A measurement must continue if a full disk prevents storing a status line.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 

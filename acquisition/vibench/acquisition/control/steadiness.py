@@ -223,7 +223,7 @@ class Judgement:
     scatter: float
     """Rms distance of the Fourier points from their cluster means; from a single mean if ``period`` is 0."""
     scatter_u: float
-    """Standard uncertainty of the scatter, relative to the motion's rms."""
+    """Standard uncertainty due to scatter, relative to the motion's rms."""
     noise: float
     """Part of the scatter explained by noise of the channel; a smaller scatter cannot be measured."""
     remaining: float

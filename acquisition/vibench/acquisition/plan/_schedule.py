@@ -317,7 +317,7 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Return the level (0 to 1) of a half-cosine ramp at ``progress`` (0 to 1); both ends have zero slope."""
+    """Return the level of a half-cosine ramp [0 to 1] at ``progress`` [0 to 1]."""
     return 0.5 * (1 - cos(pi * progress))
 
 

@@ -416,7 +416,7 @@ def run_measurement(
     that had started is finished as failed.
     """
     run = Run(bench, measurement, path, member(LowLevelCheck, bench_check), create, switch)
-    # Signals are handled until the run has ended, so that none interrupts the silencing.
+    # Ctrl-C and SIGTERM are handled until the run has ended, so that they cannot keep the output on.
     with stop_on_signal(run.switch, path.stem), run:
         for progress in run:
             on_progress(progress)

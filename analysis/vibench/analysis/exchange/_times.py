@@ -428,7 +428,7 @@ class _Scan:
         if is_exact:
             before, place = self._last or (self._start + interval, 1)
             interval = (before - self._start) / place if place else interval
-        # Rounded times with lost samples may have the same intervals, so the mapping must confirm the rate.
+        # Rounded times may have equal intervals even if samples are lost, so the mapping must state the rate.
         uncertainty = 1e-12 * interval * self.is_inferred if is_exact else spread / span
         start = self._start if is_exact else self._start + offset
         rounding = 2 * self._rounding / max(self._samples, 1) ** 0.5

@@ -132,7 +132,7 @@ class UpdatedSpecimen(Tabular):
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit; drop its values if its overlay in ``results`` disagrees with the recorded noise."""
+        """Return the fit; omit its values if its simulation of the noise in ``results`` disagrees."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]

@@ -37,7 +37,7 @@ _LAW_UNKNOWN = 0.15
 """Error of a gap if the contact law is not Hertz's, relative to the mean depth of contacts."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
-"""Smallest range of the middle 90 % of contact depths, relative to their mean, for fitting a line."""
+"""A line is fitted only if the middle 90 % of contact depths span this fraction of their mean."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
 """Largest scatter of |p| at the impacts of a valid block, relative to the gap."""

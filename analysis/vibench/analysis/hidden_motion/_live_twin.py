@@ -61,7 +61,7 @@ _HASH_DIGITS = 16
 
 
 class Level(FrozenModel):
-    """Mean squared normalised innovation of blocks in flight, with clipped outliers."""
+    """Mean squared normalised innovation of blocks without contact, with clipped outliers."""
 
     mean: float
     sd: float

@@ -165,7 +165,7 @@ def _require_rate(sample_rate_hz: float) -> None:
 def _require_length(samples: int, sample_rate_hz: float) -> None:
     if samples < _SEGMENT:
         raise NotEnoughData(
-            f"{max(samples, 0) / sample_rate_hz:.3g} s are too short to track the hidden motion; "
+            f"{max(samples, 0) / sample_rate_hz:.3g} s is too short to track the hidden motion; "
             f"{_SEGMENT / sample_rate_hz:.2g} s are needed"
         )
 

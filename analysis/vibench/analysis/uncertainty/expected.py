@@ -245,8 +245,8 @@ def recorded_s(measurement: Measurement) -> float:
 def expected_recorded_s(measurement: Measurement, rig: Rig) -> float | None:
     """Predict the total recorded time of all parts of a measurement with `until` [s].
 
-    A part ends at a check of its bounds, or at its planned time at the latest. None if the scatter cannot be
-    predicted, or the plan does not set `until`.
+    A part ends at the first check at which its bounds are met, at the latest at its planned time. None if the
+    scatter cannot be predicted, or the plan does not set `until`.
     """
     return _in_all(measurement, rig, end_s)
 

@@ -305,7 +305,7 @@ class Bridge(QObject):
 
     @property
     def may_leave(self) -> bool:
-        """Whether the plan was armed as a run that continues without a window."""
+        """Whether the plan was armed as a run that continues if the window is closed."""
         return self.is_driving and self._attendance is Supervision.UNATTENDED
 
     def close(self, how: Urgency = Urgency.END) -> None:

@@ -223,7 +223,7 @@ def _parts(specimen: Specimen, interval_s: float) -> int:
 
 
 def starting_changes(metric: Table, changes: int) -> Table:
-    """Return initial tangent vectors, orthonormal in the metric and fixed for all runs, (changes, 6)."""
+    """Return initial tangents, orthonormal in the metric and fixed for all runs, shape (changes, 6)."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
     root = np.linalg.cholesky(metric)

@@ -15,11 +15,12 @@ from ..specimen.specimen import Specimen
 from ..specimen.state import Floats, Table, Vector
 from ..specimen.stops import member
 
-# Drives as cubic polynomials of the base displacement on equal time intervals. SI units.
+# Drives: the base displacement as cubic polynomials in time, on equal time intervals. SI units.
 #
 # A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic matches the sweep's
 # displacement and velocity at both ends of each interval (C1). Its displacement error is at most amplitude
-# (omega h)^4 / 384 at the highest frequency. The interval h limits it to a thousandth of the tolerance.
+# (omega h)^4 / 384 at the highest frequency. The chosen interval h makes it at most
+# a thousandth of the tolerance.
 
 HERMITE = 384.0
 """Denominator in the error of cubic Hermite interpolation: h^4 / 384 times the fourth derivative."""

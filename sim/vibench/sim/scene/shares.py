@@ -96,7 +96,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
 
 @dataclass(frozen=True)
 class Count:
-    """Number of trials that had one outcome."""
+    """Number of trials with the outcome whose share is estimated."""
 
     trials: float
     """Number of trials; fractional if trials that depend on each other count less."""

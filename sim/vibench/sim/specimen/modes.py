@@ -120,8 +120,8 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
         raise ValueError(
-            f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s span more than double "
-            "precision resolves: give masses and stiffnesses closer to each other."
+            f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s are too far apart for "
+            "double precision: give masses and stiffnesses closer to each other."
         )
     losses = modes.T @ (damping / np.outer(root, root)) @ modes
     shapes, rows = modes / root[:, None], (modes * root[:, None]).T

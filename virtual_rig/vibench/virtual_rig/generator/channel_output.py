@@ -137,7 +137,7 @@ class ChannelSettings:
 
 
 def highest_frequency_hz(shape: str) -> float:
-    """Return the highest frequency of a shape."""
+    """Return the highest frequency at which a waveform shape can be played [Hz]."""
     return _HIGHEST_FREQUENCY_HZ.get(shape, _HIGHEST_MEMORY_FREQUENCY_HZ)
 
 
