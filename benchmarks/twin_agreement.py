@@ -5,6 +5,7 @@
     python benchmarks/twin_agreement.py --rigs 10 --json
     python benchmarks/twin_agreement.py --sweeps 6           # sweeps of 20 s: false alarms
     python benchmarks/twin_agreement.py --wrong 1            # the same under four wrong specimens
+    python benchmarks/twin_agreement.py --shifts 40          # other rigs, m0 up to 10 samples late
     python benchmarks/twin_agreement.py --stop 200           # verdicts of 16 draws and of fewer
 
 Every measurement is made on the virtual rig with another noise seed, and analysed with 19 draws. If the twin
@@ -20,15 +21,19 @@ from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from scipy.stats import binom, chisquare
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
+from vibench.acquisition.recording import Recording
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
+from vibench.analysis.kinds.analyses import ANALYSES
 from vibench.analysis.overlay.ensemble import EnsembleCurve, z_limit
+from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import Specimen, gong2025
 
@@ -56,33 +61,49 @@ class Comparison:
 
 def compare(
     rig: Rig,
-    excitation: Dwell | WhiteNoise | SineSweep,
+    excitation: Dwell | WhiteNoise | SineSweep | SteppedSine,
     scene: str,
     specimen: Specimen | None = None,
     draws: int = DRAWS,
     curves: dict[str, list[np.ndarray]] | None = None,
+    shifts: tuple[float, ...] = (0.0,),
 ) -> Iterator[Comparison]:
-    """Measure, simulate and compare; all draws of a quantity are added to ``curves``."""
+    """Measure, simulate and compare; all draws of a quantity are added to ``curves``.
+
+    The comparison is repeated with the channel of m0 late by each of ``shifts`` [samples].
+    """
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
         with open_bench(rig) as bench:
             run_measurement(bench, Measurement(name="measured", excitation=excitation, ramp_s=0.3), path)
         with open_recording(path) as recording:
+            found = [analyse_shifted(recording, each) for each in shifts]
             simulation = overlay(recording, analyse(recording), draws=draws, specimen=specimen)
-    for each in simulation.ensemble:
+    for curve, (samples, analysis) in product(simulation.ensemble, zip(shifts, found, strict=True)):
+        (measured,) = (e for e in ANALYSES[excitation.kind].compared(analysis) if e.name == curve.name)
+        each = replace(curve, measured=measured.value)
         if curves is not None and len(each.draws) == draws:
             curves.setdefault(each.name, []).append(each.draws)
-        rank = int(each.rank[0]) if each.compared == 1 else None
         yield Comparison(
-            f"{scene}, {simulation.run.impact_rate_hz:.0f} impacts/s",
+            f"{scene}, {simulation.run.impact_rate_hz:.0f} impacts/s, {samples:g} samples late",
             each.name,
             each.compared,
             each.outside,
             each.largest_z,
             each.limit,
-            rank,
+            int(each.rank[0]) if each.compared == 1 else None,
             int(each.count[0]),
         )
+
+
+def analyse_shifted(recording: Recording, samples: float) -> AbstractAnalysis[Any, Any]:
+    """Analyse a recording as if the channel of m0 were late by any number of samples."""
+    late_s = samples / recording.sample_rate_hz
+    channels = tuple(
+        replace(each, delay_s=each.delay_s - late_s) if each.role == "m0_velocity" else each
+        for each in recording.channels
+    )
+    return analyse(replace(recording, channels=channels))
 
 
 def with_seed(rig: Rig, seed: int) -> Rig:
@@ -140,6 +161,38 @@ def random_scenes(count: int, seed: int) -> Iterator[Comparison]:
         scene = f"rig {number}: {words}, {level_vpp:.2g} Vpp"
         yield from compare(rig, dwell, f"{scene}, dwell {frequency_hz:g} Hz")
         yield from compare(rig, noise, f"{scene}, noise")
+
+
+def shifted_channels(count: int, seed: int) -> Iterator[Comparison]:
+    """Compare dwells, noise, stepped sines and sweeps of random rigs, correct and with a shifted channel."""
+    for number in range(seed, seed + count):
+        rng = np.random.default_rng([number, 5])
+        rig, words = random_rig(rng)
+        rate_hz = (12_800.0, 25_600.0)[number % 2]
+        rig = rig.model_copy(update={"daq": rig.daq.model_copy(update={"sample_rate_hz": rate_hz})})
+        level_vpp, at_hz = float(10 ** rng.uniform(-1.3, 0.5)), float(np.round(rng.uniform(90, 480), 1))
+        plan = (
+            Dwell(amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=1.5, duration_s=4.0),
+            WhiteNoise(
+                amplitude_vpp=level_vpp,
+                band_start_hz=50,
+                band_stop_hz=600,
+                repetition_hz=2,
+                realisations=4,
+                periods=2,
+                settle_s=1.5,
+                seed=number,
+            ),
+            SteppedSine(
+                amplitude_vpp=level_vpp,
+                frequencies_hz=tuple(at_hz + step for step in range(0, 40, 5)),
+                settle_s=1.0,
+                record_s=1.0,
+            ),
+            SineSweep(amplitude_vpp=level_vpp, start_hz=at_hz, stop_hz=at_hz + 20, duration_s=10),
+        )[number // 2 % 4]
+        scene = f"rig {number}: {words}, {plan.kind} {level_vpp:.2g} Vpp {at_hz:g} Hz, {rate_hz:g} samples/s"
+        yield from compare(rig, plan, scene, draws=16, shifts=(0.0, 0.5, 1.0, 3.0, 10.0))
 
 
 def sweep_of(rig: Rig, level_vpp: float, start_hz: float) -> tuple[Rig, SineSweep]:
@@ -256,6 +309,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--sweeps", type=int, default=0)
     parser.add_argument("--wrong", type=int, default=0, metavar="SEEDS")
+    parser.add_argument("--shifts", type=int, default=0, metavar="RIGS")
     parser.add_argument("--stop", type=int, default=0, metavar="TRIALS")
     asked = parser.parse_args()
     found, curves = [], {}
@@ -264,6 +318,7 @@ def main() -> None:
         random_scenes(asked.rigs, asked.seed),
         true_sweeps(asked.sweeps, asked.seed, curves),
         wrong_sweeps(asked.wrong, asked.seed),
+        shifted_channels(asked.shifts, asked.seed),
     ):
         for each in scenes:
             found.append(each)

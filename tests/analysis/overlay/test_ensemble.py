@@ -9,6 +9,7 @@ from vibench.analysis.overlay.driven_rig import Driven
 from vibench.analysis.overlay.ensemble import (
     Ending,
     EnsembleCurve,
+    PhaseCurve,
     Quantity,
     ensemble_curves,
     escape_rate,
@@ -44,6 +45,28 @@ def test_random_magnitudes_exceed_the_limit_in_1_percent_of_cases():
         outside += not EnsembleCurve("q", FREQUENCY_HZ, values[0], values[1:]).agrees
     # Expected: 20, standard deviation 4.4.
     assert 5 <= outside <= 36
+
+
+@pytest.mark.parametrize("scatter", [0.01, 0.5, 1.5, 9.0])
+@pytest.mark.parametrize("middle", [0.3, np.pi])
+def test_correct_phases_exceed_the_limit_in_1_percent_of_cases_on_the_whole_circle(scatter, middle):
+    rng, outside = np.random.default_rng(2), 0
+    for _ in range(1000):
+        phases = np.angle(np.exp(1j * (middle + scatter * rng.standard_normal((9, 8)))))
+        outside += not PhaseCurve("phase", FREQUENCY_HZ[:8], phases[0], phases[1:]).agrees
+    assert outside <= 22
+
+
+@pytest.mark.parametrize("middle", [0.0, 3.1, -3.1])
+def test_a_phase_shift_is_found_across_half_a_turn_and_told_in_degrees(middle):
+    drawn = middle + 0.02 * np.random.default_rng(3).standard_normal((8, 1))
+    late = np.angle(np.exp(1j * (middle + np.radians([20.0]))))
+    found = PhaseCurve("phase", FREQUENCY_HZ[:1], late, np.angle(np.exp(1j * drawn)))
+    assert not found.agrees
+    assert found.rank[0] == 8
+    assert found.measured - found.median == pytest.approx(np.radians(20.0), abs=0.03)
+    assert found.lower < found.median < found.upper < found.measured
+    assert f"phase {np.degrees(late[0]):.2f}° differs from" in found.sentence
 
 
 def rare_dips(rng, size):

@@ -13,6 +13,7 @@ from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures.dwells import dwells_figure
 from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.overlay.driven_rig import Driven
+from vibench.analysis.overlay.overlay import PHASE
 from vibench.analysis.overlay.shaker_fit import fit_shaker
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
@@ -69,6 +70,21 @@ def test_the_twin_agrees_with_weak_noise_on_every_line(recordings):
     assert found.run.draws == 8
     assert found.quantity("transmission").agrees
     assert found.difference.rms_db < 0.05
+
+
+@pytest.mark.parametrize(("name", "late_samples"), [("noise", 0.5), ("dwell", 20.0)])
+def test_the_phase_shows_that_a_channel_is_late(recordings, name, late_samples):
+    """20 samples at 260 Hz and 25.6 kS/s are 73 degrees; magnitudes do not change."""
+    with open_recording(recordings / f"{name}.h5") as recording:
+        analysis = analyse(recording)
+        late_s = late_samples / recording.sample_rate_hz
+        m0 = recording.channel("m0_velocity")
+        others = tuple(each for each in recording.channels if each is not m0)
+        late = replace(recording, channels=(*others, replace(m0, delay_s=m0.delay_s - late_s)))
+        correct, shifted = overlay(recording, analysis), overlay(late, analyse(late))
+    assert all(each.agrees for each in correct.ensemble)
+    assert [each.name for each in shifted.ensemble if not each.agrees] == [PHASE]
+    assert shifted.agreement[0].endswith(f"disagree with the twin: {PHASE}")
 
 
 def test_json_and_figures_show_the_draws(chaotic_dwell):

@@ -17,8 +17,8 @@ from ..overlay.overlay import (
     SteppedSineOverlay,
     dwell_overlay,
     dwell_quantities,
+    sine_quantities,
     stepped_overlay,
-    stepped_quantities,
     sweep_endings,
     sweep_overlay,
     sweep_quantities,
@@ -173,13 +173,14 @@ def stepped_analysis(
 
     def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
         response = stepped_response(channels, analysis.excitation, label, setting_vpp)
-        return Draw(lambda: response, stepped_quantities(response), (), *channels.played_impacts(label))
+        found = sine_quantities(response, response.frequency_hz)
+        return Draw(lambda: response, found, (), *channels.played_impacts(label))
 
     return AnalysisKind(
         family="stepped_sine",
         analyse=analyse,
         draws=lambda analysis: partial(draw, analysis),
-        compared=lambda analysis: stepped_quantities(analysis.response),
+        compared=lambda analysis: sine_quantities(analysis.response, analysis.response.frequency_hz),
         lay=stepped_overlay,
         curves=stepped_traces,
         budgets=stepped_budgets,

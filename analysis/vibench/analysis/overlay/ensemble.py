@@ -30,7 +30,7 @@ _FEWEST_POINTS = 30
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Positive values of one physical quantity, from one analysis; arrays of shape (points,)."""
+    """Values of one physical quantity from one analysis: magnitudes, or phases; arrays of shape (points,)."""
 
     name: str
     """Name of the quantity, such as ``"Response II"`` or ``"band around 201 Hz"``."""
@@ -39,6 +39,10 @@ class Quantity:
     """Values of the quantity; NaN where missing."""
     state: Integers | None = None
     """Kind of motion at each point (colliding or not), if it varies; only equal kinds are compared."""
+
+
+class Phase(Quantity):
+    """Phases of one quantity [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,17 +77,17 @@ class EnsembleCurve(Tabular):
     @cached_property
     def median(self) -> Reals:
         """Median of the draws, shape (points,); NaN for fewer than two draws."""
-        return _over_draws(self.draws, np.nanmedian)
+        return self._value(_over_draws(self._roots, np.nanmedian))
 
     @cached_property
     def lower(self) -> Reals:
         """Lower end of the band that contains 95 % of further draws; NaN for fewer than five draws."""
-        return np.asarray(np.maximum(self._mean - self._reach, 0.0) ** 2)
+        return self._value(self._mean - self._reach)
 
     @cached_property
     def upper(self) -> Reals:
         """Upper end of the band that contains 95 % of further draws; NaN for fewer than five draws."""
-        return np.asarray((self._mean + self._reach) ** 2)
+        return self._value(self._mean + self._reach)
 
     @cached_property
     def relative_sd(self) -> Reals:
@@ -93,7 +97,7 @@ class EnsembleCurve(Tabular):
     @cached_property
     def rank(self) -> Integers:
         """Number of draws below the measured value, shape (points,)."""
-        return np.asarray(np.sum(self.draws < self.measured, axis=0), dtype=np.int64)
+        return np.asarray(np.sum(self._roots < self._root, axis=0), dtype=np.int64)
 
     @cached_property
     def z(self) -> Reals:
@@ -101,9 +105,7 @@ class EnsembleCurve(Tabular):
 
         z is as probable as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
         """
-        with np.errstate(invalid="ignore"):
-            found = _deviates(np.sqrt(self.measured), self._mean, self._sd, self.count)
-        return np.where(self._is_compared, found, np.nan)
+        return np.where(self._is_compared, _deviates(self._root, self._mean, self._sd, self.count), np.nan)
 
     @property
     def compared(self) -> int:
@@ -152,7 +154,7 @@ class EnsembleCurve(Tabular):
     @property
     def share_in_band(self) -> float:
         """Share of compared points within the 95 % band."""
-        inside = (self.measured >= self.lower) & (self.measured <= self.upper)
+        inside = np.abs(self._root - self._mean) <= self._reach
         return float(np.mean(inside[self._is_compared])) if self.compared else np.nan
 
     @property
@@ -165,10 +167,12 @@ class EnsembleCurve(Tabular):
             agrees = "agrees with" if self.agrees else "differs from"
             # A value outside the 95 % band may still agree, so state the limit of |z|.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
+            measured, median, lower, upper = map(
+                self._text, (self.measured, self.median, self.lower, self.upper)
+            )
             return (
-                f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
-                f"{self.lower[0]:.4g} to {self.upper[0]:.4g}; rank {self.rank[0]} of {self.count[0]}, z = "
-                f"{self.z[0]:+.1f}{limit})"
+                f"{self.name} {measured} {agrees} the twin's {median} (95 % of draws {lower} to {upper}; "
+                f"rank {self.rank[0]} of {self.count[0]}, z = {self.z[0]:+.1f}{limit})"
             )
         worst_hz = self.frequency_hz[np.nanargmax(np.abs(self.z))]
         return (
@@ -189,11 +193,19 @@ class EnsembleCurve(Tabular):
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
 
+    def _text(self, values: Reals) -> str:
+        return f"{values[0]:.4g}"
+
+    def _value(self, roots: Reals) -> Reals:
+        return np.asarray(np.maximum(roots, 0.0) ** 2)
+
     @cached_property
     def _roots(self) -> Reals:
-        with np.errstate(invalid="ignore"):
-            found = np.sqrt(self.draws)
-        return np.where(np.isfinite(found), found, np.nan)
+        return np.sqrt(np.where(self.draws >= 0, self.draws, np.nan))
+
+    @cached_property
+    def _root(self) -> Reals:
+        return np.sqrt(np.where(self.measured > 0, self.measured, np.nan))
 
     @cached_property
     def _mean(self) -> Reals:
@@ -212,8 +224,42 @@ class EnsembleCurve(Tabular):
     @cached_property
     def _is_compared(self) -> Integers:
         with np.errstate(invalid="ignore"):
-            known = np.isfinite(self.measured) & (self.measured > 0)
-            return np.asarray(known & (self.count >= FEWEST_DRAWS) & (self._sd > 0))
+            return np.asarray(np.isfinite(self._root) & (self.count >= FEWEST_DRAWS) & (self._sd > 0))
+
+
+class PhaseCurve(EnsembleCurve):
+    """Phases, measured and in every draw [rad]; turns from the draws' mean direction are compared.
+
+    The turns lie within half a turn, so the band may extend beyond pi. Phases that scatter over the whole
+    circle do not disagree.
+    """
+
+    OWN_UNITS: ClassVar = dict.fromkeys(("measured", "draws", "median", "lower", "upper"), "rad")
+
+    def _text(self, values: Reals) -> str:
+        return f"{np.degrees(values[0]):.2f}°"
+
+    @cached_property
+    def _direction(self) -> Reals:
+        """Mean direction of the draws, within half a turn of the measured phase."""
+        found: Reals = np.angle(np.nansum(np.exp(1j * self.draws), axis=0))
+        return np.where(np.isfinite(self.measured), self.measured - _turn(self.measured - found), found)
+
+    def _value(self, roots: Reals) -> Reals:
+        return np.asarray(self._direction + roots)
+
+    @cached_property
+    def _roots(self) -> Reals:
+        return _turn(self.draws - self._direction)
+
+    @cached_property
+    def _root(self) -> Reals:
+        return np.asarray(self.measured - self._direction)
+
+
+def _turn(angle_rad: Reals) -> Reals:
+    """Return angles within half a turn [rad]."""
+    return np.angle(np.exp(1j * angle_rad))
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
@@ -249,7 +295,8 @@ def ensemble_curves(
     for each in measured:
         rows = [_comparable(each, one) for draw in draws for one in draw if one.name == each.name]
         if rows:
-            found.append(EnsembleCurve(each.name, each.frequency_hz, each.value, np.array(rows)))
+            curve = PhaseCurve if isinstance(each, Phase) else EnsembleCurve
+            found.append(curve(each.name, each.frequency_hz, each.value, np.array(rows)))
     return tuple(found)
 
 

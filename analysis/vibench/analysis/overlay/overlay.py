@@ -11,7 +11,7 @@ from vibench.sim import Accuracy, Specimen
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.results import FrequencyResponse
-from ..signals.arrays import Reals
+from ..signals.arrays import Integers, Reals
 from ..signals.envelope import Envelope
 from ..sine.collision_region import Collisions, collisions
 from ..sine.dwell import DwellResponse
@@ -34,6 +34,7 @@ from .ensemble import (
     Ending,
     EnsembleCurve,
     EscapeRate,
+    Phase,
     Quantity,
     ensemble_curves,
     escape_rate,
@@ -47,6 +48,7 @@ _HIGHEST_PREDICTED_HZ = 700.0
 """Highest predicted frequency; above the highest mode (500 Hz) curves fall smoothly."""
 
 R = TypeVar("R")
+_Sines = TypeVar("_Sines", SweptMotion, DwellResponse, SteppedResponse)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +70,6 @@ class AbstractOverlay(Tabular, Generic[R]):
     """Predicted response to sines of the measured base amplitude A0."""
 
     @property
-    def extra_curves(self) -> tuple[EnsembleCurve, ...]:
-        """Quantities that are simulated in all draws but not compared."""
-        return ()
-
-    @property
     def agreement(self) -> tuple[str, ...]:
         """Sentence on the quantities that disagree with the simulation, then one on each quantity."""
         outside = [each.name for each in self.ensemble if not each.agrees]
@@ -83,7 +80,7 @@ class AbstractOverlay(Tabular, Generic[R]):
 
     def quantity(self, name: str) -> EnsembleCurve | None:
         """Return the quantity with this name, measured and in all draws; None if it has no draws."""
-        return next((each for each in (*self.ensemble, *self.extra_curves) if each.name == name), None)
+        return next((each for each in self.ensemble if each.name == name), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,10 +119,9 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     spectrum: EnsembleCurve
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
 
-    @property
-    def extra_curves(self) -> tuple[EnsembleCurve, ...]:
-        """Spectrum of the displacement, which is not compared with draws."""
-        return (self.spectrum,)
+    def quantity(self, name: str) -> EnsembleCurve | None:
+        """Return the quantity with this name, or the spectrum."""
+        return self.spectrum if name == SPECTRUM else super().quantity(name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +134,7 @@ class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
 
 
 TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", "Response II", "spectrum"
+PHASE = "phase of the response over the base"
 """Names of the compared quantities."""
 
 
@@ -153,7 +150,10 @@ def _difference(
 
 def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
     """Return the quantities of a noise measurement that are compared with draws."""
-    return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
+    return (
+        Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),
+        Phase(PHASE, found.frequency_hz, found.phase_rad),
+    )
 
 
 def noise_overlay(analysis: NoiseAnalysis, drawn: DrawSet[NoiseResponse]) -> NoiseOverlay:
@@ -200,16 +200,26 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
 
 
 def _sine_difference(
-    drawn: DrawSet[R],
-    compared: Sequence[Quantity],
-    measured: SweptMotion | DwellResponse | SteppedResponse,
-    simulated: SweptMotion | DwellResponse | SteppedResponse,
+    drawn: DrawSet[_Sines], compared: Sequence[Quantity], measured: _Sines
 ) -> CurveDifference:
     (quantity,) = (each for each in compared if each.name == RESPONSE_II)
     sd, sd_simulated = (
-        np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, simulated)
+        np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, drawn.response)
     )
-    return _difference(drawn, quantity, sd, (np.atleast_1d(simulated.response_ii), sd_simulated))
+    return _difference(drawn, quantity, sd, (np.atleast_1d(drawn.response.response_ii), sd_simulated))
+
+
+def sine_quantities(
+    response: SweptMotion | DwellResponse | SteppedResponse,
+    frequency_hz: Reals,
+    state: Integers | None = None,
+) -> tuple[Quantity, ...]:
+    """Return both responses and the phase of the response over the base."""
+    values = (np.atleast_1d(e) for e in (response.response_i, response.response_ii, response.phase_rad))
+    kinds = ((Quantity, RESPONSE_I), (Quantity, RESPONSE_II), (Phase, PHASE))
+    return tuple(
+        kind(name, frequency_hz, each, state) for (kind, name), each in zip(kinds, values, strict=True)
+    )
 
 
 _EDGE_S = 1.0
@@ -225,10 +235,7 @@ def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity
     reach = max(1, round(_EDGE_S / response.interval_s))
     for edge in np.flatnonzero(np.diff(found.is_colliding)):
         state[max(0, edge + 1 - reach) : edge + 1 + reach] = MIXED
-    return (
-        Quantity(RESPONSE_I, response.frequency_hz, response.response_i, state),
-        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii, state),
-    )
+    return sine_quantities(response, response.frequency_hz, state)
 
 
 def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
@@ -254,7 +261,7 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: DrawSet[SweptMotion]) -> Sweep
         ensemble=ensemble_curves(compared, drawn.quantities),
         escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
         collisions=collisions(drawn.response),
-        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        difference=_sine_difference(drawn, compared, measured),
         prediction=predict(specimen, grid, amplitude_m),
     )
 
@@ -280,8 +287,7 @@ def dwell_quantities(
         for each in terminal_levels(response, towards_hz)
     )
     return (
-        Quantity(RESPONSE_I, at, np.array([response.response_i]), state),
-        Quantity(RESPONSE_II, at, np.array([response.response_ii]), state),
+        *sine_quantities(response, at, state),
         *bands,
         Quantity(SPECTRUM, columns_hz, size, np.repeat(state, size.size)),
     )
@@ -303,7 +309,7 @@ def dwell_overlay(
         escape=escape_rate(endings, drawn.endings),
         displacement=settled_envelope(drawn.response),
         terminal=terminal_levels(drawn.response, towards_hz),
-        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        difference=_sine_difference(drawn, compared, measured),
         prediction=predict(
             drawn.run.specimen,
             np.array([measured.drive.frequency_hz]),
@@ -313,24 +319,16 @@ def dwell_overlay(
     )
 
 
-def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
-    """Return the quantities of a stepped sine that are compared with draws."""
-    return (
-        Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
-        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),
-    )
-
-
 def stepped_overlay(analysis: SteppedSineAnalysis, drawn: DrawSet[SteppedResponse]) -> SteppedSineOverlay:
     """Compare the measured responses of all steps with the draws."""
     measured = analysis.response
-    compared = stepped_quantities(measured)
+    compared = sine_quantities(measured, measured.frequency_hz)
     return SteppedSineOverlay(
         run=drawn.run,
         response=drawn.response,
         ensemble=ensemble_curves(compared, drawn.quantities),
         escape=None,
-        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        difference=_sine_difference(drawn, compared, measured),
         prediction=predict(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
     )
 
