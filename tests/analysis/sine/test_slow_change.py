@@ -162,6 +162,21 @@ def test_bounds_of_a_mean_include_a_decay_that_noise_hides():
     assert np.mean(held) > 0.7
 
 
+def test_bounds_include_the_rest_of_a_decay_that_lasts_longer_than_the_record():
+    """With three times the scatter, 26 to 78 % of the bounds did not contain the settled value."""
+    rng, place, held, withheld = np.random.default_rng(3), np.linspace(0.05, 0.95, 10), [], 0
+    for _ in range(600):
+        size, record_per_decay = 10 ** rng.uniform(-5, -2), 10 ** rng.uniform(-1, 0)
+        turn = np.exp(2j * np.pi * rng.uniform())
+        noise = 0.01 * size * record_per_decay * (rng.standard_normal(10) + 1j * rng.standard_normal(10))
+        parts = 1 + size * turn * np.exp(-place * record_per_decay) + noise
+        found = slow_change(parts)
+        withheld += np.isnan(found)
+        held.append(not abs(np.mean(parts) - 1) > 2 * np.hypot(found, 1e-7))
+    assert np.mean(held) > 0.95
+    assert withheld < 200
+
+
 def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
     """Response I of a weak step was once 0.0886 +- 0.0006; 0.0871 is true."""
     hz = 416.15

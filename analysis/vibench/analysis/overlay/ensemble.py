@@ -259,7 +259,7 @@ class PhaseCurve(EnsembleCurve):
 
 def _turn(angle_rad: Reals) -> Reals:
     """Return angles within half a turn [rad]."""
-    return np.angle(np.exp(1j * angle_rad))
+    return np.asarray(np.angle(np.exp(1j * angle_rad)))
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:

@@ -132,41 +132,66 @@ _FEWEST_BLOCKS = 4
 _SLOW = 0.5
 """Correlation of neighbouring blocks; in one of a hundred records, ten random blocks exceed it by chance."""
 _ONCE = 0.5
-"""Share of the variance at one cycle per record; above it, the change may continue after the record."""
-_TREND = 2.0
-"""Ratio of a squared trend to its variance below which it counts as random; chance exceeds it in 14 %."""
+"""Share of the variance at one cycle per record above which the change may continue after the record."""
+_TREND, _CLEAR_TREND = 2.0, 8.0
+"""Squares of a trend over its variance, below which it counts as random, and above which as slow change.
+
+Chance exceeds them in 14 % and in 0.4 % of records.
+"""
 _BEYOND = 3.0
-"""Ratio of a decay's remaining part to its observed scatter, if the record covers a tenth of the decay."""
+"""Minimum ratio of the remaining decay to the observed scatter."""
+_LONGEST_DECAY = 10.0
+"""Longest time constant of a decay, in lengths of the record, that bounds include."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    It is 0 if the parts scatter at random, because their standard error then suffices; otherwise at least
-    half the change of a line through the parts. It is NaN if a change of more than 0.2 % is incomplete at the
-    end of the record, because the final value is unknown.
+    0 if the parts scatter at random, because their standard error then suffices. A change that may continue
+    after the record counts as an exponential decay; the curvature of the parts limits its time constant. NaN
+    if more than 0.6 % may remain, because the final value is then unknown.
 
     Parameters
     ----------
     parts
         Amplitudes of successive equal parts of a record, shape (parts,).
     """
-    count, mean = parts.size, np.mean(parts)
-    off = parts / mean - 1
+    count = parts.size
+    off = parts / np.mean(parts) - 1
     power = float(np.sum(np.abs(off) ** 2))
     if count < _FEWEST_BLOCKS or power == 0.0:
         return 0.0
     # With few parts, neighbouring parts of a linear trend are less correlated.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
-    if float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) <= min(limit, _SLOW) * power:
-        place = np.linspace(-1, 1, count)
-        trend = abs(complex(place @ off)) ** 2 / float(place @ place)
-        return float(np.sqrt(max(0.0, trend - _TREND * (power - trend) / (count - 2)) / (place @ place)))
-    sd = float(np.sqrt(power / (count - 1)))
-    lines = np.abs(np.fft.fft(off)) ** 2
-    if lines[1] + lines[-1] <= _ONCE * np.sum(lines):
-        return sd
-    return _BEYOND * sd if sd <= STEADY else float("nan")
+    is_slow = float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) > min(limit, _SLOW) * power
+    place = (2 * np.arange(count) + 1) / count - 1
+    slope = complex(place @ off / (place @ place))
+    trend = abs(slope) ** 2 * float(place @ place)
+    scatter = (power - trend) / (count - 2)
+    if trend <= _CLEAR_TREND * scatter:
+        if not is_slow:
+            return float(np.sqrt(max(0.0, trend - _TREND * scatter) / (place @ place)))
+        lines = np.abs(np.fft.fft(off)) ** 2
+        if lines[1] + lines[-1] <= _ONCE * np.sum(lines):
+            return float(np.sqrt(power / (count - 1)))
+    least = _BEYOND * float(np.sqrt(power / (count - 1)))
+    remaining = max(least, 0.6 * _remaining_decay(off, slope, place))
+    return remaining if remaining <= _BEYOND * STEADY else float("nan")
+
+
+def _remaining_decay(off: Complexes | Reals, slope: complex, place: Reals) -> float:
+    """Return the largest likely distance of the mean of ``off`` from the end of its exponential decay.
+
+    For exp(-h x), -1 < x < 1, the quadratic over the linear Legendre coefficient is r = (5/3) i2(h) / i1(h),
+    at most h / 3, and the mean over the linear one 0.2 r + 1 / h.
+    """
+    curve = place**2 - np.mean(place**2)
+    bend = complex(curve @ off / (curve @ curve))
+    rest = float(np.sum(np.abs(off - slope * place - bend * curve) ** 2)) / (place.size - 3)
+    sd = float(np.sqrt(rest / (2 * (curve @ curve))))
+    ratio = -2 / 3 * ((bend / slope).real + 2 * sd / abs(slope))
+    ratio = max(ratio, 1 / (6 * _LONGEST_DECAY))
+    return float(abs(slope) * (0.2 * ratio + 1 / (3 * ratio)))
 
 
 def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) -> Complexes:
