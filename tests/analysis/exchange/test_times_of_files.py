@@ -274,14 +274,23 @@ def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):
     assert remark.startswith("the mapping's 5120 samples/s replace the times of the file")
 
 
-def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more=""):
-    """Write and map a dwell at 260 Hz."""
+DWELL = {"kind": "dwell", "amplitude_vpp": 2.0, "frequency_hz": 260, "settle_s": 1, "duration_s": 3}
+HITS = {
+    "kind": "streamed_noise",
+    "amplitude_vpp": 2,
+    "band_start_hz": 9,
+    "band_stop_hz": 600,
+    "duration_s": 4,
+}
+
+
+def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more="", plan=DWELL):
+    """Write and map a dwell at 260 Hz, or another plan."""
     times = np.arange(volts.size) / rate_hz
     np.savetxt(
         file, np.stack((times, volts, base, velocity)).T, "%.9g", ",", header="time [s],u,a,v", comments=""
     )
     roles = {"u": "drive_voltage", "a": "base_acceleration", "v": "m0_velocity"}
-    plan = {"kind": "dwell", "amplitude_vpp": 2.0, "frequency_hz": 260, "settle_s": 1, "duration_s": 3}
     content = {
         "started_utc": "2026-03-01T12:00:00Z",
         "measurement": {"name": "m", "excitation": plan},
@@ -346,7 +355,7 @@ def test_only_clipped_peaks_of_hits_are_flat_tops(tmp_path, motion_of, noise):
     ringing = np.exp(-since / 200.0) * np.cos(0.3 * since)
     velocity = np.sum(signs * np.where(since > 0, 1.0 - ringing, 0.0), axis=1)
     wave = [each + noise * rng.standard_normal(each.size) for each in (force, force, velocity)]
-    meaning = dwell_at(tmp_path / "a.csv", *wave)
+    meaning = dwell_at(tmp_path / "a.csv", *wave, plan=HITS)
     with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
         flat = [bool(each.flat_tops) for each in channel_levels(recording)]
     assert flat == [motion_of == "clipped hits"] * 2 + [False]

@@ -34,6 +34,7 @@ from ..recordings.channels import DRIVE
 from ..signals.arrays import Reals, runs_of
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
+from ._held import held_values
 from ._mapping import ChannelMapping, ImportMapping
 from ._source import find_channel, open_source
 from ._source_channel import Source, SourceChannel
@@ -174,6 +175,7 @@ def import_recording(
         aligned = align(found, mapping, path)
         samples, rate = aligned.places, aligned.rate_hz
         wanted = tuple(map(_ChannelImport, mapping.channels, found, aligned.pieces, aligned.late_s))
+        wanted, samples, held = _without_held(source, wanted, mapping, rate, samples)
         parts = place_parts(mapping, rate, samples)
         planned = len(mapping.parts) or len(list(_recorded_steps(mapping.measurement.excitation)))
         if (whole := sum(each.stop <= samples for each in parts)) < planned:
@@ -185,7 +187,7 @@ def import_recording(
             expected_samples=samples,
             origin=_origin(wanted, mapping, path),
             plan_json=mapping.measurement.model_dump_json(),
-            bench_json=json.dumps(_bench(path, mapping, wanted, aligned)),
+            bench_json=json.dumps(_bench(path, mapping, wanted, aligned, held)),
             confirmations=mapping.confirmations,
             provenance=replace(
                 collect_provenance(),
@@ -202,6 +204,31 @@ def import_recording(
             out.unlink(missing_ok=True)
             raise
         return writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+
+
+def _without_held(
+    source: Source, wanted: tuple[_ChannelImport, ...], mapping: ImportMapping, rate_hz: float, samples: int
+) -> tuple[tuple[_ChannelImport, ...], int, list[str]]:
+    """Return the channels without held values in the plan's parts, the number of samples, and remarks.
+
+    A record ends where values are held to its end; elsewhere held values count as lost samples.
+    """
+    parts = [range(each.start, min(each.stop, samples)) for each in place_parts(mapping, rate_hz, samples)]
+    excitation, remarks, end, kept = mapping.measurement.excitation, [], samples, []
+    for each in wanted:
+        pieces = each.pieces
+        for start, stop, what in held_values(source, each.source, each.mapped, excitation, rate_hz):
+            spans = [span for piece in each.pieces if (span := piece.span(start, stop))]
+            if not any(max(part[0], span[0]) < min(part[-1], span[-1]) for part in parts for span in spans):
+                continue
+            if stop == each.source.samples:
+                end = min(end, spans[0][0])
+            else:
+                pieces = tuple(one for piece in pieces for one in piece.without(piece.span(start, stop)))
+            times = f"from {spans[0][0] / rate_hz:.6g} to {(spans[-1][-1] + 1) / rate_hz:.6g} s"
+            remarks.append(f"{each.mapped.role} {what} {times}")
+        kept.append(replace(each, pieces=pieces))
+    return tuple(kept), end, remarks
 
 
 def _require_samples(writer: RecordingWriter, path: Path) -> None:
@@ -298,7 +325,11 @@ def _power_of_two_above(peak: float, name: str) -> float:
 
 
 def _bench(
-    path: Path, mapping: ImportMapping, wanted: Sequence[_ChannelImport], aligned: Alignment
+    path: Path,
+    mapping: ImportMapping,
+    wanted: Sequence[_ChannelImport],
+    aligned: Alignment,
+    held: Sequence[str],
 ) -> dict[str, Any]:
     """Return the known facts of the bench, and facts on the imported file."""
     with path.open("rb") as file:
@@ -314,6 +345,7 @@ def _bench(
             "channels": [asdict(each.source) for each in wanted],
             "time": list(aligned.remarks),
             "time_contradicted": aligned.is_contradicted,
+            "held": list(held),
         },
     }
     if mapping.specimen is not None:

@@ -78,7 +78,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         *_ranges(facts),
         *_scales(facts),
         _rates(facts),
-        *_import_time_checks(facts),
+        *_import_checks(facts),
         _calibrations(facts),
         _bench_check(facts),
     )
@@ -236,8 +236,13 @@ def _rates(facts: RecordingFacts) -> Check:
     return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
 
 
-def _import_time_checks(facts: RecordingFacts) -> Iterator[Check]:
+def _import_checks(facts: RecordingFacts) -> Iterator[Check]:
     imported = facts.bench.get("imported", {})
+    if held := imported.get("held", ()):
+        text = (
+            f"{'; '.join(held)}, as if a converter was stuck or zeros were added; these samples are left out"
+        )
+        yield Check("Held values", Verdict.WARNING, text)
     if remarks := imported.get("time", ()):
         verdict = Verdict.WARNING if imported.get("time_contradicted") else Verdict.NOTE
         yield Check("Time of the imported file", verdict, "; ".join(remarks))
