@@ -6,15 +6,13 @@ analyses runs in a separate process, so that its peak memory can be measured.
 """
 
 import json
-import multiprocessing
-import resource
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 from scipy import signal
+from separate_process import MEGABYTE, run_separately
 
 from vibench.acquisition import Block, open_recording
 from vibench.acquisition.plan import Measurement, StreamedNoise
@@ -44,8 +42,6 @@ UNITS = {
     RESPONSE: ("velocity", "m s-1"),
     "table_acceleration": ("acceleration", "m s-2"),
 }
-BYTES_PER_MEGABYTE = 1 << 20
-KILOBYTES = 1 << 10
 
 
 def header(plan, samples):
@@ -115,41 +111,18 @@ def run_scipy(path):
     return frequency_hz, np.abs(s_xy / s_xx) * 2 * np.pi * frequency_hz
 
 
-def run_analysis(contestant, path, pipe):
-    """Run one analysis and send its time, peak memory and result."""
-    idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
-    result = contestant(path)
-    wall_s, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    scale = KILOBYTES / BYTES_PER_MEGABYTE
-    pipe.send((wall_s, cpu_s, peak * scale, idle * scale, result))
-
-
-def run(contestant, path):
-    """Run one analysis in a new process and return what it sends."""
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=run_analysis, args=(contestant, path, sender))
-    process.start()
-    answer = receiver.recv()
-    process.join()
-    return answer
-
-
 def compare(path):
     """Run both on one recording and print time, memory and agreement."""
-    answers = {"vibench": run(run_vibench, path), "scipy": run(run_scipy, path)}
-    for name, (wall_s, cpu_s, peak_mb, idle_mb, _) in answers.items():
+    ours, theirs = run_separately(run_vibench, path), run_separately(run_scipy, path)
+    for name, run in (("vibench:", ours), ("scipy:", theirs)):
         print(
-            f"{name + ':':9} {wall_s:6.2f} s, {cpu_s:6.2f} s of processor time, peak {peak_mb:.0f} MB "
-            f"({idle_mb:.0f} MB before it began)"
+            f"{name:9} {run.wall_s:6.2f} s, {run.cpu_s:6.2f} s of processor time, peak {run.peak_mb:.0f} MB "
+            f"({run.idle_mb:.0f} MB before it began)"
         )
-    frequency_hz, magnitude = answers["vibench"][-1]
-    their_hz, theirs_magnitude = answers["scipy"][-1]
+    (frequency_hz, magnitude), (their_hz, theirs_magnitude) = ours.result, theirs.result
     lines = np.searchsorted(their_hz, frequency_hz - 1e-9)
     difference = np.max(np.abs(magnitude / theirs_magnitude[lines] - 1))
-    ratio = answers["scipy"][1] / answers["vibench"][1]
+    ratio = theirs.cpu_s / ours.cpu_s
     print(f"scipy takes {ratio:.2f} times the processor time; h1 differs by {difference:.1e} at most")
 
 
@@ -159,8 +132,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "long.h5"
         write_recording(path, 60.0 * minutes)
-        counts = 4 * len(PER_VOLT) * minutes * 60 * RATE_HZ / BYTES_PER_MEGABYTE
-        size = path.stat().st_size / BYTES_PER_MEGABYTE
+        counts = 4 * len(PER_VOLT) * minutes * 60 * RATE_HZ / MEGABYTE
+        size = path.stat().st_size / MEGABYTE
         print(
             f"{minutes:g} minutes, {len(PER_VOLT)} channels: {counts:.0f} MB of counts, {size:.0f} MB on disk"
         )

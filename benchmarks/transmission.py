@@ -5,15 +5,13 @@ so that its peak memory can be measured. The recording (4 channels at 51.2 kS/s)
 laboratory.
 """
 
-import multiprocessing
-import resource
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 from scipy import signal
+from separate_process import run_separately
 
 from vibench.analysis.spectra.spectra import SegmentSpectra
 
@@ -21,8 +19,6 @@ RATE_HZ = 51_200
 CHANNELS = 4
 SEGMENT = 51_200
 BLOCK = 1 << 19
-BYTES_PER_MEGABYTE = 1 << 20
-KILOBYTES = 1 << 10
 
 
 def channel_file(folder, channel):
@@ -65,27 +61,6 @@ def run_scipy(folder, _samples):
     return result
 
 
-def run_program(contestant, folder, samples, pipe):
-    """Run one program and send its time, peak memory and result."""
-    idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    begin = time.perf_counter()
-    result = contestant(folder, samples)
-    duration = time.perf_counter() - begin
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    pipe.send((duration, (peak - idle) * KILOBYTES / BYTES_PER_MEGABYTE, result))
-
-
-def run(contestant, folder, samples):
-    """Run one program in a new process and return what it sends."""
-    context = multiprocessing.get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=run_program, args=(contestant, folder, samples, sender))
-    process.start()
-    answer = receiver.recv()
-    process.join()
-    return answer
-
-
 def main():
     """Run both programs and print time, memory and agreement."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
@@ -93,13 +68,14 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_recording(folder, samples)
-        our_s, our_mb, our_result = run(run_vibench, folder, samples)
-        their_s, their_mb, their_result = run(run_scipy, folder, samples)
-    difference = np.max(np.abs(our_result / their_result - 1))
+        ours = run_separately(run_vibench, folder, samples)
+        theirs = run_separately(run_scipy, folder, samples)
+    difference = np.max(np.abs(ours.result / theirs.result - 1))
     print(f"{minutes:g} minutes of {CHANNELS} channels, segments of {SEGMENT}, all spectra and cross-spectra")
-    print(f"vibench: {our_s:6.2f} s, {our_mb:7.0f} MB above the idle process")
-    print(f"scipy:   {their_s:6.2f} s, {their_mb:7.0f} MB above the idle process")
-    print(f"scipy takes {their_s / our_s:.1f} times as long; largest relative difference {difference:.1e}")
+    for name, run in (("vibench:", ours), ("scipy:", theirs)):
+        print(f"{name:8} {run.wall_s:6.2f} s, {run.peak_mb - run.idle_mb:7.0f} MB above the idle process")
+    ratio = theirs.wall_s / ours.wall_s
+    print(f"scipy takes {ratio:.1f} times as long; largest relative difference {difference:.1e}")
 
 
 if __name__ == "__main__":
