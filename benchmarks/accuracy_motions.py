@@ -119,10 +119,11 @@ def measure_attractors(lottery: Lottery, starts: int) -> LotteryFigures:
 
 
 def _share_in(many: Ensemble, motion: FoundMotion) -> float:
-    return sum(each.share.share for each in many.motions if _is_same(each, motion))
+    return sum(each.share.share for each in many.motions if is_same_motion(each, motion))
 
 
-def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
+def is_same_motion(one: FoundMotion, other: FoundMotion) -> bool:
+    """Return whether two motions are equal; all that may not be settled yet count as equal."""
     if one.motion in PENDING or other.motion in PENDING:
         return one.motion in PENDING and other.motion in PENDING
     is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME

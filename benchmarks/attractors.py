@@ -9,13 +9,11 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
+from accuracy_motions import is_same_motion
 from random_scenes import edge_scene, random_scene, scene_line
 
-from vibench.sim import Ensemble, FoundMotion, MotionKind, ScenePrediction, solve_ensemble, solve_scene
+from vibench.sim import Ensemble, FoundMotion, ScenePrediction, solve_ensemble, solve_scene
 
-SAME = 1e-3
-"""Largest relative difference of Response I of equal periodic motions."""
-PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 SEED = 77_000
 
 
@@ -52,12 +50,14 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
     if stated is None or truth is None:
         return False
     for motion in truth.motions:
-        same = sorted((each for each in stated.motions if _is_same(each, motion)), key=_apart_from(motion))
+        same = sorted(
+            (each for each in stated.motions if is_same_motion(each, motion)), key=_apart_from(motion)
+        )
         low, high = (same[0].share.low, same[0].share.high) if same else (0.0, stated.unseen_share)
         if not low <= motion.share.share <= high:
             return False
     return all(
-        any(_is_same(each, motion) for motion in truth.motions) or each.share.low < 1.0 / truth.starts
+        any(is_same_motion(each, motion) for motion in truth.motions) or each.share.low < 1.0 / truth.starts
         for each in stated.motions
     )
 
@@ -65,13 +65,6 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
 def _apart_from(motion: FoundMotion) -> Callable[[FoundMotion], float]:
     """Return a sort key: the distance of a motion's Response I from that of ``motion``."""
     return lambda each: abs((each.response_i or 0.0) - (motion.response_i or 0.0))
-
-
-def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
-    if one.motion in PENDING or other.motion in PENDING:
-        return one.motion in PENDING and other.motion in PENDING
-    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
-    return one.period == other.period and is_near
 
 
 def _print_row(stated: Ensemble | None, truth: Ensemble | None) -> None:
