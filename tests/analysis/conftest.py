@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from tests.analysis import synthetic_recordings as synthetic
-from vibench.acquisition.plan import Dwell, SineSweep, SteppedSine, StreamedNoise, WhiteNoise
+from vibench.acquisition.plan import Dwell, SteppedSine, StreamedNoise
 
 A0_WEAK, A0_STRONG = 0.5e-6, 5e-6
 DELAY_SAMPLES = 1
 SETTLE_S, DWELL_S = 2.0, 3.0
 SWEEP = {"start_hz": 225.0, "stop_hz": 305.0, "duration_s": 16.0}
-NOISE = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
 
 
 @pytest.fixture(scope="session")
@@ -58,31 +57,13 @@ def dwell_file(dwell_motions, tmp_path_factory):
 @pytest.fixture(scope="session")
 def sweep_file(tmp_path_factory):
     """Write a sweep through the collision region, slow enough for a clear jump."""
-    motion = synthetic.chirp(SWEEP["duration_s"], SWEEP["start_hz"], SWEEP["stop_hz"], A0_STRONG)
-    velocity, _ = synthetic.response_of(motion)
-    plan = SineSweep(amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * A0_STRONG, settle_s=0.0, **SWEEP)
-    part = synthetic.Part("sweep", 0.0, SWEEP["duration_s"], {"start_hz": SWEEP["start_hz"]})
-    folder = tmp_path_factory.mktemp("sweep")
-    return synthetic.write_recording(folder, plan, motion, velocity, [part], name="sweep")
+    return synthetic.write_sweep(tmp_path_factory.mktemp("sweep"), A0_STRONG, SWEEP)[0]
 
 
 @pytest.fixture(scope="session")
 def noise_motion():
-    """Base motion, m0 velocity and parts of two consecutive realisations of weak noise, each from rest."""
-    lines = np.arange(NOISE["band_start_hz"], NOISE["band_stop_hz"] + 1, NOISE["repetition_hz"])
-    settle_s, played_s = 3.0, NOISE["periods"] / NOISE["repetition_hz"]
-    motions, velocities, parts = [], [], []
-    for number in range(2):
-        motion = synthetic.multisine(settle_s + played_s, lines, 1e-8, number)
-        motions.append(motion)
-        velocities.append(synthetic.response_of(motion)[0])
-        start_s = number * (settle_s + played_s + synthetic.RAMP_S) + settle_s
-        parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
-    base = synthetic.Motion(
-        np.concatenate([each.displacement_m for each in motions]),
-        np.concatenate([each.acceleration for each in motions]),
-    )
-    return base, np.concatenate(velocities), parts
+    """Plan, base motion, m0 velocity and parts of two consecutive realisations of weak noise."""
+    return synthetic.noise_from_rest(1e-8, settle_s=3.0)
 
 
 @pytest.fixture(scope="session")
@@ -90,9 +71,8 @@ def noise_file(noise_motion, tmp_path_factory):
     """Return a function that writes complete or shortened noise to a new folder."""
 
     def write(**how):
-        plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
         folder = tmp_path_factory.mktemp("noise")
-        return synthetic.write_recording(folder, plan, *noise_motion, **{"name": "noise", **how})
+        return synthetic.write_recording(folder, *noise_motion, **{"name": "noise", **how})
 
     return write
 
@@ -102,10 +82,7 @@ def stepped_file(tmp_path_factory):
     """Write two upward steps of a stepped sine, each from rest and known in closed form."""
     frequencies = (150.0, 180.0)
     motions = [synthetic.sine(4.0, each, A0_WEAK) for each in frequencies]
-    base = synthetic.Motion(
-        np.concatenate([each.displacement_m for each in motions]),
-        np.concatenate([each.acceleration for each in motions]),
-    )
+    base = synthetic.joined(motions)
     velocity = np.concatenate([synthetic.response_of(each)[0] for each in motions])
     parts = [
         synthetic.Part("step", 4.5 * n + 2.5, 4.5 * n + 3.5, {"frequency_hz": each, "direction": "up"})

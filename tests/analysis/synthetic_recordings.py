@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import Block, Identity
-from vibench.acquisition.plan import Measurement
+from vibench.acquisition.plan import Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.recording import (
     ChannelHeader,
     Origin,
@@ -95,6 +95,31 @@ def multisine(duration_s, lines_hz, amplitude_m, seed):
     return Motion(sum(each.displacement_m for each in parts), sum(each.acceleration for each in parts))
 
 
+def joined(motions):
+    """Return motions that follow each other."""
+    return Motion(
+        np.concatenate([each.displacement_m for each in motions]),
+        np.concatenate([each.acceleration for each in motions]),
+    )
+
+
+def noise_from_rest(amplitude_m, settle_s, realisations=2, specimen=None):
+    """Return plan, base motion, m0 velocity and parts of weak noise, every realisation from rest."""
+    plan = WhiteNoise(
+        amplitude_vpp=0.05, band_start_hz=60.0, band_stop_hz=560.0, repetition_hz=4.0, periods=2,
+        settle_s=settle_s, realisations=realisations,
+    )  # fmt: skip
+    lines = np.arange(plan.band_start_hz, plan.band_stop_hz + 1, plan.repetition_hz)
+    played_s = plan.periods / plan.repetition_hz
+    motions = [multisine(settle_s + played_s, lines, amplitude_m, seed) for seed in range(realisations)]
+    velocities = [response_of(each, specimen=specimen)[0] for each in motions]
+    parts = []
+    for number in range(realisations):
+        start_s = number * (settle_s + played_s + RAMP_S) + settle_s
+        parts.append(Part("realisation", start_s, start_s + played_s, {"realisation": number}))
+    return plan, joined(motions), np.concatenate(velocities), parts
+
+
 def noise_band(duration_s, low_hz, high_hz, rms_m, seed):
     """Return Gaussian base motion in a band and the velocity of a mass with twice that displacement."""
     count = round(duration_s * RATE)
@@ -151,6 +176,16 @@ def header(measurement, samples, delay_s, started_utc, response=VELOCITY):
         confirmations={"operator": "somebody", "amplifier gain": "10 dB"},
         provenance=replace(PROVENANCE, started_utc=started_utc),
     )
+
+
+def write_sweep(folder, amplitude_m, sweep, specimen=None, noise=0.0, seed=1):
+    """Write a sweep with the numbers of its plan; return its file and the impact times [s]."""
+    motion = chirp(sweep["duration_s"], sweep["start_hz"], sweep["stop_hz"], amplitude_m)
+    velocity, impacts_s = response_of(motion, specimen=specimen)
+    velocity = velocity + noise * np.random.default_rng(seed).standard_normal(velocity.size)
+    plan = SineSweep(amplitude_vpp=2 * VOLTS_PER_METRE * amplitude_m, settle_s=0.0, **sweep)
+    part = Part("sweep", 0.0, sweep["duration_s"], {"start_hz": sweep["start_hz"]})
+    return write_recording(folder, plan, motion, velocity, [part], name="sweep"), impacts_s
 
 
 def write_recording(*recorded, state=RecordingState.COMPLETE, reason="the plan was carried out", **how):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.analysis import synthetic_recordings as synthetic
-from vibench.acquisition.plan import Dwell, SineSweep, WhiteNoise
+from vibench.acquisition.plan import Dwell
 from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
 from vibench.analysis.fit.gap_fit import bracketed_gap, brackets, fit_gap, onsets, swept_response
 from vibench.analysis.fit.parameters import LINEAR, Parameter, parameter_value, with_values
@@ -24,40 +24,20 @@ TRUE = with_values(
         Parameter.GAP: 52e-6,
     },
 )
-LINES = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
-REALISATIONS = 4
 LASER_NOISE = 2e-7
 """Noise of the velocity channel [m/s rms]; the response is some tens of micrometres per second."""
 SWEEP = {"start_hz": 225.0, "stop_hz": 305.0, "duration_s": 16.0}
 SWEEP_M = 6e-6
 
 
-def noise_file(folder, rng):
-    lines = np.arange(LINES["band_start_hz"], LINES["band_stop_hz"] + 1, LINES["repetition_hz"])
-    settle_s, played_s = 2.0, LINES["periods"] / LINES["repetition_hz"]
-    motions, velocities, parts = [], [], []
-    for number in range(REALISATIONS):
-        motion = synthetic.multisine(settle_s + played_s, lines, 1e-9, number)
-        velocity = synthetic.response_of(motion, specimen=TRUE)[0]
-        motions.append(motion)
-        velocities.append(velocity + LASER_NOISE * rng.standard_normal(velocity.size))
-        start_s = number * (settle_s + played_s + synthetic.RAMP_S) + settle_s
-        parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
-    base = synthetic.Motion(
-        np.concatenate([each.displacement_m for each in motions]),
-        np.concatenate([each.acceleration for each in motions]),
-    )
-    plan = WhiteNoise(amplitude_vpp=0.05, realisations=REALISATIONS, settle_s=settle_s, **LINES)
-    return synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="noise")
+def noise_file(folder):
+    plan, base, velocity, parts = synthetic.noise_from_rest(1e-9, 2.0, 4, TRUE)
+    velocity += LASER_NOISE * np.random.default_rng(12).standard_normal(velocity.size)
+    return synthetic.write_recording(folder, plan, base, velocity, parts, name="noise")
 
 
-def sweep_file(folder, rng):
-    motion = synthetic.chirp(SWEEP["duration_s"], SWEEP["start_hz"], SWEEP["stop_hz"], SWEEP_M)
-    velocity, impacts_s = synthetic.response_of(motion, specimen=TRUE)
-    velocity = velocity + 100 * LASER_NOISE * rng.standard_normal(velocity.size)
-    plan = SineSweep(amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * SWEEP_M, settle_s=0.0, **SWEEP)
-    part = synthetic.Part("sweep", 0.0, SWEEP["duration_s"], {"start_hz": SWEEP["start_hz"]})
-    path = synthetic.write_recording(folder, plan, motion, velocity, [part], name="sweep")
+def sweep_file(folder):
+    path, impacts_s = synthetic.write_sweep(folder, SWEEP_M, SWEEP, TRUE, 100 * LASER_NOISE, seed=11)
     rate = (SWEEP["stop_hz"] - SWEEP["start_hz"]) / SWEEP["duration_s"]
     return path, SWEEP["start_hz"] + rate * impacts_s[0]
 
@@ -65,9 +45,8 @@ def sweep_file(folder, rng):
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
     """Record weak noise and a colliding sweep of the true specimen; the bench states the paper's values."""
-    folder, rng = tmp_path_factory.mktemp("shaken"), np.random.default_rng(11)
-    sweep, first_hz = sweep_file(folder, rng)
-    return noise_file(folder, rng), sweep, first_hz
+    folder = tmp_path_factory.mktemp("shaken")
+    return noise_file(folder), *sweep_file(folder)
 
 
 @pytest.fixture(scope="module")
@@ -133,12 +112,7 @@ def test_base_motion_from_collisions_does_not_bias_the_gap(campaign):
 def test_a_sweep_with_smooth_collisions_before_its_regions_gives_no_gap(tmp_path, amplitude_m):
     """The gap was given as 150 and 63 um instead of 45."""
     sweep = {"start_hz": 60.0, "stop_hz": 92.0, "duration_s": 20.0}
-    motion = synthetic.chirp(sweep["duration_s"], sweep["start_hz"], sweep["stop_hz"], amplitude_m)
-    noise = 2e-5 * np.random.default_rng(1).standard_normal(motion.displacement_m.size)
-    plan = SineSweep(amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * amplitude_m, settle_s=0.0, **sweep)
-    part = synthetic.Part("sweep", 0.0, sweep["duration_s"], {"start_hz": sweep["start_hz"]})
-    velocity = synthetic.response_of(motion)[0] + noise
-    path = synthetic.write_recording(tmp_path, plan, motion, velocity, [part])
+    path, _ = synthetic.write_sweep(tmp_path, amplitude_m, sweep, noise=2e-5)
     with pytest.raises(NotEnoughData, match="no sweep goes from predicted motion without"):
         update_model(analyse_files([path], "smooth", Simulation.LEFT_OUT))
 

@@ -1,3 +1,6 @@
+import shutil
+
+import h5py
 import numpy as np
 import pytest
 
@@ -15,16 +18,19 @@ HOLE = (100_000, 103_000)
 CHANNELS = ("drive_voltage", "base_acceleration", "m0_velocity")
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
+def write(folder, frequency_hz, impact=(), hole=None):
+    """Record a sine, with the velocities of an impact."""
     time_s = np.arange(SAMPLES) / RATE
-    velocity = 0.01 * np.sin(2 * np.pi * 50 * time_s)
-    velocity[150_001:150_004] = (0.4, -0.5, 0.4)
+    velocity = 0.01 * np.sin(2 * np.pi * frequency_hz * time_s)
+    velocity[150_001 : 150_001 + len(impact)] = impact
     motion = synthetic.Motion(np.zeros(SAMPLES), np.cos(time_s))
     plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)
-    path = synthetic.write_recording(
-        tmp_path_factory.mktemp("overview"), plan, motion, velocity, [], hole=HOLE
-    )
+    return synthetic.write_recording(folder, plan, motion, velocity, [], hole=hole)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = write(tmp_path_factory.mktemp("overview"), 50.0, (0.4, -0.5, 0.4), HOLE)
     with open_recording(path) as opened:
         yield opened
 
@@ -66,10 +72,6 @@ def test_lost_samples_leave_a_gap_in_the_overview_picture(recording):
 
 
 def test_a_file_without_an_overview_gives_the_same_picture(recording, tmp_path):
-    import shutil
-
-    import h5py
-
     path = tmp_path / "old.h5"
     shutil.copyfile(recording.path, path)
     with h5py.File(path, "r+") as file:
@@ -96,12 +98,7 @@ def test_an_overview_picture_of_an_empty_range_is_refused(recording, start, stop
 
 @pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 11.5])
 def test_a_steady_sine_has_straight_edges_with_bins_shorter_than_a_period(tmp_path, frequency_hz):
-    time_s = np.arange(SAMPLES) / RATE
-    motion = synthetic.Motion(np.zeros(SAMPLES), np.cos(time_s))
-    plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)
-    velocity = 0.01 * np.sin(2 * np.pi * frequency_hz * time_s)
-    path = synthetic.write_recording(tmp_path, plan, motion, velocity, [])
-    with open_recording(path) as opened:
+    with open_recording(write(tmp_path, frequency_hz)) as opened:
         for columns in (390, 350, 300):
             picture = overview_of(opened).picture(("m0_velocity",), 0, SAMPLES, columns)
             assert picture.samples_per_column >= BIN_SAMPLES

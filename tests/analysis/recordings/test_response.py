@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.analysis.conftest import A0_STRONG, A0_WEAK, DWELL_PART, NOISE, dwell_plan, synthetic
+from tests.analysis.conftest import A0_STRONG, A0_WEAK, DWELL_PART, dwell_plan, synthetic
 from vibench.acquisition import Overload, open_recording
-from vibench.acquisition.plan import WhiteNoise
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channel_levels import channel_levels
@@ -80,8 +79,7 @@ def test_dwell_responses_are_equal_for_any_sensor(dwell_file, sensor_file, level
 @pytest.mark.thorough
 @SENSORS
 def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp_path, response):
-    base, velocity, parts = noise_motion
-    plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
+    plan, base, velocity, parts = noise_motion
     values = sensor_values(velocity, response)
     path = synthetic.write_recording(tmp_path, plan, base, values, parts, response=response)
     expected, found = (analysis_of(each).response for each in (noise_file(), path))
