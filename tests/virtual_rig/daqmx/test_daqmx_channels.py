@@ -95,6 +95,8 @@ def test_units_other_than_volts_are_refused(task):
         ("Dev1/ao0", DAQmxErrors.INVALID_PHYS_CHAN_TYPE),
         ("Dev1/ai0, Dev2/ai0", DAQmxErrors.MULTI_DEVS_IN_TASK),
         ("Dev1/ai0, Dev1/ai0", DAQmxErrors.VIRTUAL_CHAN_NAME_USED),
+        ("Dev1/ai0:Dev2/ai1", DAQmxErrors.INVALID_RANGE_OF_OBJECTS_SYNTAX_IN_STRING),
+        ("Dev1/ai0:20000", DAQmxErrors.INVALID_RANGE_OF_OBJECTS_SYNTAX_IN_STRING),
     ],
 )
 def test_missing_inputs_and_invalid_combinations_are_refused(task, names, code):

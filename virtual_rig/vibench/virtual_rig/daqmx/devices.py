@@ -6,8 +6,7 @@ and the output memory of the USB-4431, the default couplings, and the USB-6211's
 """
 
 import math
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +18,8 @@ from nidaqmx.constants import (
     TerminalConfiguration,
 )
 from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError
+from nidaqmx.utils import unflatten_channel_string
 from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
@@ -218,26 +219,15 @@ class Catalogue:
         return tuple(found)
 
 
-_RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?P<stem_again>.*?)(?P<last>\d+)$")
-
-
 def expand(text: str) -> tuple[str, ...]:
-    """Return all names in a list of names and ranges, in order.
+    """Return all names in a list of names and ranges, in order (-200498 for an invalid range).
 
     ``"Dev1/ai0:2"`` and ``"Dev1/ai0:Dev1/ai2"`` both give three names; ``"ai2:0"`` counts down.
     """
-    return tuple(name for part in text.split(",") for name in _expand_one(part.strip()))
-
-
-def _expand_one(part: str) -> Iterable[str]:
-    if not part:
-        return ()
-    found = _RANGE.match(part)
-    if found is None or found["stem_again"] not in ("", found["stem"], found["stem"].rpartition("/")[2]):
-        return (part,)
-    first, last = int(found["first"]), int(found["last"])
-    step = 1 if last >= first else -1
-    return (f"{found['stem']}{number}" for number in range(first, last + step, step))
+    try:
+        return tuple(unflatten_channel_string(text))
+    except DaqError as error:
+        raise DaqmxRefusal(error.error_code, f"Channels: {text}") from None
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:
