@@ -110,49 +110,43 @@ _ZEROS = 6
 """Number of numerator weights that are fitted."""
 
 
-class LowPass:
-    """Analogue low-pass of a sensor with a bandwidth (one pole, -3 dB) and a mounted resonance, if given.
+def low_pass_poles(
+    bandwidth_hz: float | None = None, resonance_hz: float | None = None, damping_ratio: float = 0.02
+) -> tuple[complex, ...]:
+    """Return the poles of a sensor [rad/s]: one for its bandwidth (-3 dB), two for its mounted resonance.
 
     The default damping ratio is assumed; it is typical of piezoelectric sensors.
     """
-
-    def __init__(
-        self,
-        bandwidth_hz: float | None = None,
-        resonance_hz: float | None = None,
-        damping_ratio: float = 0.02,
-    ) -> None:
-        self.poles: tuple[complex, ...] = ()
-        """Poles in the left half plane, complex poles in conjugate pairs [rad/s]."""
-        if bandwidth_hz is not None:
-            self.poles += (complex(-2 * np.pi * bandwidth_hz),)
-        if resonance_hz is not None:
-            omega = 2 * np.pi * resonance_hz
-            pole = complex(-damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2))
-            self.poles += (pole, pole.conjugate())
-
-    def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the complex gain of the low-pass, with the shape of ``frequency_hz``."""
-        s = 2j * np.pi * np.asarray(frequency_hz)
-        return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
+    poles = () if bandwidth_hz is None else (complex(-2 * np.pi * bandwidth_hz),)
+    if resonance_hz is None:
+        return poles
+    omega = 2 * np.pi * resonance_hz
+    pole = complex(-damping_ratio * omega, omega * np.sqrt(1 - damping_ratio**2))
+    return (*poles, pole, pole.conjugate())
 
 
-def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
+def low_pass_gain(poles: tuple[complex, ...], frequency_hz: FloatArray) -> NDArray[np.complex128]:
+    """Return the complex gain of an analogue low-pass, with the shape of ``frequency_hz``."""
+    s = 2j * np.pi * np.asarray(frequency_hz)
+    return np.asarray(np.prod([pole / (pole - s) for pole in poles], axis=0), dtype=np.complex128)
+
+
+def running_filter(analogue_poles: tuple[complex, ...], step_s: float) -> RecursiveFilter:
     """Return a low-pass filter for a grid of ``step_s``, initially at rest.
 
     The poles are mapped exactly (z = exp(s T)), so a resonance keeps its frequency even close to the grid's
     Nyquist frequency. A resonance above Nyquist is omitted, as it would appear at another frequency. The
     zeros are a least-squares fit to the complex analogue response, with exact gain at zero frequency.
     """
-    poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
+    poles = np.array([pole for pole in analogue_poles if abs(pole.imag) * step_s < np.pi])
     denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
-    return RecursiveFilter(_fit_zeros(analogue, denominator, step_s), denominator)
+    return RecursiveFilter(_fit_zeros(analogue_poles, denominator, step_s), denominator)
 
 
-def _fit_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: float) -> NDArray[np.float64]:
+def _fit_zeros(poles: tuple[complex, ...], denominator: FloatArray, step_s: float) -> FloatArray:
     frequency_hz = np.geomspace(_FIT_FLOOR, _FIT_BAND, _FIT_POINTS) / step_s
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
-    target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
+    target = low_pass_gain(poles, frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
     powers = z[:, np.newaxis] ** np.arange(_ZEROS)
     # Unit gain at zero frequency: numerator and denominator have equal sums, so one weight is eliminated.
     total = denominator.sum()
@@ -222,7 +216,7 @@ class MotionSensor:
             )
         bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz) if config.bandwidth_hz else 0.0
         self.delay_steps = (config.delay_s - bandwidth_s) * grid.rate_hz
-        self._filter = running_filter(LowPass(config.bandwidth_hz, config.resonance_hz), grid.step_s)
+        self._filter = running_filter(low_pass_poles(config.bandwidth_hz, config.resonance_hz), grid.step_s)
         self._noise_rms = noise_rms
         self._full_scale = config.full_scale_v * config.units_per_volt(role.unit)
         self._full_scale_v = config.full_scale_v
