@@ -8,13 +8,13 @@ answers. One busy process runs per core. The script prints the missing samples a
 flags.
 """
 
-import os
-import subprocess
 import sys
 import tempfile
 import time
 from contextlib import ExitStack
 from pathlib import Path
+
+from time_to_silence import busy
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineClient, EngineState, Supervision, start_engine
@@ -24,7 +24,6 @@ from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 
 RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
-BUSY = "while True: sum(i * i for i in range(100_000))"
 
 
 def campaign(duration_s: float) -> Campaign:
@@ -61,10 +60,7 @@ def main() -> None:
         client.start()
         while client.status().samples == 0:
             time.sleep(0.05)
-        for _ in range(os.cpu_count() or 1):
-            busy = subprocess.Popen([sys.executable, "-c", BUSY])
-            stack.callback(busy.wait)
-            stack.callback(busy.kill)
+        stack.enter_context(busy())
         frozen_viewer(stack, EngineClient.attach(engine.address))
         began_s = time.monotonic()
         while (status := client.status()).state is not EngineState.READY:

@@ -29,7 +29,8 @@ LOST_M = 5e-6
 MICRO = 1e6
 
 
-def _world() -> ModuleType:
+def load_world() -> ModuleType:
+    """Load the simulation of the tests, which knows the true motion."""
     path = ROOT / "tests" / "analysis" / "hidden_motion" / "shaken_world.py"
     spec = importlib.util.spec_from_file_location("shaken_world", path)
     assert spec is not None
@@ -186,7 +187,7 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=1001)
     parser.add_argument("--only", default="", help="lines whose name holds this")
     asked = parser.parse_args()
-    world = _world()
+    world = load_world()
     print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")
     seed = asked.first_seed
     for line in (each for each in LINES if asked.only in each.name):

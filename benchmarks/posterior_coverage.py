@@ -9,9 +9,7 @@ recording is simulated. A draw without enough impacts is drawn again.
 """
 
 import argparse
-import importlib.util
 import math
-import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
@@ -19,18 +17,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from hidden_motion import load_world
 
 import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError
 from vibench.analysis.fit.statistical_numbers import statistical_numbers
 from vibench.analysis.hidden_motion import Hidden, tracked_specimen, value_of
-from vibench.sim import Hertz, Specimen, gong2025
+from vibench.sim import Hertz, Specimen, gong2025, wilson_share
 
-WORLD = Path(__file__).parents[1] / "tests" / "analysis" / "hidden_motion" / "shaken_world.py"
 RECORDED_S, BEGIN_S, RATE_HZ = 1.8, 0.5, 25_600.0
 FEWEST_IMPACTS = 100
-CONFIDENCE_Z = 1.96
 
 
 def other(specimen: Specimen, rng: np.random.Generator, shares: tuple[float, ...]) -> Specimen:
@@ -98,14 +95,6 @@ def check_draw(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, 
         return f"{words}: distance {distance:.2f}: {told}", held
 
 
-def wilson(held: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a share."""
-    z2 = CONFIDENCE_Z**2
-    middle = (held + z2 / 2) / (count + z2)
-    half = CONFIDENCE_Z / (count + z2) * math.sqrt(held * (count - held) / count + z2 / 4)
-    return middle - half, middle + half
-
-
 def coverage_lines(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
     """Yield for each parameter how often its bounds contain the truth."""
     by_name: dict[str, list[bool | None]] = defaultdict(list)
@@ -116,9 +105,9 @@ def coverage_lines(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
     for name, answers in by_name.items():
         told = [each for each in answers if each is not None]
         if told:
-            low, high = wilson(sum(told), len(told))
-            share = f"{100 * sum(told) / len(told):.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"
-            yield f"{name}: told in {len(told)} of {len(answers)}, held in {sum(told)} = {share}"
+            share = wilson_share(sum(told), len(told))
+            shown = f"{100 * share.share:.1f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
+            yield f"{name}: told in {len(told)} of {len(answers)}, held in {sum(told)} = {shown}"
         else:
             yield f"{name}: never told"
     yield f"refused: {sum(not each for each in found)} of {len(found)}"
@@ -131,10 +120,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--shard", default="1/1", help="i/n: every nth draw, from the ith")
     asked = parser.parse_args()
-    spec = importlib.util.spec_from_file_location("shaken_world", WORLD)
-    world = importlib.util.module_from_spec(spec)
-    sys.modules["shaken_world"] = world
-    spec.loader.exec_module(world)
+    world = load_world()
     shard, shards = (int(part) for part in asked.shard.split("/"))
     found = []
     for index in range(shard - 1, asked.draws, shards):

@@ -11,13 +11,14 @@ and open files at every tenth of the night, the result of every point, and the s
 """
 
 import os
-import resource
 import sys
 import tempfile
 import time
 from collections import Counter
 from contextlib import closing
 from pathlib import Path
+
+from sustained_recording import resident_mb
 
 from vibench.acquisition import RecordingError
 from vibench.acquisition.campaign import (
@@ -145,14 +146,6 @@ def main() -> None:
                 orders = orders.model_copy(update={"existing": ExistingRecordings.RESUME})
         account.print_summary()
         print(f"faults played: {len(engine.played_faults)}; load {os.getloadavg()[0]:.1f}")
-
-
-def resident_mb() -> float:
-    """Return the present memory of the process [MB]."""
-    for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines():
-        if line.startswith("VmRSS:"):
-            return int(line.split()[1]) / 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def open_files() -> int:

@@ -278,7 +278,7 @@ def idle(_: WatchedRun) -> Iterator[None]:
 
 
 @contextmanager
-def busy(_: WatchedRun) -> Iterator[None]:
+def busy(_: WatchedRun | None = None) -> Iterator[None]:
     """Run one busy process per core."""
     with ExitStack() as stack:
         for _ in range(os.cpu_count() or 1):
