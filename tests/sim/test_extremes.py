@@ -123,6 +123,12 @@ def test_any_contact_stiffness_is_solved_within_its_accuracy(contact, factor):
         assert distance(finals[2], as_written(specimen, DRIVE, 0.02)) < 1e-6
 
 
+def with_scaled_mass(specimen, place, factor):
+    masses = list(specimen.masses)
+    masses[place] *= factor
+    return replace(specimen, masses=tuple(masses))
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
@@ -130,12 +136,8 @@ def test_any_contact_stiffness_is_solved_within_its_accuracy(contact, factor):
     "contact", ["hertz", *(pytest.param(law, marks=pytest.mark.slow) for law in SPRINGY[1:])]
 )
 def test_mass_ratios_of_a_million_agree_with_direct_integration(contact, factor, place):
-    masses = list(paper(contact).masses)
-    masses[place] *= factor
-    specimen, start = (
-        replace(paper(contact, gap_m=1e-6), masses=tuple(masses)),
-        [0.0, 0.0, 0.0, 0.0, 0.1, 0.0],
-    )
+    specimen = with_scaled_mass(paper(contact, gap_m=1e-6), place, factor)
+    start = [0.0, 0.0, 0.0, 0.0, 0.1, 0.0]
     if (factor, place) == (1e-6, 1):
         # The damper stops such a light m1 at once, so it starts on the stop.
         start[1] = 1e-6
@@ -149,9 +151,8 @@ def test_mass_ratios_of_a_million_agree_with_direct_integration(contact, factor,
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.8", "rigid:1", "power:47"])
 def test_mass_ratios_of_a_million_with_other_laws_agree_between_accuracies(contact, factor, place):
-    masses = list(paper(contact).masses)
-    masses[place] *= factor
-    specimen, drive = replace(paper(contact, gap_m=5e-6), masses=tuple(masses)), Harmonic(430.0, 50e-6)
+    specimen = with_scaled_mass(paper(contact, gap_m=5e-6), place, factor)
+    drive = Harmonic(430.0, 50e-6)
     finals = [
         integrate(specimen, drive, 0.002, level, max_impact_rate_hz=1e7).final_state for level in Accuracy
     ]

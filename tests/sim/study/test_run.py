@@ -138,12 +138,17 @@ class SolverThatFailsAt:
         return solve_scene(scene)
 
 
-def test_an_error_in_one_scene_affects_only_its_point(small, truth):
-    store = MemoryStore(small)
-    executor = ThreadExecutor(2, SolverThatFailsAt(200.0))
-    assert run_study(small, executor, store) is StudyEnd.COMPLETE
+def run_with(solver, study, *how):
+    """Run a study with a solver; return how the run ended and its results."""
+    store, executor = MemoryStore(study), ThreadExecutor(2, solver)
+    end = run_study(study, executor, store, *how)
     executor.close()
-    results = results_of(small, store.arrays)
+    return end, results_of(study, store.arrays)
+
+
+def test_an_error_in_one_scene_affects_only_its_point(small, truth):
+    end, results = run_with(SolverThatFailsAt(200.0), small)
+    assert end is StudyEnd.COMPLETE
     state = results.state[0, 0, 0]
     assert np.all(state[..., 0] == PointState.FAILED)
     assert np.all(state[..., 1:] == PointState.DONE)
@@ -170,11 +175,7 @@ class SolverThatStops:
 
 
 def test_a_run_that_did_not_reach_its_end_is_marked_as_stopped(small):
-    store = MemoryStore(small)
-    executor = ThreadExecutor(1, SolverThatStops())
-    run_study(small, executor, store)
-    executor.close()
-    results = results_of(small, store.arrays)
+    _, results = run_with(SolverThatStops(), small)
     assert np.all(results.state == PointState.STOPPED)
     assert {each.outcome for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS}
     assert {each.ended for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS.text}
@@ -189,11 +190,8 @@ def test_a_cancelled_study_stops_at_once_and_keeps_its_finished_points(study, re
         begun.append(scene)
         return solve_scene(scene)
 
-    store = MemoryStore(study)
-    executor = ThreadExecutor(2, solver)
-    end = run_study(study, executor, store, seen.append, lambda: seen[-1].done >= 10 if seen else False)
+    end, results = run_with(solver, study, seen.append, lambda: seen[-1].done >= 10 if seen else False)
     assert end is StudyEnd.CANCELLED
-    results = results_of(study, store.arrays)
     kept = int(np.count_nonzero(results.state))
     assert 10 <= kept < study.grid.size
     # Every point that had begun was finished and stored; no point began afterwards.
