@@ -75,6 +75,16 @@ class MeasuredLevel:
         """Return whether the amplitude deviates from ``target`` by at most ``tolerance`` times ``target``."""
         return Hold.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Hold.OUTSIDE
 
+    def correction(self, level: BaseLevel, target: float) -> float:
+        """Return the factor for the generator setting; 1 if the level error is small or may be random."""
+        if self.amplitude <= 0.0:
+            return 1.0
+        dead = max(_DEAD_SHARE * level.tolerance, _SURE * self.uncertainty / target)
+        if abs(self.amplitude / target - 1) <= dead:
+            return 1.0
+        factor = (target / self.amplitude) ** _GAIN
+        return float(min(max(factor, 1 / level.most_change), level.most_change))
+
 
 def measured_level(base: Phasors) -> MeasuredLevel:
     """Return the mean fundamental of ``base``, shape (periods,), with its uncertainty from batches."""
@@ -88,26 +98,3 @@ def measured_level(base: Phasors) -> MeasuredLevel:
     length = len(base) // _BATCHES
     batches = along[len(base) - length * _BATCHES :].reshape(_BATCHES, length).mean(axis=1)
     return MeasuredLevel(amplitude, float(batches.std(ddof=1)) / sqrt(_BATCHES))
-
-
-@dataclass(frozen=True)
-class LevelControl:
-    """Quasi-static control of the base level, with one correction after each measurement."""
-
-    level: BaseLevel
-    most_vpp: float
-    """Largest amplitude setting that the plan allows [Vpp]."""
-    least_vpp: float
-    """Smallest amplitude setting that the generator accepts [Vpp]."""
-
-    def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Return the next generator setting [Vpp]; unchanged if the level error is small or may be random."""
-        if measured.amplitude <= 0.0:
-            return setting_vpp
-        error = abs(measured.amplitude / target - 1)
-        dead = max(_DEAD_SHARE * self.level.tolerance, _SURE * measured.uncertainty / target)
-        if error <= dead:
-            return setting_vpp
-        most = self.level.most_change
-        factor = min(max((target / measured.amplitude) ** _GAIN, 1 / most), most)
-        return float(min(max(setting_vpp * factor, self.least_vpp), self.most_vpp))

@@ -13,7 +13,6 @@ from ..plan import LOOK_PERIODS, RunState, needed_vpp
 from ..recording import Hold, LockResult, ResonanceNote, Steadiness
 from ..rig import OnTable
 from .control_action import Controller
-from .feedback_channels import require_answer
 from .phase_law import LearntMode, PhaseError, PhaseLaw, PhaseResonance, PhaseSearch, TrackedPlace
 from .settling_controller import SettledState, SettlingController, record_and_judge, record_settled
 from .sine_loop import SineLoop, move, start
@@ -145,7 +144,7 @@ def _go_on(
         radians(left_deg) * mode.half_width_hz,
         -degrees(1.0) / mode.half_width_hz,
     )
-    _say(loop, plan, number, found, Track(resonance, None, lock, looks, periods))
+    _say(loop, plan, number, found, resonance, lock, tries=looks, periods=periods)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, mode)
 
 
@@ -161,13 +160,13 @@ def _lock(
         now = loop.setting
         yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / loop.motion_hz)
         base, seen = controller.mean_level(), controller.settled_state(0.0)
-        require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
+        loop.require_answer(base.amplitude)
         error_rad, left = law.see(now.frequency_hz, seen)
         is_on = abs(error_rad) <= tolerance_rad and left <= most_left and seen.held is Hold.WITHIN
         in_a_row = in_a_row + 1 if is_on else 0
         if in_a_row == _LOOKS_LOCKED:
             return look, LockResult.LOCKED
-        setting_vpp = controller.prompt_vpp(base, now.frequency_hz)
+        setting_vpp = controller.prompt_vpp(base)
         frequency_hz = law.next_hz(now.frequency_hz, base.amplitude * setting_vpp / now.setting_vpp)
         loop.change(frequency_hz, setting_vpp)
     return looks, None if abs(error_rad) > _LOST_RAD else LockResult.LOST
@@ -233,7 +232,7 @@ def _search(
         found = yield from controller.settle()
     yield from record_settled(controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
     periods = round(sum(each.waited_s * each.drive_hz for each in states))
-    _say(loop, plan, number, found, Track(resonance, mode, lock, len(search.tries), periods))
+    _say(loop, plan, number, found, resonance, lock, tries=len(search.tries), periods=periods, mode=mode)
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
@@ -242,18 +241,6 @@ def _search(
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
-
-
-@dataclass(frozen=True)
-class Track:
-    """Result of resonance tracking at one base level."""
-
-    resonance: PhaseResonance
-    mode: Mode | None
-    lock: LockResult
-    tries: int
-    periods: int
-    """Number of drive periods that the measurement took."""
 
 
 def _flanks(
@@ -326,19 +313,30 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
 
-def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Track) -> None:
-    lock = tracked.lock
+def _say(
+    loop: SineLoop,
+    plan: ResonanceTracking,
+    number: int,
+    found: SettledState,
+    resonance: PhaseResonance,
+    lock: LockResult,
+    *,
+    tries: int,
+    periods: int,
+    mode: Mode | None = None,
+) -> None:
+    """Note the result at one level; the measurement took so many ``periods`` of the drive."""
     if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
         lock = LockResult.LOST
     is_locked = lock is LockResult.LOCKED
-    resonance, mode = (tracked.resonance, tracked.mode) if is_locked else (None, None)
+    mode = mode if is_locked else None
     base_m = found.base.amplitude / (2 * pi * found.drive_hz) ** 2
     loop.note(
         ResonanceNote(
             level=number,
             asked_m_per_s2=plan.accelerations_m_per_s2[number],
-            frequency_hz=None if resonance is None else resonance.frequency_hz,
-            frequency_u_hz=None if resonance is None else resonance.uncertainty_hz,
+            frequency_hz=resonance.frequency_hz if is_locked else None,
+            frequency_u_hz=resonance.uncertainty_hz if is_locked else None,
             at_hz=found.drive_hz,
             phase_deg=degrees(float(np.angle(plan.motion(found.harmonics)))),
             response_ii=found.response,
@@ -346,8 +344,8 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             base_u=found.base.uncertainty,
             held=found.held,
             motion=found.judgement.steadiness,
-            tries=tracked.tries,
-            periods=tracked.periods,
+            tries=tries,
+            periods=periods,
             lock=lock,
             mode_hz=None if mode is None else mode.frequency_hz,
             mode_u_hz=None if mode is None else mode.frequency_u_hz,

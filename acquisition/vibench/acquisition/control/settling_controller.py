@@ -20,8 +20,7 @@ from ..recording import (
     Steadiness,
     SweepNote,
 )
-from .control_action import Controller, LevelControl, MeasuredLevel, measured_level
-from .feedback_channels import require_answer
+from .control_action import Controller, MeasuredLevel, measured_level
 from .sine_loop import GainEstimator, SineLoop, start, track, update_track
 from .steadiness import ORDERS, Judgement, Phasors, in_drives, judgement_of
 
@@ -176,13 +175,12 @@ class SettlingController:
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
-    def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Return the generator setting [Vpp] for the base level at ``frequency_hz``, ignoring uncertainty."""
+    def prompt_vpp(self, measured: MeasuredLevel) -> float:
+        """Return the next generator setting [Vpp] for the base level, ignoring its uncertainty."""
         assert self.level is not None
-        control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
-        seen = MeasuredLevel(measured.amplitude, 0.0)
         now_vpp = self.loop.setting.setting_vpp
-        next_vpp = control.next_vpp(now_vpp, seen, self.level.acceleration_at(frequency_hz))
+        certain = MeasuredLevel(measured.amplitude, 0.0)
+        next_vpp = self.loop.bounded_vpp(now_vpp * certain.correction(self.level, self._target))
         return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
     def hold_state(self, measured: MeasuredLevel) -> Hold:
@@ -202,13 +200,12 @@ class SettlingController:
             return False
         now = self.loop.setting
         measured = self.mean_level()
-        require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
+        self.loop.require_answer(measured.amplitude)
         level = self.level
         if self.loop.settling_order is not None:
             # The phase of a single order depends on the level, so all compared periods need the same level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
-        control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
-        next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
+        next_vpp = self.loop.bounded_vpp(now.setting_vpp * measured.correction(level, self._target))
         if next_vpp == now.setting_vpp:
             return False
         self.loop.change(now.frequency_hz, next_vpp)
@@ -259,7 +256,6 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     controller = SettlingController(loop, plan.settling, plan.base_level)
     yield from start(loop, plan.frequency_hz, plan.base_level)
     yield from controller.settle()
-    control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
     pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
     outside = 0
@@ -269,7 +265,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
         piece_s = min(plan.update_s, plan.duration_s - begun_s)
         yield from loop.listen(RunState.RECORDING, piece_s, plan.segment)
         measured = measured_level(loop.periods.base)
-        require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
+        loop.require_answer(measured.amplitude)
         held = controller.hold_state(measured)
         outside += held is Hold.OUTSIDE
         loop.note(
@@ -282,7 +278,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
             )
         )
         # Average over all pieces since the last change of the drive, because chaos needs a long average.
-        next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
+        next_vpp = loop.bounded_vpp(loop.setting.setting_vpp * measured.correction(plan.base_level, target))
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
     loop.note(DwellNote(segment=SegmentLabel.DWELL, looks=pieces, looks_outside=outside))

@@ -165,6 +165,10 @@ class SineLoop:
         """Return a setting, limited to the generator's smallest and the plan's largest setting [Vpp]."""
         return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
+    def require_answer(self, acceleration: float) -> None:
+        """Raise LimitExceeded if the base's fundamental ``acceleration`` [m/s2] is too small."""
+        require_answer(self.rig, self.setting.frequency_hz, self.setting.setting_vpp, acceleration)
+
     def forget(self) -> None:
         """Discard the measured periods, so that only later periods are evaluated."""
         self._scope.forget()
@@ -266,8 +270,7 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
         return
     now = loop.setting
     if loop.periods.count:
-        acceleration = abs(complex(np.mean(loop.periods.base)))
-        require_answer(loop.rig, now.frequency_hz, now.setting_vpp, acceleration)
+        loop.require_answer(abs(complex(np.mean(loop.periods.base))))
     target = level.acceleration_at(now.frequency_hz)
     modelled = target * now.setting_vpp / _bare_vpp(loop, level, now.frequency_hz)
     estimator.add(loop.elapsed_s, loop.periods.base, modelled, target)
@@ -312,7 +315,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         yield from loop.listen(RunState.SETTLING, stretch_s)
         waited_s += stretch_s
         response_m, _, base = response_of(loop, plan)
-        require_answer(loop.rig, frequency_hz, loop.setting.setting_vpp, base)
+        loop.require_answer(base)
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
