@@ -3,8 +3,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control.jump_controller import JumpBracket
-from vibench.acquisition.control.settling_controller import LocatedJump, SettledPoint, is_on_branch, side
+from vibench.acquisition.control.jump_controller import JumpBracket, LocatedJump, is_on_branch, side
+from vibench.acquisition.control.settling_controller import SettledPoint
 from vibench.acquisition.recording import JumpSide
 
 

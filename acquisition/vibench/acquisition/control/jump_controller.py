@@ -6,22 +6,14 @@ If the motion stays on the other branch, the drive is lowered until that motion 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from math import inf, log
 
 from ..excitation.settled_sine import SettledSine
 from ..excitation.steps import Segment
 from ..plan import RunState
 from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
 from .control_action import Controller
-from .settling_controller import (
-    LocatedJump,
-    SettledPoint,
-    SettledState,
-    SettlingController,
-    is_on_branch,
-    ratio,
-    record_settled,
-    side,
-)
+from .settling_controller import SettledPoint, SettledState, SettlingController, record_settled
 from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
@@ -41,6 +33,56 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
     for rung in range(RUNGS - 1, -1, -1):
         loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
         yield from loop.listen(RunState.SETTLING, _RUNG_S)
+
+
+@dataclass(frozen=True)
+class LocatedJump:
+    """A jump between two settled frequencies of one pass."""
+
+    before: SettledPoint
+    after: SettledPoint
+
+    @property
+    def frequency_hz(self) -> float:
+        """Middle of the frequency interval that contains the jump [Hz]."""
+        return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
+
+    def is_narrow(self, resolution_hz: float) -> bool:
+        """Whether the interval is no wider than ``resolution_hz``."""
+        return abs(self.after.frequency_hz - self.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
+
+    def is_jump(self, factor: float) -> bool:
+        """Whether the response changes by more than ``factor`` across the bracket."""
+        return ratio(self.before, self.after) > factor
+
+
+def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
+    """Return whether a point between the ends of a jump belongs before or after the jump.
+
+    It belongs before if, of the three responses, its own and that of ``before`` are the nearest pair. A jump
+    to a third branch counts as after.
+    """
+    away = ratio(point, before)
+    return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
+
+
+def ratio(one: SettledPoint, other: SettledPoint) -> float:
+    """Return the ratio of larger to smaller response; 1 if both are equal, infinite if only one is zero."""
+    if min(one.response, other.response) <= 0.0:
+        return 1.0 if one.response == other.response else inf
+    return float(2.0 ** abs(log(one.response / other.response, 2)))
+
+
+def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
+    """Return whether a point is on the same branch as an earlier point at the same frequency.
+
+    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so the
+    limit is half of this factor in decibels. Repeated measurements of a chaotic motion scatter more than
+    those of a periodic one: their limit is the whole factor.
+    """
+    if point.period != expected.period:
+        return False
+    return bool(ratio(point, expected) < (factor if point.period == 0 else factor**0.5))
 
 
 _MOST_BRACKETS = 4

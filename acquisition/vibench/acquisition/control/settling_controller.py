@@ -1,7 +1,7 @@
 """Wait until a motion has settled, while feedback brings the base to its level and holds it there."""
 
 from dataclasses import dataclass
-from math import ceil, inf, isfinite, log
+from math import ceil, isfinite
 
 from ..excitation.feedback import BaseLevel, Settling
 from ..excitation.held_dwell import HeldDwell
@@ -12,7 +12,6 @@ from ..recording import (
     DwellNote,
     ExcursionNote,
     Hold,
-    JumpSide,
     LevelNote,
     SegmentLabel,
     SegmentNote,
@@ -33,56 +32,6 @@ class SettledPoint:
     response: float
     period: int = 1
     """Number of drive periods after which the motion repeats; 0 if it does not."""
-
-
-@dataclass(frozen=True)
-class LocatedJump:
-    """A jump between two settled frequencies of one pass."""
-
-    before: SettledPoint
-    after: SettledPoint
-
-    @property
-    def frequency_hz(self) -> float:
-        """Middle of the frequency interval that contains the jump [Hz]."""
-        return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
-
-    def is_narrow(self, resolution_hz: float) -> bool:
-        """Whether the interval is no wider than ``resolution_hz``."""
-        return abs(self.after.frequency_hz - self.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
-
-    def is_jump(self, factor: float) -> bool:
-        """Whether the response changes by more than ``factor`` across the bracket."""
-        return ratio(self.before, self.after) > factor
-
-
-def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
-    """Return whether a point between the ends of a jump belongs before or after the jump.
-
-    It belongs before if, of the three responses, its own and that of ``before`` are the nearest pair. A jump
-    to a third branch counts as after.
-    """
-    away = ratio(point, before)
-    return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
-
-
-def ratio(one: SettledPoint, other: SettledPoint) -> float:
-    """Return the ratio of larger to smaller response; 1 if both are equal, infinite if only one is zero."""
-    if min(one.response, other.response) <= 0.0:
-        return 1.0 if one.response == other.response else inf
-    return float(2.0 ** abs(log(one.response / other.response, 2)))
-
-
-def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
-    """Return whether a point is on the same branch as an earlier point at the same frequency.
-
-    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so the
-    limit is half of this factor in decibels. Repeated measurements of a chaotic motion scatter more than
-    those of a periodic one: their limit is the whole factor.
-    """
-    if point.period != expected.period:
-        return False
-    return bool(ratio(point, expected) < (factor if point.period == 0 else factor**0.5))
 
 
 _SURE = 2.0
