@@ -35,27 +35,6 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
         yield from loop.listen(RunState.SETTLING, _RUNG_S)
 
 
-@dataclass(frozen=True)
-class LocatedJump:
-    """A jump between two settled frequencies of one pass."""
-
-    before: SettledPoint
-    after: SettledPoint
-
-    @property
-    def frequency_hz(self) -> float:
-        """Middle of the frequency interval that contains the jump [Hz]."""
-        return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
-
-    def is_narrow(self, resolution_hz: float) -> bool:
-        """Whether the interval is no wider than ``resolution_hz``."""
-        return abs(self.after.frequency_hz - self.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
-
-    def is_jump(self, factor: float) -> bool:
-        """Whether the response changes by more than ``factor`` across the bracket."""
-        return ratio(self.before, self.after) > factor
-
-
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return whether a point between the ends of a jump belongs before or after the jump.
 
@@ -114,13 +93,26 @@ class JumpBracket:
     """Side of the jump on which the motion is now."""
 
     @property
-    def jump(self) -> LocatedJump:
-        """The jump between the two ends of the bracket."""
-        return LocatedJump(self.branch[-1], self.after)
+    def before(self) -> SettledPoint:
+        """The last point before the jump."""
+        return self.branch[-1]
+
+    @property
+    def frequency_hz(self) -> float:
+        """Middle of the frequency interval that contains the jump [Hz]."""
+        return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
+
+    def is_narrow(self, resolution_hz: float) -> bool:
+        """Whether the interval is no wider than ``resolution_hz``."""
+        return abs(self.after.frequency_hz - self.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
+
+    def is_jump(self, factor: float) -> bool:
+        """Whether the response changes by more than ``factor`` across the bracket."""
+        return ratio(self.before, self.after) > factor
 
     def narrow(self, point: SettledPoint) -> None:
         """Replace one end of the bracket by ``point``, which was measured between both ends."""
-        self.here = side(point, self.branch[-1], self.after)
+        self.here = side(point, self.before, self.after)
         if self.here is JumpSide.BEFORE:
             self.branch.append(point)
         else:
@@ -152,42 +144,42 @@ class JumpLocator:
         branches exist at the frequency of ``after``, the motion may end on either; the note states on which.
         """
         search = JumpBracket(list(points), after)
-        found, why = yield from self._bisect(search)
-        is_jump = found.is_jump(self._rule.factor)
+        why = yield from self._bisect(search)
+        is_jump = search.is_jump(self._rule.factor)
         end = yield from _settle_at(self._controller, self._plan, after.frequency_hz)
         point = end.point
         has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
-        self._say(found, why, branch)
+        self._say(search, why, branch)
         return point, is_jump and has_arrived
 
-    def _bisect(self, search: JumpBracket) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
+    def _bisect(self, search: JumpBracket) -> Controller[JumpSearchEnd]:
         for _ in range(_MOST_BRACKETS):
-            found = yield from self._halve(search)
-            if found is not None:
-                return found
-        return search.jump, JumpSearchEnd.ELSEWHERE
+            why = yield from self._halve(search)
+            if why is not None:
+                return why
+        return JumpSearchEnd.ELSEWHERE
 
-    def _halve(self, search: JumpBracket) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
+    def _halve(self, search: JumpBracket) -> Controller[JumpSearchEnd | None]:
         """Halve the bracket until it is narrow enough; return None if the motion left its branch early."""
-        while not search.jump.is_narrow(self._rule.resolution_hz):
+        while not search.is_narrow(self._rule.resolution_hz):
             if search.here is JumpSide.AFTER:
                 match (yield from self._return_to_branch(search)):
                     case _Return.NOT_FOUND if not self._is_late():
-                        return search.jump, JumpSearchEnd.BRANCH_LOST
+                        return JumpSearchEnd.BRANCH_LOST
                     case _Return.LEFT:
                         return None
             if self._is_late():
-                return search.jump, JumpSearchEnd.OUT_OF_TIME
+                return JumpSearchEnd.OUT_OF_TIME
             numbers: dict[str, int | str] = {"direction": self._direction, "pass": self._number}
-            middle_hz = search.jump.frequency_hz
+            middle_hz = search.frequency_hz
             point = yield from _record_at(
                 self._controller, self._plan, middle_hz, SegmentLabel.SEARCH, numbers
             )
             search.narrow(point)
-            if not search.jump.is_jump(self._rule.factor):
-                return search.jump, JumpSearchEnd.STEEP
-        return search.jump, JumpSearchEnd.LOCALISED
+            if not search.is_jump(self._rule.factor):
+                return JumpSearchEnd.STEEP
+        return JumpSearchEnd.LOCALISED
 
     def _return_to_branch(self, search: JumpBracket) -> Controller[_Return]:
         """Go back along the pass until the motion is on its branch again, then forward to the branch's end.
@@ -244,7 +236,7 @@ class JumpLocator:
         step_s = self._plan.settling.longest_wait_s
         return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
-    def _say(self, found: LocatedJump, how: JumpSearchEnd, arrived: JumpSide) -> None:
+    def _say(self, found: JumpBracket, how: JumpSearchEnd, arrived: JumpSide) -> None:
         self._controller.loop.note(
             JumpNote(
                 direction=self._direction,
