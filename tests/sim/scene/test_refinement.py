@@ -1,5 +1,6 @@
 """Predictions with an error or time target reach it and have correct error bounds."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_a_mean_over_initial_states_is_called_chaotic_only_if_perturbations_grow
 
 
 def test_predictions_improve_until_the_requested_time_is_over():
-    answers = list(refine_scene(target_scene(frequency_hz=242.0, amplitude_m=5e-6, error=1e-6, time_s=0.4)))
+    answers = list(refine_scene(target_scene(frequency_hz=242.0, amplitude_m=5e-6, error=1e-3, time_s=0.4)))
     reports = [each.target for each in answers]
     assert len(answers) > 1
     assert reports[0].time_s < reports[-1].time_s
@@ -132,7 +133,16 @@ def test_an_error_below_rounding_is_reported_as_unreachable():
     report = solve_scene(target_scene(error=1e-15)).target
     assert not report.is_met
     assert report.needed_s is None
-    assert report.text.endswith("is not known")
+    assert not report.is_reachable
+    assert report.text.endswith("; 1e-13 % is not reachable")
+
+
+def test_an_unreachable_error_of_a_mean_over_initial_states_is_recognised_at_once():
+    began_s = time.thread_time()
+    report = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=1e-12)).target
+    assert time.thread_time() - began_s < 5.0
+    assert 1e-4 < report.error < 0.1
+    assert report.text.endswith("; 1e-10 % is not reachable")
 
 
 def test_the_error_of_a_prediction_during_a_transient_includes_the_transient():

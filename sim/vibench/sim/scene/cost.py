@@ -23,7 +23,7 @@ import numpy as np
 from ..engine.library import physics_digest
 from ..operating_system.this import replace_file, state_folder, state_place
 from .plan import ScenePlan, plan_scene
-from .refinement import LONGEST_S, refine_to_end
+from .refinement import HOPELESS_S, LONGEST_S, refine_to_end, takes_too_long
 from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
@@ -250,6 +250,8 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
     taken_s = time.monotonic() - began_s
     if taken_s < tried_s or (report.is_met and scene.target.error is not None):
         return taken_s
+    if takes_too_long(replace(report, wanted_time_s=scene.target.time_s)):
+        return HOPELESS_S
     if report.needed_s is not None:
         return min(limit_s, report.needed_s[0])
     # Without a requested error, a scene uses its whole time limit.

@@ -114,6 +114,8 @@ class TargetReport:
     needed_s: tuple[float, float, float] | None
     """Computing time for the requested error [s]: estimate, lower and upper limit. None if unknown, or if
     more time does not reduce the error."""
+    is_reachable: bool = True
+    """Whether more time may reach the requested error; False if that takes more than ten days."""
 
     @property
     def text(self) -> str:
@@ -125,6 +127,8 @@ class TargetReport:
             return f"{reached} reached in {_seconds(self.time_s)}"
         sentence = f"{reached} after {_seconds(self.time_s)}"
         wanted = _percent(self.wanted_error or 0.0)
+        if not self.is_reachable:
+            return f"{sentence}; {wanted} is not reachable"
         if self.needed_s is None:
             return f"{sentence}; the time for {wanted} is not known"
         about, low, high = (_short(each) for each in self.needed_s)

@@ -49,8 +49,10 @@ from .shares import student_quantile
 from .solve import Question, solve_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
-LONGEST_S = 60.0
-"""Default limit of the computing time [s]."""
+LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
+"""Default limit of the computing time, and computing time above which an error is out of reach [s]."""
+HOPELESS_S = 2.0
+"""Computing time without a requested time, if the requested error takes longer than the default limit [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
 """Time after which a first result is due [s], and nominal cost it may use even after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
@@ -105,12 +107,18 @@ class _Clock:
         starts: int = 1,
         needed: tuple[float, float, float] | None = None,
         windows: int = 1,
+        *,
+        is_final: bool = False,
     ) -> ScenePrediction:
-        """Return the prediction, with its requested and reached error and time."""
+        """Return the prediction, with its requested and reached error and time.
+
+        ``is_final`` is True if more time does not reduce the error.
+        """
         error, target = found.error_estimate, self._target
         is_met = error is not None and (target.error is None or error <= target.error)
-        taken_s = self.time_s
-        report = TargetReport(target.error, target.time_s, error, taken_s, starts, windows, is_met, needed)
+        may_reach = is_met or not (is_final if needed is None else needed[1] > OUT_OF_REACH_S)
+        wanted, taken_s = (target.error, target.time_s), self.time_s
+        report = TargetReport(*wanted, error, taken_s, starts, windows, is_met, needed, may_reach)
         return replace(found, target=report)
 
 
@@ -149,8 +157,9 @@ class _Path:
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     """Yield results of a scene with a target, each better than the one before.
 
-    Raises ValueError when the scene has no target, the specimen cannot be simulated, or the requested time is
-    too short for one drive period.
+    Without a requested time, they end after a minute, or after two seconds if the requested error certainly
+    takes longer than a minute. Raises ValueError when the scene has no target, the specimen cannot be
+    simulated, or the requested time is too short for one drive period.
 
     """
     if scene.target is None:
@@ -160,9 +169,14 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     if plan_of(scene, motion).method is Method.CLOSED_FORM:
         found = solve_closed_form(scene, motion, Question.ANSWER)
-        yield clock.report(found)
+        yield clock.report(found, is_final=True)
         return
     yield from _Refinement(scene, motion, clock).answers()
+
+
+def takes_too_long(report: TargetReport) -> bool:
+    """Return whether an error requested without a time certainly takes longer than the default limit."""
+    return report.wanted_time_s is None and report.needed_s is not None and report.needed_s[1] > LONGEST_S
 
 
 def refine_to_end(scene: Scene) -> ScenePrediction:
@@ -409,7 +423,7 @@ class _Refinement:
             memory=StartMemory.KEPT,
             section=self._section(orbit.section),
         )
-        return self._clock.report(found)
+        return self._clock.report(found, is_final=True)
 
     def _section(self, states: Floats) -> Floats | None:
         """Return the states once per drive period if a Poincaré section was requested, otherwise None."""
@@ -455,7 +469,7 @@ class _Refinement:
             integration_error=float(off.max()),
             section=self._section(states_of(window.stretches)),
         )
-        return self._clock.report(found)
+        return self._clock.report(found, is_final=run.tolerance == TIGHT)
 
     def _one_start(self) -> Iterator[ScenePrediction]:
         """Yield results for a motion that does not repeat and does not depend sensitively on its start."""
@@ -503,6 +517,7 @@ class _Refinement:
                 is_enough = len(starts) >= FIRST_STARTS and self._target.error is not None
                 if is_enough and found.target.is_met:
                     return
+                is_over = is_over or (takes_too_long(found.target) and self._clock.time_s > HOPELESS_S)
             if is_over:
                 if self._is_lost and not self._has_answered:
                     yield self._lost_result()
