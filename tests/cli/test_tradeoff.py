@@ -1,5 +1,7 @@
 """`vibench tradeoff` for a user's case: error over time for every applicable method."""
 
+import time
+
 import pytest
 
 
@@ -29,6 +31,22 @@ def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(output_o
 def test_an_impossible_scene_is_refused_with_a_readable_message(refusal, tmp_path, arguments, said):
     assert said in refusal("tradeoff", *arguments)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [(1e-4, 1000, "power:47", 0.0, 4.5e-5), (1e-9, 94.6, "linear", 1e-9, 1e-12)],
+    ids=["chaos", "linear"],
+)
+def test_the_tradeoff_of_a_scene_ends_within_the_requested_time(output_of, scene):
+    amplitude_m, frequency_hz, law, damping_s, gap_m = scene
+    options = ("--model", law, "--damping-time", damping_s, "--gap", gap_m, "--time", "0.4s", "--json")
+    asked = ("tradeoff", "--amplitude", amplitude_m, "--frequency", frequency_hz, *options)
+    output_of(*asked)  # loads modules
+    began_s = time.thread_time()
+    points = output_of(*asked)["points"]
+    assert time.thread_time() - began_s < 1.5 * 0.4
+    assert sum(each["is_chosen"] for each in points) == 1
 
 
 @pytest.mark.thorough

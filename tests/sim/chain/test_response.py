@@ -132,5 +132,14 @@ def test_a_requested_computing_time_is_met_even_if_a_window_takes_longer(contact
 
 def test_a_computing_time_too_short_for_a_drive_period_is_refused():
     chain = chain_of(gong2025(0.1, 10.0, "power:3"), 4)
+    began_s = time.thread_time()
     with pytest.raises(ValueError, match=r"one drive period of 4\.7619 s takes longer to compute"):
         chain_response_to(chain, Harmonic(0.21, 2.71e-7), None, 0.5)
+    assert time.thread_time() - began_s < 1.5 * 0.5
+
+
+def test_an_error_that_a_chain_cannot_reach_in_minutes_ends_the_run_early():
+    began_s = time.thread_time()
+    found = chain_response_to(chain_of(gong2025(), 2), Harmonic(220.0, 20e-6), 1e-12, None)
+    assert time.thread_time() - began_s < 20.0
+    assert np.all((found.errors > 1e-12) & (found.errors < 0.3))

@@ -2,18 +2,19 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from ..engine.run import check_time, time_limit
 from ..periodic.balance_branch import BalanceOptions, balance
 from ..periodic.first_order_balance import first_order_states
 from ..periodic.harmonic_balance import BalanceEnd, HarmonicSet, structure_of
 from ..periodic.restoring_force import PowerSpring, spring_of
 from ..periodic.shooting import ShootingEnd, periodic_orbit
 from ..scene.prediction import Method, ScenePrediction
-from ..scene.refinement import refine_scene
+from ..scene.refinement import LONGEST_S, refine_scene
 from ..scene.scene import AutomaticDuration, FixedDuration, Scene
 from ..scene.solve import solve_scene
 from ..specimen.accuracy import Accuracy
@@ -48,10 +49,16 @@ Answer = tuple[Floats, float | None]
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     """Yield error and computing time of all suitable methods for a scene with a target.
 
-    The first points are the successive results of `refine_scene`, until the target is met. Raises ValueError
-    when the scene has no target, or cannot be simulated.
+    The first points are the successive results of `refine_scene`, until the target is met. They take at most
+    half of the time limit; methods that exceed the rest of it are left out. Raises ValueError when the scene
+    has no target, or cannot be simulated.
     """
+    end_s = time.monotonic()
     next(refine_scene(scene))  # not timed: the first solution includes work done once per process
+    if scene.target is not None:
+        limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
+        end_s += limit_s
+        scene = replace(scene, target=replace(scene.target, time_s=0.5 * limit_s))
     refined, times_s, began_s = list[ScenePrediction](), list[float](), time.thread_time()
     for found in refine_scene(scene):
         refined.append(found)
@@ -70,8 +77,10 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     for method, answer in _methods(scene):
         began_s = time.thread_time()
         try:
-            given = answer()
-        except ValueError:
+            with time_limit(end_s):
+                check_time()
+                given = answer()
+        except (ValueError, TimeoutError):
             continue
         taken_s = time.thread_time() - began_s
         if given is None:
@@ -84,11 +93,11 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
 
 def _methods(scene: Scene) -> Iterator[tuple[str, Callable[[], Answer | None]]]:
     window_s = scene.duration.window_s
+    yield "first-order balance", partial(_first_order, scene)
     for level in Accuracy:
         yield f"30 s, {level}", partial(_solve, scene, level, partial(FixedDuration, window_s=window_s))
         yield f"until settled, {level}", partial(_solve, scene, level, partial(AutomaticDuration, window_s))
     yield "shooting", partial(_shoot, scene)
-    yield "first-order balance", partial(_first_order, scene)
     for tolerance in TOLERANCES:
         yield f"many-harmonic balance, {tolerance:g}", partial(_balance, scene, tolerance)
 

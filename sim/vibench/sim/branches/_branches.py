@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..engine.run import parts_within
 from ..periodic.balance_branch import (
     BalanceOptions,
     balance,
@@ -35,6 +36,8 @@ INTERPOLATED = 0.06
 length. It follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
 """Additional distance between scaled states that `lies_on` allows for rounding errors."""
+LATE, LEAST_LATE_S = 0.25, 0.1
+"""Time allowed to end a branch after the time limit: share of the limit, and smallest time [s]."""
 LENGTHS = 10.0
 """Length of the whole parameter range in the scaled units of branch following."""
 
@@ -113,20 +116,20 @@ def branches_from(
 ) -> Iterator[FoundBranch]:
     """Until a time limit, yield branches through motions on no known branch, and branches that fork off."""
     known: list[FoundBranch] = []
+    last_s = until_s + max(LEAST_LATE_S, LATE * (until_s - time.monotonic()))
     for value in np.linspace(*bounds, search.places):
         began = time.perf_counter()
-        for start in starts(Harmonic(*path.drive(float(value)))):
+        for start in parts_within(until_s, starts(Harmonic(*path.drive(float(value))))):
             fresh = [start]
-            while fresh and len(known) < search.most_branches:
-                if time.monotonic() > until_s:
-                    return
+            while fresh and len(known) < search.most_branches and time.monotonic() < until_s:
                 one = fresh.pop()
                 if any(lies_on(each, specimen, path, one.drive, one.states) for each in known):
                     continue
-                found = replace(follow(one), elapsed_s=time.perf_counter() - began)
-                known.append(found)
-                yield found
-                fresh += leaving(found)
+                # After ``until_s`` a branch ends at its next point, unless that takes too long.
+                for found in parts_within(last_s, map(follow, [one])):
+                    known.append(replace(found, elapsed_s=time.perf_counter() - began))
+                    yield known[-1]
+                    fresh += parts_within(until_s, leaving(known[-1]))
                 began = time.perf_counter()
 
 

@@ -2,11 +2,19 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import MAX_IMPACT_RATE_HZ, MOST_IMPACTS, SPARE_IMPACTS, Watch, native_engine
+from ..engine.run import (
+    MAX_IMPACT_RATE_HZ,
+    MOST_IMPACTS,
+    SPARE_IMPACTS,
+    Watch,
+    in_slices,
+    native_engine,
+)
 from ..engine.scene import collision_structure, fill_drive, power_structure
 from ..motion.integrate import ROUNDING, Trajectory, check_impact_rate, check_times, check_within, integrate
 from ..specimen.accuracy import Accuracy, AccuracyWord
@@ -21,6 +29,8 @@ STATES_PER_CELL = 6
 """Number of state variables of a cell: x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
 """Largest number of windows of a run; `check_work` usually refuses much shorter runs first."""
+SLICE_CELL_WINDOWS = 1 << 12
+"""Windows times cells between two checks of a time limit: some milliseconds of computing."""
 
 
 class ChainRun:
@@ -90,7 +100,9 @@ class ChainRun:
     def advance(self, until_s: float) -> Outcome:
         """Integrate the chain to a time [s] and return the outcome; do nothing if that time has passed."""
         self._motion["until"] = until_s
-        return Outcome(native_engine().call("follow_chain", self._motion))
+        follow = partial(native_engine().call, "follow_chain", self._motion)
+        most = max(1, SLICE_CELL_WINDOWS // len(self._states))
+        return Outcome(in_slices(follow, self._motion, "windows_left", most))
 
     @property
     def motion(self) -> Floats:

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..engine.run import time_limit
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
 from ..specimen.state import Complex, Floats
 from ._chain import Chain
-from ._integrate import integrate_chain
 from ._response import ChainResponse, chain_response
 
 WINDOW_S, FEWEST_WINDOWS = 0.25, 32
@@ -22,10 +22,12 @@ FEWEST_PAIRS, STUDENT = 8, 2.365
 """Smallest number of pairs of windows for an error estimate, and Student's t (95 %) for this number."""
 TOLERANCE_PART = 0.1
 """Largest part of the requested error that may come from the integration."""
-TRIED_S, TRIED_PART = 1e-4, 0.1
-"""Simulated time of the first speed trial [s], and largest part of the time limit spent on trials."""
-LONGEST_S = 60.0
-"""Default limit of the computing time of a chain [s]."""
+LONGEST_S, FIRST_S, FIRST_SHARE = 60.0, 0.1, 0.75
+"""Default limit of the computing time of a chain [s]. Its first period may take FIRST_S, or this share of the
+time limit if that is longer, because callers compute a second period."""
+HOPELESS, STEADILY = 10.0, 0.5
+"""Expected time over the default limit above which an error is out of reach, and error over that of half as
+many windows above which the error falls only with the square root of the time."""
 
 
 class TargetedResponse(NamedTuple):
@@ -43,6 +45,8 @@ def chain_response_to(
 ) -> TargetedResponse:
     """Extend the run until the second half of its windows gives the requested error; return the response.
 
+    Without a time limit, the run ends early if the error would take more than ten minutes.
+
     Raises ValueError when the computation of one drive period takes longer than ``time_s``.
 
     Parameters
@@ -56,24 +60,30 @@ def chain_response_to(
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
+    end_s = began_s + max(FIRST_S, FIRST_SHARE * limit_s)
     levels = (level for level in Accuracy if level.promise <= TOLERANCE_PART * wanted)
     accuracy = next(levels, Accuracy.REFERENCE)
     most = max(1, math.floor(WINDOW_S * drive.frequency_hz))
     seen: list[ChainResponse] = []
 
     def follows(periods: int) -> bool:
-        """Continue the run for ``periods``; return whether that succeeded and time remains to repeat it."""
-        before_s, length_s = time.monotonic(), periods / drive.frequency_hz
-        state = seen[-1].final_state if seen else None
-        seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
-        now_s = time.monotonic()
-        fits = now_s + (now_s - before_s) < began_s + limit_s
-        return fits and seen[-1].outcome is Outcome.REACHED_END
+        """Continue the run for ``periods``; return whether it succeeded before ``end_s``."""
+        length_s, state = periods / drive.frequency_hz, seen[-1].final_state if seen else None
+        try:
+            with time_limit(end_s):
+                seen.append(chain_response(chain, drive, accuracy, length_s, length_s, state))
+        except TimeoutError:
+            return False
+        return seen[-1].outcome is Outcome.REACHED_END
 
-    if most == 1:
-        _require_one_period(chain, drive, accuracy, limit_s)
     # A whole window may take longer than the time limit, so start with one drive period.
     periods, goes_on = 1, follows(1)
+    if not seen:
+        raise ValueError(
+            f"A time of {limit_s:g} s is not allowed for this chain: one drive period of "
+            f"{1.0 / drive.frequency_hz:g} s takes longer to compute; give more time."
+        )
+    end_s = began_s + limit_s
     while goes_on and periods < most:
         periods = min(2 * periods, most)
         goes_on = follows(periods)
@@ -83,8 +93,12 @@ def chain_response_to(
         goes_on = follows(most)
         count = len(seen) - before
         if not goes_on or (count >= FEWEST_WINDOWS and not count & (count - 1)):
-            used = seen[before + count // 2 :]
+            used, last = seen[before + count // 2 :], float(errors.max())
             errors = _errors(used) + accuracy.promise
+            worst = float(errors.max())
+            if time_s is None and worst > max(wanted, STEADILY * last):
+                needed_s = (worst / wanted) ** 2 * (time.monotonic() - began_s)
+                goes_on = goes_on and needed_s < HOPELESS * limit_s
     response = replace(
         used[-1],
         window_s=sum(each.window_s for each in used),
@@ -93,21 +107,6 @@ def chain_response_to(
         impacts=np.sum([each.impacts for each in used], axis=0),
     )
     return TargetedResponse(response, errors, sum(each.duration_s for each in seen))
-
-
-def _require_one_period(chain: Chain, drive: Harmonic, accuracy: Accuracy, limit_s: float) -> None:
-    """Raise ValueError if trials of rising length show that one drive period takes longer than allowed."""
-    integrate_chain(chain, drive, TRIED_S, accuracy)  # not timed, because it prepares the engine
-    tried_s, took_s, period_s = TRIED_S, 0.0, 1.0 / drive.frequency_hz
-    while took_s < TRIED_PART * limit_s and 4.0 * tried_s < period_s:
-        tried_s, began_s = 4.0 * tried_s, time.monotonic()
-        integrate_chain(chain, drive, tried_s, accuracy)
-        took_s = time.monotonic() - began_s
-    if took_s * period_s / tried_s > limit_s:
-        raise ValueError(
-            f"A time of {limit_s:g} s is not allowed for this chain: one drive period of {period_s:g} s "
-            "takes longer to compute; give more time."
-        )
 
 
 def _errors(windows: Sequence[ChainResponse]) -> Floats:

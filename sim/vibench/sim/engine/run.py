@@ -1,9 +1,13 @@
 """Motion of a specimen under a harmonic or sampled drive, integrated by the native engine. SI units."""
 
 import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from enum import IntEnum
 from functools import lru_cache
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,6 +46,58 @@ KNOWN_MOTION = (
 """Known state of the paper's specimen (loss 0.5 s/m), 30 ms after a start from rest at 20 um and 130 Hz."""
 KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
+SLICE_STEPS = 1 << 20
+"""Steps between two checks of a time limit: a few milliseconds of computing."""
+_END_S: ContextVar[float] = ContextVar("end of the computing time", default=math.inf)
+
+
+@contextmanager
+def time_limit(end_s: float) -> Iterator[None]:
+    """Let runs and `check_time` in this block raise TimeoutError after ``end_s`` (`time.monotonic`) [s]."""
+    before = _END_S.set(min(end_s, _END_S.get()))
+    try:
+        yield
+    finally:
+        _END_S.reset(before)
+
+
+def check_time() -> None:
+    """Raise TimeoutError if the computing time of the innermost `time_limit` is over."""
+    if time.monotonic() > _END_S.get():
+        raise TimeoutError("The requested computing time is over.")
+
+
+Part = TypeVar("Part")
+
+
+def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
+    """Yield the parts that are computed before ``end_s``, as a value of `time.monotonic` [s]."""
+    computing = iter(parts)
+    while True:
+        try:
+            with time_limit(end_s):
+                check_time()
+                part = next(computing)
+        except (StopIteration, TimeoutError):
+            return
+        yield part
+
+
+def in_slices(advance: Callable[[], int], counter: Structure, name: str, slice_steps: int) -> int:
+    """Call ``advance`` until it ends, with checks of the time limit between slices of its steps.
+
+    ``counter[name]`` is the number of steps that ``advance`` may still take; it returns `Outcome.TOO_LONG` at
+    zero. Without a time limit there is one slice.
+    """
+    left, is_limited = int(counter[name]), _END_S.get() < math.inf
+    while True:
+        check_time()
+        counter[name] = allowed = min(left, slice_steps) if is_limited else left
+        code = advance()
+        left -= allowed - int(counter[name])
+        if code != Outcome.TOO_LONG or left <= 0 or not is_limited:
+            counter[name] = max(left, 0)
+            return code
 
 
 class Watch(IntEnum):
@@ -207,7 +263,13 @@ class NativeRun(_Run):
         Raises ValueError when the engine rejects the time.
         """
         tangent = self._tangent if self._tangent["changes"] > 0 else None
-        code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
+
+        def go_on() -> int:
+            return self.engine.run(
+                self._tables, self._state, until_s, self.tolerance, record.structure, tangent
+            )
+
+        code = in_slices(go_on, record.structure, "steps_left", SLICE_STEPS)
         if code < 0:
             raise ValueError(
                 f"The native engine refuses to advance to {until_s} s: the end time must be finite."

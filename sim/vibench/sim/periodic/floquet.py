@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..engine.run import check_time
 from ..specimen.state import Complex, Floats
 from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_grid, waveform
 from .restoring_force import RestoringForce
@@ -28,6 +29,8 @@ STEPS_PER_HARMONIC = 16
 """Number of Magnus steps per period of the highest harmonic, for a force that is smooth at every p."""
 SMOOTH_STEPS = 128
 """Smallest number of Magnus steps per period, for a force that is smooth at every p."""
+BLOCK_STEPS = 4096
+"""Number of Magnus steps computed at once; limits memory and the time between checks of a time limit."""
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of each of the two Gauss points from the middle of a step, relative to the step length."""
 
@@ -98,16 +101,21 @@ class _Departures:
         stiffness, _ = self._slopes(np.array([0.5 * (start + stop)]))
         if self._spring.kinks and stiffness[0] == 0.0:
             return np.asarray(scipy.linalg.expm(self._system * length))
-        return self._by_magnus(self._marks(start, stop, self._fastest * length))
+        steps, result = self._steps(self._fastest * length), np.eye(len(self._system))
+        for first in range(0, steps, BLOCK_STEPS):
+            check_time()
+            shares = np.arange(first, min(first + BLOCK_STEPS, steps) + 1) / steps
+            if self._spring.kinks:
+                shares = 0.5 * (1.0 - np.cos(math.pi * shares))
+            result = self._by_magnus(start + (stop - start) * shares) @ result
+        return np.asarray(result)
 
-    def _marks(self, start: float, stop: float, turn: float) -> Floats:
-        """Return the phases at the ends of the Magnus steps, shape (steps + 1,) [rad]."""
+    def _steps(self, turn: float) -> int:
+        """Return the number of Magnus steps for a phase ``turn`` of the fastest motion [rad]."""
         needed = math.ceil(STEPS_PER_TURN * turn)
         if self._spring.kinks:
-            even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
-            return start + 0.5 * (stop - start) * (1.0 - np.cos(even))
-        steps = max(SMOOTH_STEPS, needed, STEPS_PER_HARMONIC * int(self._motion.harmonics[-1]))
-        return np.linspace(start, stop, steps + 1)
+            return max(CONTACT_STEPS, needed)
+        return max(SMOOTH_STEPS, needed, STEPS_PER_HARMONIC * int(self._motion.harmonics[-1]))
 
     def _by_magnus(self, marks: Floats) -> Floats:
         """Return the transition matrix over all steps between ``marks``, by fourth-order Magnus steps."""

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine.run import check_time
 from ..specimen.specimen import Specimen
 from ..specimen.state import Complex, Floats, Table, Vector
 from .restoring_force import RestoringForce
@@ -283,6 +284,7 @@ class BalanceProblem:
 
         Shapes (n,), (n, n), (n,), (n,). Values are not finite where the force overflows.
         """
+        check_time()
         phasors = self.phasors(unknowns)
         seen = condense(self.structure, omega, self.harmonics)
         spring = force_harmonics(self.spring, phasors, self.harmonics, omega)
