@@ -26,10 +26,6 @@ _PAPER_HZ = 260.0
 def tradeoff(
     amplitude: Annotated[float | None, option("Amplitude of your scene's base displacement.", "M")] = None,
     frequency: Annotated[float | None, option("Drive frequency of your scene [Hz].", "F")] = None,
-    error: Annotated[str | None, option("Requested relative error; default 1% without --time.", "E")] = None,
-    time_limit: Annotated[
-        str | None, option("Time limit for all methods of a scene, such as 2s.", "T", name="--time")
-    ] = None,
     out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
     as_json: AsJson = False,
     *,
