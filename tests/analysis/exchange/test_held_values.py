@@ -43,7 +43,7 @@ def hits(rng, noise=1e-4):
     force = np.zeros(round(SECONDS * RATE_HZ))
     force[300::RATE_HZ] = 0.8
     time_s = np.arange(RATE_HZ) / RATE_HZ
-    ring = 0.5 * np.exp(-9.0 * time_s) * np.sin(2 * np.pi * 150.0 * time_s)
+    ring = 0.5 * np.exp(-20.0 * time_s) * np.sin(2 * np.pi * 150.0 * time_s)
     response = np.convolve(force, ring)[: force.size]
     motion = np.stack((force, 0.4 * force, response))
     return motion + noise * rng.standard_normal(motion.shape)

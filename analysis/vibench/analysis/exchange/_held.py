@@ -38,12 +38,13 @@ def held_values(
     """Yield first sample, one past the last sample, and description of each stretch without new values.
 
     A driven channel is not constant for a period of the lowest frequency. Exceptions are weak signals of a
-    coarse converter, and exact zeros before a hit or, in drive and base, between hits or bursts.
+    coarse converter (also until the next hit or burst), and exact zeros before a hit or, in drive and base,
+    between hits or bursts.
     """
     quantity, _ = mapped.kind
     if mapped.role not in KNOWN_ROLES and quantity not in _VIBRATING:
         return
-    is_drive = mapped.role in _DRIVEN or quantity == "force"
+    is_noise, is_drive = excitation.family is Family.NOISE, mapped.role in _DRIVEN or quantity == "force"
     runs, step = _runs(source, channel)
     period = max(_FEWEST, int(rate_hz / excitation.band_hz[0]) + 1)
     natural = [b - a for a, b in runs if b - a < period and b < channel.samples]
@@ -51,11 +52,13 @@ def held_values(
     for start, stop in runs:
         if not (at_end if stop == channel.samples else period) <= stop - start < channel.samples:
             continue
-        near = source.read(channel, max(0, start - _FEWEST), start)
-        after = source.read(channel, stop, min(stop + _FEWEST, channel.samples))
         (value,) = source.read(channel, start, start + 1)
-        is_weak = np.all(np.abs(np.concatenate((near, after)) - value) <= _WEAK_STEPS * step)
-        may_rest = excitation.family is Family.NOISE and value == 0.0 and (start == 0 or is_drive)
+        near = source.read(channel, max(0, start - _FEWEST), start)
+        if not is_noise:
+            after = source.read(channel, stop, min(stop + _FEWEST, channel.samples))
+            near = np.concatenate((near, after))
+        is_weak = np.all(np.abs(near - value) <= _WEAK_STEPS * step)
+        may_rest = is_noise and value == 0.0 and (start == 0 or is_drive)
         if not is_weak and not may_rest:
             yield start, stop, f"holds {value:.6g}"
     end = source.read(channel, max(0, channel.samples - _SEARCHED), channel.samples)
