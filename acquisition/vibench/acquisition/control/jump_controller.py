@@ -3,11 +3,12 @@
 If the motion stays on the other branch, the drive is lowered until that motion stops.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf, log
 
+from ..excitation.feedback import JumpSearch
 from ..excitation.settled_sine import SettledSine
 from ..excitation.steps import Segment
 from ..plan import RunState
@@ -119,19 +120,58 @@ class JumpBracket:
             self.after = point
 
 
+@dataclass(frozen=True)
+class SettledPass:
+    """One pass of a settled sine through its frequencies."""
+
+    controller: SettlingController
+    plan: SettledSine
+    direction: str
+    number: int
+
+    def settle_at(self, frequency_hz: float) -> Controller[SettledState]:
+        """Move to a frequency and wait until the motion has settled."""
+        yield from glide(self.controller.loop, frequency_hz, self.plan.base_level, self.plan.glide_step_hz)
+        return (yield from self.controller.settle())
+
+    def record_at(
+        self, frequency_hz: float, label: SegmentLabel, **others: int | str
+    ) -> Controller[SettledPoint]:
+        """Settle at a frequency, and record a segment with the numbers of pass and settled motion."""
+        found = yield from self.settle_at(frequency_hz)
+        own: dict[str, int | float | str] = {"direction": self.direction, "pass": self.number}
+        numbers = {"frequency_hz": frequency_hz, **own, **others, **found.note.numbers}
+        yield from record_settled(self.controller, found, Segment(label, numbers), self.plan.record_s)
+        return found.point
+
+    def run(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
+        """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
+        points: list[SettledPoint] = []
+        searched, branch = 0, 1  # each jump increases the number of the branch by 1
+        for frequency_hz in frequencies_hz:
+            point = yield from self.record_at(
+                frequency_hz, SegmentLabel.STEP, branch=branch, came_from=came_from
+            )
+            search = self.plan.jumps
+            has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
+            if search is not None and has_jumped and searched < search.most_searches:
+                searched += 1
+                point, is_on_next_branch = yield from JumpLocator(self, search).localise(points, point)
+                if is_on_next_branch:
+                    branch += 1
+                    points = []
+            points.append(point)
+            came_from = f"{frequency_hz:g} Hz"
+
+
 class JumpLocator:
     """Search for one jump during one pass through the frequencies."""
 
-    def __init__(
-        self, controller: SettlingController, plan: SettledSine, direction: str, number: int
-    ) -> None:
-        assert plan.jumps is not None
-        self._controller = controller
-        self._plan = plan
-        self._rule = plan.jumps
-        self._direction = direction
-        self._number = number
-        self._until_s = controller.loop.elapsed_s + plan.search_s
+    def __init__(self, one_pass: SettledPass, rule: JumpSearch) -> None:
+        self._pass = one_pass
+        self._rule = rule
+        self._loop = one_pass.controller.loop
+        self._until_s = self._loop.elapsed_s + one_pass.plan.search_s
 
     def localise(
         self, points: Sequence[SettledPoint], after: SettledPoint
@@ -146,8 +186,7 @@ class JumpLocator:
         search = JumpBracket(list(points), after)
         why = yield from self._bisect(search)
         is_jump = search.is_jump(self._rule.factor)
-        end = yield from _settle_at(self._controller, self._plan, after.frequency_hz)
-        point = end.point
+        point = (yield from self._pass.settle_at(after.frequency_hz)).point
         has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
         self._say(search, why, branch)
@@ -171,12 +210,7 @@ class JumpLocator:
                         return None
             if self._is_late():
                 return JumpSearchEnd.OUT_OF_TIME
-            numbers: dict[str, int | str] = {"direction": self._direction, "pass": self._number}
-            middle_hz = search.frequency_hz
-            point = yield from _record_at(
-                self._controller, self._plan, middle_hz, SegmentLabel.SEARCH, numbers
-            )
-            search.narrow(point)
+            search.narrow((yield from self._pass.record_at(search.frequency_hz, SegmentLabel.SEARCH)))
             if not search.is_jump(self._rule.factor):
                 return JumpSearchEnd.STEEP
         return JumpSearchEnd.LOCALISED
@@ -207,7 +241,7 @@ class JumpLocator:
     ) -> Controller[tuple[int, SettledPoint] | None]:
         """Go forward. Return index and state where the motion left the branch; None if it stayed."""
         for place in steps:
-            found = yield from _settle_at(self._controller, self._plan, branch[place].frequency_hz)
+            found = yield from self._pass.settle_at(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
                 return place, found.point
         return None
@@ -217,7 +251,7 @@ class JumpLocator:
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
-            found = yield from _settle_at(self._controller, self._plan, branch[place].frequency_hz)
+            found = yield from self._pass.settle_at(branch[place].frequency_hz)
             if is_on_branch(found.point, branch[place], self._rule.factor):
                 return place
             if place == 0:
@@ -226,21 +260,21 @@ class JumpLocator:
         return None
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
-        """Stop the motion at the first frequency; return 0 if it restarts on the branch, else None."""
-        yield from decay_motion(self._controller.loop)
-        found = yield from self._controller.settle()
+        """Stop the motion at the branch's first frequency; return 0 if it restarts on the branch, or None."""
+        yield from decay_motion(self._loop)
+        found = yield from self._pass.controller.settle()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
     def _is_late(self) -> bool:
         """Return whether too little time is left for another step and the move to the end of the bracket."""
-        step_s = self._plan.settling.longest_wait_s
-        return self._controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
+        plan = self._pass.plan
+        return self._loop.elapsed_s + 2 * plan.settling.longest_wait_s + plan.record_s > self._until_s
 
     def _say(self, found: JumpBracket, how: JumpSearchEnd, arrived: JumpSide) -> None:
-        self._controller.loop.note(
+        self._loop.note(
             JumpNote(
-                direction=self._direction,
-                pass_number=self._number,
+                direction=self._pass.direction,
+                pass_number=self._pass.number,
                 frequency_hz=found.frequency_hz,
                 before_hz=found.before.frequency_hz,
                 after_hz=found.after.frequency_hz,
@@ -252,27 +286,6 @@ class JumpLocator:
         )
 
 
-def _settle_at(
-    controller: SettlingController, plan: SettledSine, frequency_hz: float
-) -> Controller[SettledState]:
-    yield from glide(controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
-    return (yield from controller.settle())
-
-
-def _record_at(
-    controller: SettlingController,
-    plan: SettledSine,
-    frequency_hz: float,
-    label: SegmentLabel,
-    numbers: Mapping[str, int | str],
-) -> Controller[SettledPoint]:
-    """Settle at a frequency, and record a segment with these ``numbers`` and those of the settled motion."""
-    found = yield from _settle_at(controller, plan, frequency_hz)
-    segment = Segment(label, {"frequency_hz": frequency_hz, **numbers, **found.note.numbers})
-    yield from record_settled(controller, found, segment, plan.record_s)
-    return found.point
-
-
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     """Run all passes of a settled sine, from the ramp up to the ramp down."""
     controller = SettlingController(loop, plan.settling, plan.base_level)
@@ -280,38 +293,6 @@ def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:
     yield from start(loop, passes[0][1][0], plan.base_level)
     came_from = "rest"
     for number, (direction, frequencies_hz) in enumerate(passes, start=1):
-        yield from _run_pass(controller, plan, number, direction, frequencies_hz, came_from)
+        yield from SettledPass(controller, plan, direction, number).run(frequencies_hz, came_from)
         came_from = f"{direction} pass {number}, {frequencies_hz[-1]:g} Hz"
     yield from loop.ramp_down()
-
-
-def _run_pass(
-    controller: SettlingController,
-    plan: SettledSine,
-    number: int,
-    direction: str,
-    frequencies_hz: Sequence[float],
-    came_from: str,
-) -> Controller[None]:
-    """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
-    points: list[SettledPoint] = []
-    searched, branch = 0, 1  # each jump increases the number of the branch by 1
-    for frequency_hz in frequencies_hz:
-        numbers: dict[str, int | str] = {
-            "direction": direction,
-            "pass": number,
-            "branch": branch,
-            "came_from": came_from,
-        }
-        point = yield from _record_at(controller, plan, frequency_hz, SegmentLabel.STEP, numbers)
-        search = plan.jumps
-        has_jumped = search is not None and points and ratio(points[-1], point) > search.factor
-        if search is not None and has_jumped and searched < search.most_searches:
-            searched += 1
-            locator = JumpLocator(controller, plan, direction, number)
-            point, is_on_next_branch = yield from locator.localise(points, point)
-            if is_on_next_branch:
-                branch += 1
-                points = []
-        points.append(point)
-        came_from = f"{frequency_hz:g} Hz"
