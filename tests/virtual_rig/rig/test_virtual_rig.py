@@ -9,9 +9,11 @@ import pytest
 import pyvisa
 import usb.core
 from nidaqmx.constants import AcquisitionType, Coupling, ExcitationSource
+from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
 from tests.changed import changed
+from tests.virtual_rig.conftest import daq_error
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig
 from vibench.virtual_rig import VirtualRig
@@ -159,6 +161,16 @@ def test_a_rig_on_an_address_in_use_is_refused_and_starts_nothing():
             pass
         assert serials_on_the_bus() == ["C060606"]
     assert "C060606" not in serials_on_the_bus()
+
+
+def test_an_overrun_fails_every_kind_of_read(switch_on):
+    program = switch_on(RIG)
+    task = program.task()
+    task.start()
+    program.rig.faults.overrun()
+    for read in (task.read, task.read_waveform):
+        with daq_error(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE):
+            read(10)
 
 
 def test_the_devices_have_the_names_that_the_rig_gives_them(switch_on):

@@ -23,6 +23,7 @@ from vibench.acquisition import file_path, load_toml
 from vibench.acquisition.recording import DiskTrouble
 from vibench.sim import FrozenModel
 
+from ..daqmx.data_calls import DATA_CALLS
 from ..daqmx.server import DaqServer
 from ..generator.afg1022 import AFG1022
 from ..usb.usbtmc import UsbTmcInstrument
@@ -32,7 +33,7 @@ Heal = Callable[[], None]
 """Function that ends one fault of the rig."""
 # Calls at which a program first accesses the device: setting a task's clock, and starting the task.
 _RESERVING = ("CfgSampClkTiming", "StartTask")
-_READS = ("ReadAnalogF64", "ReadBinaryI32", "ReadRaw")
+_READS = tuple(call for call in DATA_CALLS if call.startswith("Read"))
 
 
 @dataclass(frozen=True)
