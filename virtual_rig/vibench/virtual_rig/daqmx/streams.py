@@ -106,7 +106,7 @@ class Acquisition(Stream):
     def advance_to(self, now_s: float) -> None:
         """Acquire all samples that are due at rig time ``now_s``."""
         due = int(min(self.due(now_s), self.total))
-        while self.transferred < min(due, self.total) and self._is_open and self.failure is None:
+        while self.transferred < due and self._is_open and self.failure is None:
             self._store(self._sampler.read(min(due - self.transferred, self.buffer_size)))
         if self.is_done:
             self.close()
@@ -191,8 +191,8 @@ class Generation(Stream):
         """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(self._outputs), 0))
-        """Number of samples in the device's memory; a repeated buffer is not transferred in advance."""
         self._most_in_memory = 0 if self.repeats else device.memory
+        """Most samples in the device's memory; a repeated buffer is not transferred in advance."""
         self._fetched = 0
         self._recent = np.empty((len(self._outputs), 0))
         self._is_open = True

@@ -38,7 +38,7 @@ _READS = tuple(call for call in DATA_CALLS if call.startswith("Read"))
 
 @dataclass(frozen=True)
 class PlayedFault:
-    """A fault that has started, with the function that ends it."""
+    """A fault of a script that has started."""
 
     fault: str
     began_s: float
