@@ -2,15 +2,13 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
+from tests.analysis.virtual_measurements import record, sampled_at
+from vibench.acquisition.plan import ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Hold, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
-from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.figures.backbone import backbone_figure
 from vibench.analysis.figures.stepped_sine import (
@@ -22,7 +20,6 @@ from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine.stepped_response import feedback_sentences, noted_jumps
 
-ROOT = Path(__file__).parents[3]
 JUMP = JumpNote(
     direction="down",
     pass_number=1,
@@ -73,13 +70,7 @@ def record_and_analyse(tmp_path):
     """Return a function that records an excitation on the virtual rig and analyses the recording."""
 
     def analysis_of(excitation):
-        shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
-        daq = shipped.daq.model_copy(update={"sample_rate_hz": 10240.0})
-        with open_bench(shipped.model_copy(update={"daq": daq})) as bench:
-            plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02)
-            outcome = run_measurement(bench, plan, tmp_path / "run.h5")
-        with open_recording(outcome.path) as recording:
-            return analyse(recording)
+        return analyse(record(tmp_path / "run.h5", excitation, sampled_at(10240.0), ramp_s=0.4))
 
     return analysis_of
 
