@@ -18,32 +18,32 @@ def ramp(samples):
     return np.linspace(-3, 3, samples)
 
 
-@pytest.fixture
-def pair(daq):
+def pair_on(daq, device):
     """Return an input task, and an output task that is wired to the input and triggered by its start."""
-    inputs, outputs = daq.task(), daq.task()
-    inputs.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-10, max_val=10)
-    outputs.ao_channels.add_ao_voltage_chan(OUTPUT, min_val=-3.5, max_val=3.5)
-    inputs.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    inputs = daq.inputs(f"{device}/ai0", RATE_HZ, min_val=-10, max_val=10)
+    outputs = daq.outputs(f"{device}/ao0", 3.5)
     outputs.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
     outputs.triggers.start_trigger.cfg_dig_edge_start_trig(inputs.triggers.start_trigger.term)
     return inputs, outputs
 
 
+@pytest.fixture
+def pair(daq):
+    return pair_on(daq, "Dev1")
+
+
 def play(pair, samples):
-    """Write samples and start both tasks."""
+    """Write samples and start both tasks; return how many were written."""
     inputs, outputs = pair
-    outputs.write(samples)
+    written = outputs.write(samples)
     outputs.start()
     inputs.start()
+    return written
 
 
 def test_a_triggered_output_begins_with_the_first_sample_of_the_input_and_repeats(pair):
-    inputs, outputs = pair
-    assert outputs.write(ramp(1500)) == 1500
-    outputs.start()
-    inputs.start()
-    np.testing.assert_allclose(inputs.read(4500), np.tile(ramp(1500), 3), atol=1e-12)
+    assert play(pair, ramp(1500)) == 1500
+    np.testing.assert_allclose(pair[0].read(4500), np.tile(ramp(1500), 3), atol=1e-12)
 
 
 def test_an_output_without_its_trigger_stays_silent(pair, daq):
@@ -57,12 +57,7 @@ def test_an_output_without_its_trigger_stays_silent(pair, daq):
 
 @pytest.mark.parametrize(("device", "block"), [("Dev1", 1000), ("Dev2", 1000), ("Dev2", 7000)])
 def test_a_buffer_of_the_first_block_suffices_together_with_the_memory_of_the_device(daq, device, block):
-    inputs, outputs = daq.task(), daq.task()
-    inputs.ai_channels.add_ai_voltage_chan(f"{device}/ai0", min_val=-10, max_val=10)
-    outputs.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-3.5, max_val=3.5)
-    for task in (inputs, outputs):
-        task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
-    outputs.triggers.start_trigger.cfg_dig_edge_start_trig(f"/{device}/ai/StartTrigger")
+    inputs, outputs = pair_on(daq, device)
     outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
     played = np.random.default_rng(block).uniform(-3, 3, 12 * block)
     outputs.write(played[:block])
@@ -142,17 +137,14 @@ def test_writing_more_than_the_buffer_size_is_refused_before_the_start(pair):
 
 
 def test_a_software_timed_output_holds_its_value(daq):
-    inputs, outputs = daq.task(), daq.task()
-    outputs.ao_channels.add_ao_voltage_chan("Dev2/ao0")
-    inputs.ai_channels.add_ai_voltage_chan("Dev2/ai0", min_val=-10, max_val=10)
+    inputs, outputs = daq.inputs("Dev2/ai0", min_val=-10, max_val=10), daq.outputs("Dev2/ao0", 10.0)
     outputs.write(1.25)
     assert daq.world.played["Dev2/ao0"][-1].volts.tolist() == [1.25]
     assert inputs.read() == 1.25
 
 
 def test_two_outputs_play_one_row_of_samples_each(daq):
-    task = daq.task()
-    task.ao_channels.add_ao_voltage_chan("Dev2/ao0:1")
+    task = daq.outputs("Dev2/ao0:1", 10.0)
     task.timing.cfg_samp_clk_timing(10000, samps_per_chan=200)
     rows = np.stack([ramp(200), -ramp(200)])
     AnalogMultiChannelWriter(task.out_stream).write_many_sample(rows)
