@@ -39,6 +39,13 @@ def small():
     )
 
 
+@pytest.fixture
+def path(small, tmp_path):
+    """Return the path of a study's file without results."""
+    make_file(tmp_path / "a.h5", small)
+    return tmp_path / "a.h5"
+
+
 def run_into_file(path, study, solver=solve_scene, cancelled=None):
     """Run or resume a study in its file; return the computed scenes and how the run ended."""
     begun = []
@@ -97,9 +104,7 @@ def test_motions_of_an_ensemble_round_trip_through_the_study_file(tmp_path):
 REST = Rest()
 
 
-def test_h5py_alone_finds_named_axes_units_and_missing_points(small, tmp_path):
-    path = tmp_path / "a.h5"
-    make_file(path, small)
+def test_h5py_alone_finds_named_axes_units_and_missing_points(path):
     with h5py.File(path) as file:
         response = file["response_i"]
         assert [dim.label or dim[0].name for dim in response.dims] == [
@@ -117,9 +122,7 @@ def test_h5py_alone_finds_named_axes_units_and_missing_points(small, tmp_path):
         assert file.attrs["Conventions"].startswith(b"CF-")
 
 
-def test_a_study_file_needs_no_recent_hdf5_version(small, tmp_path):
-    path = tmp_path / "a.h5"
-    make_file(path, small)
+def test_a_study_file_needs_no_recent_hdf5_version(path):
     with h5py.File(path) as file:
         assert file.id.get_create_plist().get_version()[0] == 0
 
@@ -131,9 +134,7 @@ def test_a_study_file_needs_no_recent_hdf5_version(small, tmp_path):
         file.visititems(require_plain)
 
 
-def test_the_file_records_which_executor_computed_which_point(small, tmp_path):
-    path = tmp_path / "a.h5"
-    make_file(path, small)
+def test_the_file_records_which_executor_computed_which_point(small, path):
     count = itertools.count()
     _, end = run_into_file(path, small, cancelled=lambda: next(count) >= 0)
     assert end is StudyEnd.CANCELLED
@@ -177,9 +178,7 @@ def test_stored_scene_identities_match_the_scenes(small, tmp_path):
         ({"duration_s": 0.3, "window_s": 0.2}, "0.2 in the file and 0.3 in the request, window_s is 0.1"),
     ],
 )
-def test_a_file_of_another_study_is_refused_with_the_differences(small, tmp_path, change, said):
-    path = tmp_path / "a.h5"
-    make_file(path, small)
+def test_a_file_of_another_study_is_refused_with_the_differences(small, path, change, said):
     before = path.read_bytes()
     other = Study.model_validate({**small.model_dump(), **change})
     with pytest.raises(StudyError, match=said) as refused:
@@ -200,10 +199,8 @@ def test_a_study_file_has_one_writer_and_can_be_read_meanwhile(small, tmp_path):
     FileStore(path, small).close()
 
 
-def test_a_study_starts_even_while_its_file_is_briefly_read(small, tmp_path):
+def test_a_study_starts_even_while_its_file_is_briefly_read(small, path):
     """A reader holds the HDF5 lock for a moment; a study that starts then must wait for its file."""
-    path = tmp_path / "a.h5"
-    make_file(path, small)
     reader = h5py.File(path, "r")
     leaving = threading.Timer(0.3, reader.close)
     leaving.start()
@@ -329,10 +326,8 @@ def images_after_power_cuts(empty, log, luck):
 
 
 @pytest.mark.thorough
-def test_study_points_reported_as_stored_are_complete_after_a_power_cut(small, tmp_path):
-
-    path, image_path = tmp_path / "a.h5", tmp_path / "image.h5"
-    make_file(path, small)
+def test_study_points_reported_as_stored_are_complete_after_a_power_cut(small, path, tmp_path):
+    image_path = tmp_path / "image.h5"
     empty = path.read_bytes()
     disks = []
 
