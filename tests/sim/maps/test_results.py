@@ -1,11 +1,14 @@
 """Computed maps: adaptive and full refinement, several starts, and basins with their boundary."""
 
+import shutil
+
+import h5py
 import numpy as np
 import pytest
 
-from vibench.sim.maps import Map, Range, kick_stability, solve_map, uncertainty_exponent
+from vibench.sim.maps import Map, Range, kick_stability, open_map, solve_map, uncertainty_exponent
 from vibench.sim.scene.shares import wilson_share
-from vibench.sim.study import InvalidStudy, PointState
+from vibench.sim.study import InvalidStudy, PointState, StudyError
 
 # The map covers the boundary between motions with and without contact.
 PLAN = Map(
@@ -139,3 +142,41 @@ def test_the_onset_of_impacts_is_refined_and_audited():
     differs = (adaptive.values("impact_rate") == 0.0) != (full.values("impact_rate") == 0.0)
     assert differs[is_filled].mean() <= adaptive.audit.wrong_share.high
     assert {each.has_impacts for each in adaptive.motions if each.period == 1} == {True, False}
+
+
+def changed(path, change):
+    """Return the path of a copy of a map's file after a change by another program."""
+    copy = path.with_name("changed.h5")
+    shutil.copy(path, copy)
+    with h5py.File(copy, "r+") as file:
+        change(file)
+    return copy
+
+
+def test_a_map_file_with_changed_values_or_plan_is_refused(tmp_path):
+    plan = Map(frequency_hz=Range(start=200, stop=220, points=3), amplitude_m=5e-6)
+    solve_map(plan, tmp_path / "map.h5")
+
+    def change_value(file):
+        file["response_i"][0, 1] *= 1.01
+
+    def change_plan(file):
+        file["study_json"][()] = file["study_json"][()].replace(b'"amplitude_m":5e-6', b'"amplitude_m":6e-6')
+
+    for change, number in ((change_value, 1), (change_plan, 0)):
+        with pytest.raises(StudyError, match=f"point {number} has other values than were computed"):
+            open_map(changed(tmp_path / "map.h5", change))
+
+
+def test_a_map_file_of_an_earlier_version_without_digests_is_read_and_resumed(tmp_path):
+    plan = Map(frequency_hz=Range(start=200, stop=220, points=3), amplitude_m=5e-6)
+    found = solve_map(plan, tmp_path / "map.h5")
+
+    def remove_digest_and_a_point(file):
+        del file["digest"]
+        file["state"][0, 1] = 0
+
+    old = changed(tmp_path / "map.h5", remove_digest_and_a_point)
+    assert not open_map(old).is_complete
+    resumed = solve_map(plan, old, "resume")
+    assert np.array_equal(resumed.arrays["response_i"], found.arrays["response_i"])

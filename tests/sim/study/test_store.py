@@ -259,7 +259,8 @@ def set_values(name, value):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (reverse, "point 0 has the result of another scene"),
+        (reverse, "point 0 has other values than were computed"),
+        (set_values("response_ii", 1.25), "point 0 has other values than were computed"),
         (replace_column, "column response_i has another size, type or storage"),
         (lambda file: file.pop("response_ii"), "response_ii"),
         (lambda file: file.attrs.pop("format_version"), "format_version"),

@@ -71,8 +71,8 @@ _MAP_COLUMNS = (
 
 
 def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
-    """Return all columns of a map; the state of a point is the last column."""
-    return (*_MAP_COLUMNS, *more, _OF_STUDIES["state"])
+    """Return all columns of a map; the digest and the state of a point are the last columns."""
+    return (*_MAP_COLUMNS, *more, _OF_STUDIES["digest"], _OF_STUDIES["state"])
 
 
 LONGER = 64

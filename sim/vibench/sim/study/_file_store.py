@@ -126,7 +126,7 @@ def _fill(file: h5py.File, plan: layout.GridPlan) -> None:
             "title": "predictions of vibro-impact responses",
         },
     )
-    text = plan.model_dump_json().encode()
+    text = plan.text.encode()
     file.create_dataset(layout.STUDY, data=np.array(text, dtype=h5py.string_dtype("utf-8", len(text))))
     scales = [_scale(file, axis) for axis in plan.axes]
     last: dict[str, h5py.Dataset] = {}
@@ -201,7 +201,7 @@ class FileStore:
         self, path: Path, plan: layout.GridPlan, opened: Callable[[Path], OpenFile] = sole_writer
     ) -> None:
         self._path = path
-        self._columns = plan.columns
+        self._plan = plan
         self._disk = opened(path)
         try:
             _require_same(path, read_plan(path, type(plan)), plan)
@@ -238,8 +238,9 @@ class FileStore:
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
-            for column, raw in write_cells(self.arrays, self._columns, kept):
-                self._write(self._offsets[column.name] + answer.number * len(raw), raw)
+            for column, raw in write_cells(self.arrays, self._plan, kept):
+                if column.name in self._offsets:  # files of earlier versions have no digests of points
+                    self._write(self._offsets[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
             self._write(self._offsets[layout.STATE] + answer.number, bytes([answer.state]))

@@ -3,11 +3,13 @@
 ``docs/studies.md`` describes the file for users of h5py, xarray or MATLAB.
 """
 
+import hashlib
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -67,7 +69,7 @@ IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
 """Longest stored text [bytes]; longer text is cut off."""
 
-TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
+TAKEN, SESSION, MESSAGE, IDENTITY, DIGEST = "taken", "session", "message", "scene", "digest"
 CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
 DURATION, MOTION, METHOD, ENDED = "duration", "motion", "method", "ended"
 MEMORY, STARTS = "start_memory", "starts_followed"
@@ -188,6 +190,7 @@ OTHERS = (
     Column(SESSION, WHOLE, "1", "row of the session that computed the point"),
     Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of all values of the scene"),
     Column(MESSAGE, f"S{TEXT_BYTES}", "", "reason why the scene could not be computed"),
+    Column(DIGEST, f"S{IDENTITY_DIGITS}", "", "digest of the plan and of all values of the point"),
     Column(STATE, STATE_DTYPE, "", "state of the point", _meanings(PointState)),
 )
 COLUMNS = (
@@ -281,6 +284,19 @@ class GridPlan(FrozenModel, ABC):
         return Grid(
             tuple(len(axis.values) for axis in self.axes), tuple(axis.is_ordered for axis in self.axes)
         )
+
+    @cached_property
+    def text(self) -> str:
+        """The plan as JSON text."""
+        return self.model_dump_json()
+
+    def digest_at(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
+        """Return the digest of a point: its number, the plan, and all values except the point's state."""
+        found = hashlib.sha256(f"{number} {self.text}".encode())
+        for column in self.columns:
+            if column.name not in (DIGEST, STATE):
+                found.update(arrays[column.name][number : number + 1].tobytes())
+        return found.hexdigest()[:IDENTITY_DIGITS].encode()
 
     @abstractmethod
     def frequency_at(self, place: tuple[int, ...]) -> float:

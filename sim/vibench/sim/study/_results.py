@@ -28,7 +28,7 @@ from ._grid import (
     StudyAxis,
 )
 from ._software import software
-from ._store import Arrays, prediction_at, states
+from ._store import Arrays, empty_arrays, prediction_at, states
 from ._study import GivenStart, Start, Study, start_name
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
         kept = [each.decode() if isinstance(each, bytes) else each for each in file[axis.name][...].tolist()]
         if kept != list(axis.values):
             raise ValueError(f"its axis {axis.name} has other values than its {plan.called}")
-    for column in plan.columns:
+    for column in _stored_columns(file, plan):
         dataset = file[column.name]
         shape = plan.grid.shape if column.components == 1 else (*plan.grid.shape, column.components)
         is_plain = getattr(dataset, "shape", None) == shape and dataset.dtype == np.dtype(column.dtype)
@@ -91,12 +91,17 @@ def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
             raise ValueError(f"its column {column.name} has another size, type or storage")
 
 
-CHECKED = 50
-"""Approximate number of points whose digests are checked (in 0.02 s) when a file is opened."""
+def _stored_columns(file: "h5py.File", plan: GridPlan) -> list[layout.Column]:
+    """Return the columns in a file; files of earlier versions have no digests of points."""
+    return [each for each in plan.columns if each.name != layout.DIGEST or each.name in file]
+
+
+CHECKED = 2000
+"""About the number of points whose digests are checked when a file is opened; this takes 0.05 s."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:
-    """Raise ValueError if a result is not possible, or belongs to another point.
+    """Raise ValueError if a result is not possible, was changed, or belongs to another point or plan.
 
     Digests are checked for some of the points that this version has computed, evenly spread.
     """
@@ -115,15 +120,16 @@ def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session,
     own = [row for row, each in enumerate(sessions) if each.software_json == software()]
     known = done[np.isin(arrays[SESSION][done], own)]
     for number in known[:: max(1, len(known) // CHECKED)].tolist():
-        if isinstance(plan, Study) and not plan.is_own(number, arrays):
-            raise ValueError(f"point {number} has the result of another scene")
+        digest = bytes(arrays[layout.DIGEST][number])
+        if digest and digest != plan.digest_at(number, arrays):
+            raise ValueError(f"point {number} has other values than were computed")
 
 
 def offsets_of(path: Path, plan: GridPlan) -> dict[str, int]:
     """Return the position in the file [bytes] of every dataset that is written during a run, by its name."""
     sessions = (f"{layout.SESSIONS}/{name}" for name in (*layout.SESSION_COLUMNS, layout.N_SESSIONS))
     with _open_store(path, type(plan)) as file:
-        names = (*(column.name for column in plan.columns), *sessions)
+        names = (*(column.name for column in _stored_columns(file, plan)), *sessions)
         return {name: int(file[name].id.get_offset()) for name in names}
 
 
@@ -131,8 +137,8 @@ def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
     # Read the states first: results that arrive while reading are then ignored in all columns.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
-    arrays: Arrays = {layout.STATE: state}
-    for column in plan.columns:
+    arrays: Arrays = {**empty_arrays(plan), layout.STATE: state}
+    for column in _stored_columns(file, plan):
         if column.name != layout.STATE:
             whole = file[column.name][...]
             rows = whole.reshape(len(state), *((column.components,) if column.components > 1 else ()))

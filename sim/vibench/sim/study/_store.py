@@ -39,16 +39,18 @@ def empty_arrays(plan: layout.GridPlan) -> Arrays:
 
 
 def write_cells(
-    arrays: Arrays, columns: Sequence[layout.Column], answer: PointAnswer
+    arrays: Arrays, plan: layout.GridPlan, answer: PointAnswer
 ) -> Iterator[tuple[layout.Column, bytes]]:
     """Write a result into the arrays; yield each changed column with its bytes for the file.
 
     The state is left out, because it must be written after all other values.
     """
-    for column in columns:
-        if column.name in answer.cells:
+    for column in plan.columns:
+        is_digest = column.name == layout.DIGEST
+        if is_digest or column.name in answer.cells:
             values = arrays[column.name]
-            values[answer.number] = answer.cells[column.name]
+            value = plan.digest_at(answer.number, arrays) if is_digest else answer.cells[column.name]
+            values[answer.number] = value
             # Take a slice: numpy removes the padding of text from a single value, but not from a slice.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
@@ -88,7 +90,7 @@ class MemoryStore:
     """Store that keeps the results in memory."""
 
     def __init__(self, plan: layout.GridPlan) -> None:
-        self.arrays, self._columns = empty_arrays(plan), plan.columns
+        self.arrays, self._plan = empty_arrays(plan), plan
 
     def begin(self, executor: str) -> None:
         """Do nothing, because a store in memory has no sessions."""
@@ -96,7 +98,7 @@ class MemoryStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Store the results of points in memory."""
         for answer in answers:
-            for _ in write_cells(self.arrays, self._columns, answer):
+            for _ in write_cells(self.arrays, self._plan, answer):
                 pass
             self.arrays[layout.STATE][answer.number] = answer.state
 

@@ -3,13 +3,11 @@
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     AliasChoices,
@@ -30,10 +28,8 @@ from ..specimen.frozen_model import FrozenModel, NumberWith
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ._grid import (
     COLUMNS,
-    CONTINUES,
     FORMAT,
     FREQUENCY,
-    IDENTITY,
     IDENTITY_DIGITS,
     MODEL,
     START,
@@ -312,13 +308,6 @@ class Study(GridPlan):
         """Return the scene at a position of the grid that continues no other point."""
         start = self.starts[place[-2]]
         return self.scene(place, Given(start.state, start.label) if isinstance(start, GivenStart) else Rest())
-
-    def is_own(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bool:
-        """Return whether the digest stored for a point equals the digest of its scene."""
-        before = int(arrays[CONTINUES][number])
-        known = "" if before < 0 else bytes(arrays[IDENTITY][before]).decode()
-        scene = self.first_scene(self.grid.place(number))
-        return scene_identity(scene, known).encode() == bytes(arrays[IDENTITY][number])
 
     def frequency_at(self, place: tuple[int, ...]) -> float:
         """Return the drive frequency at a position of the grid [Hz]."""
