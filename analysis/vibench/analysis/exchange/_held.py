@@ -8,6 +8,7 @@ from vibench.acquisition.plan import AbstractExcitation, Family
 
 from ..recordings.channels import BASE, DRIVE
 from ..signals.arrays import Reals
+from ._alignment import Piece
 from ._mapping import KNOWN_ROLES, ChannelMapping
 from ._source_channel import Source, SourceChannel
 
@@ -31,6 +32,7 @@ _SAME_TURNS = 1e-3
 def held_values(
     source: Source,
     channel: SourceChannel,
+    pieces: tuple[Piece, ...],
     mapped: ChannelMapping,
     excitation: AbstractExcitation,
     rate_hz: float,
@@ -61,8 +63,10 @@ def held_values(
         may_rest = is_noise and value == 0.0 and (start == 0 or is_drive)
         if not is_weak and not may_rest:
             yield start, stop, f"holds {value:.6g}"
-    end = source.read(channel, max(0, channel.samples - _SEARCHED), channel.samples)
-    if repeated := _repeated(end, excitation, rate_hz):
+    first = max(0, channel.samples - _SEARCHED)
+    times = np.concatenate([each.span(first, channel.samples) for each in pieces])
+    end = source.read(channel, channel.samples - times.size, channel.samples)
+    if repeated := _repeated(end, times / rate_hz, excitation):
         yield channel.samples - repeated, channel.samples, "repeats earlier values"
 
 
@@ -83,7 +87,7 @@ def _runs(source: Source, channel: SourceChannel) -> tuple[list[tuple[int, int]]
     return runs, step
 
 
-def _repeated(values: Reals, excitation: AbstractExcitation, rate_hz: float) -> int:
+def _repeated(values: Reals, times_s: Reals, excitation: AbstractExcitation) -> int:
     """Return the number of last values that repeat earlier ones exactly; 0 for a periodic motion."""
     last = values.size - 1
     if last < _PATTERN or np.unique(values[-_PATTERN:]).size < _FEWEST_VALUES:
@@ -96,7 +100,8 @@ def _repeated(values: Reals, excitation: AbstractExcitation, rate_hz: float) -> 
     lag = last - int(found[-1])
     differs = np.flatnonzero(values[lag:] != values[:-lag])
     plan = excitation.model_dump(include={"frequency_hz", "frequencies_hz", "repetition_hz"})
-    turns = np.hstack([each for each in plan.values() if each is not None] or [np.nan]) * lag / rate_hz
+    lag_s = times_s[last] - times_s[last - lag]
+    turns = np.hstack([each for each in plan.values() if each is not None] or [np.nan]) * lag_s
     if not differs.size or np.any(np.abs(turns - np.rint(turns)) < _SAME_TURNS):
         return 0
     start = lag + int(differs[-1]) + 1
