@@ -325,7 +325,7 @@ def _say(
     periods: int,
     mode: Mode | None = None,
 ) -> None:
-    """Note the result at one level; the measurement took so many ``periods`` of the drive."""
+    """Note the result at one level; the measurement took ``periods`` periods of the drive."""
     if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
         lock = LockResult.LOST
     is_locked = lock is LockResult.LOCKED

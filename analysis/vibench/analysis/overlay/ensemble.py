@@ -234,7 +234,7 @@ class PhaseCurve(EnsembleCurve):
     circle do not disagree.
     """
 
-    OWN_UNITS: ClassVar = dict.fromkeys(("measured", "draws", "median", "lower", "upper"), "rad")
+    OWN_UNITS: ClassVar = {"measured": "rad", "draws": "rad"}
 
     def _text(self, values: Reals) -> str:
         return f"{np.degrees(values[0]):.2f}°"

@@ -149,7 +149,7 @@ class PicturingStore(MemoryStore):
 
     def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
         super().__init__(plan)
-        self._plan, self._tell = plan, tell
+        self._map, self._tell = plan, tell
         self._picture_s = -BETWEEN_PICTURES_S
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
@@ -160,7 +160,7 @@ class PicturingStore(MemoryStore):
 
     def show(self) -> None:
         """Send a picture of the results so far."""
-        self._tell(picture_of(MapResults(self._plan, self.arrays)))
+        self._tell(picture_of(MapResults(self._map, self.arrays)))
         self._picture_s = time.monotonic()
 
 

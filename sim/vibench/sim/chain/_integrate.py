@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +11,8 @@ from ..engine.run import (
     MOST_IMPACTS,
     SPARE_IMPACTS,
     Watch,
-    in_slices,
     native_engine,
+    next_slice,
 )
 from ..engine.scene import collision_structure, fill_drive, power_structure
 from ..motion.integrate import ROUNDING, Trajectory, check_impact_rate, check_times, check_within, integrate
@@ -100,9 +99,14 @@ class ChainRun:
     def advance(self, until_s: float) -> Outcome:
         """Integrate the chain to a time [s] and return the outcome; do nothing if that time has passed."""
         self._motion["until"] = until_s
-        follow = partial(native_engine().call, "follow_chain", self._motion)
-        most = max(1, SLICE_CELL_WINDOWS // len(self._states))
-        return Outcome(in_slices(follow, self._motion, "windows_left", most))
+        size, left = max(1, SLICE_CELL_WINDOWS // len(self._states)), int(self._motion["windows_left"])
+        while True:
+            self._motion["windows_left"] = allowed = next_slice(left, size)
+            code = native_engine().call("follow_chain", self._motion)
+            left -= allowed - int(self._motion["windows_left"])
+            if code != Outcome.TOO_LONG or left <= 0:
+                self._motion["windows_left"] = max(left, 0)
+                return Outcome(code)
 
     @property
     def motion(self) -> Floats:

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from enum import IntEnum
@@ -83,21 +83,10 @@ def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
         yield part
 
 
-def in_slices(advance: Callable[[], int], counter: Structure, name: str, slice_steps: int) -> int:
-    """Call ``advance`` until it ends, with checks of the time limit between slices of its steps.
-
-    ``counter[name]`` is the number of steps that ``advance`` may still take; it returns `Outcome.TOO_LONG` at
-    zero. Without a time limit there is one slice.
-    """
-    left, is_limited = int(counter[name]), _END_S.get() < math.inf
-    while True:
-        check_time()
-        counter[name] = allowed = min(left, slice_steps) if is_limited else left
-        code = advance()
-        left -= allowed - int(counter[name])
-        if code != Outcome.TOO_LONG or left <= 0 or not is_limited:
-            counter[name] = max(left, 0)
-            return code
+def next_slice(steps_left: int, size: int) -> int:
+    """Check the time limit; return the number of steps until the next check, or all without a limit."""
+    check_time()
+    return min(steps_left, size) if _END_S.get() < math.inf else steps_left
 
 
 class Watch(IntEnum):
@@ -263,13 +252,16 @@ class NativeRun(_Run):
         Raises ValueError when the engine rejects the time.
         """
         tangent = self._tangent if self._tangent["changes"] > 0 else None
-
-        def go_on() -> int:
-            return self.engine.run(
+        left = int(record.structure["steps_left"])
+        while True:
+            record.structure["steps_left"] = allowed = next_slice(left, SLICE_STEPS)
+            code = self.engine.run(
                 self._tables, self._state, until_s, self.tolerance, record.structure, tangent
             )
-
-        code = in_slices(go_on, record.structure, "steps_left", SLICE_STEPS)
+            left -= allowed - int(record.structure["steps_left"])
+            if code != Outcome.TOO_LONG or left <= 0:
+                break
+        record.structure["steps_left"] = max(left, 0)
         if code < 0:
             raise ValueError(
                 f"The native engine refuses to advance to {until_s} s: the end time must be finite."
