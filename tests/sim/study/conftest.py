@@ -7,7 +7,7 @@ from vibench.sim.study import Study
 from vibench.sim.study._grid import SESSION, TAKEN
 
 SHORT = {"duration_s": 0.2, "window_s": 0.1, "budget_s": 0.0}
-OF_THE_OCCASION = (TAKEN, SESSION)
+OF_THE_OCCASION = (TAKEN, SESSION, "digest")
 """What may differ between two computations of the same study."""
 
 
