@@ -16,6 +16,7 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import (
     BUDGET_S,
     Ensemble,
+    MotionKind,
     Observable,
     Outcome,
     Rest,
@@ -235,6 +236,8 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
         rows.add_row(*cells, _share_text(each), *[exponent] * has_exponents)
     if points:
         print_table(rows)
+    if len(points) == 1 and points[0].motion is MotionKind.UNDECIDED:
+        console.print(f"Undecided: {points[0].ended}. The responses are those of this window.")
     if step > 1:
         console.print(f"one in {step} points is shown (of {len(points)}); --json or --out gives all")
     motions = _motions_table(points)

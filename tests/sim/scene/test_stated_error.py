@@ -59,6 +59,19 @@ def test_responses_agree_within_errors_even_if_only_one_accuracy_level_finds_the
         assert np.all(off <= errors(found) + errors(reference))
 
 
+def test_the_error_of_a_fixed_window_includes_the_distance_to_the_steady_state():
+    specimen = gong2025(3.141343367807852e-6, 3.1865246546292145e-5, "linear_gap")
+    drive = Harmonic(561.6604926866107, 2.6175677047112556e-6)
+    found, later = (
+        solve_scene(Scene(specimen, drive, duration=FixedDuration(length_s, 2.0)))
+        for length_s in (30.0, 300.0)
+    )
+    assert found.motion is later.motion is MotionKind.PERIODIC
+    off = np.abs(responses(found) / responses(later) - 1.0)
+    assert off.max() > 1e-8
+    assert np.all(off <= errors(found) + errors(later))
+
+
 def test_undamped_motions_from_different_initial_states_differ_within_the_stated_error():
     """Each of 24 differences is within the error at 95 % probability; fewer than 16 at 0.01 %."""
     scene = scene_of("hunt_crossley:1", 64.4, 20e-6, 0.0, duration=FixedDuration(3.0, 1.0))

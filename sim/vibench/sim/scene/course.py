@@ -55,6 +55,9 @@ class SceneRun:
     """Whether a small perturbation grew enough to prove chaos."""
     wandered_until_s: float
     """Last time at which successive periods of the motion still differed [s]."""
+    steady_m: Floats | None = None
+    """Responses of the periodic motion that the run approaches, shape (4,) [m]; None if the motion does not
+    repeat."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
     """Relative change of the responses by leakage if spectral lines are computed over the whole window, shape
     (4,). Zero unless the motion was found to repeat only within the window."""
@@ -121,7 +124,7 @@ def classify(
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
-    motion = kind_of(repeats, growth, pace.fading_s)
+    motion, steady_m = kind_of(repeats, growth, pace.fading_s), None
     if run.outcome is not Outcome.REACHED_END:
         motion, repeats, ended = MotionKind.UNDECIDED, None, run.outcome.text
     elif repeats is not None:
@@ -131,6 +134,9 @@ def classify(
             motion, repeats = MotionKind.UNDECIDED, None
         else:
             repeats = replace(repeats, distance=found.distance)
+            end_s = found.run.time_s + repeats.period / pace.frequency_hz
+            one = found.run.copy().follow(end_s, Watch.PEAKS_AND_LINES)
+            steady_m = window_of(found.run, [one]).responses_m
     elif motion is MotionKind.QUASI_PERIODIC and any(map(pace.drifts, (stretches, window.stretches))):
         motion, ended = MotionKind.UNDECIDED, f"after {run.time_s:.3g} s it still drifts"
     return SceneRun(
@@ -144,6 +150,7 @@ def classify(
         path=tuple(stretches),
         grew=growth.is_certain and repeats is None,
         wandered_until_s=run.time_s if repeats is None else stretches[0].start_s,
+        steady_m=steady_m,
     )
 
 

@@ -101,6 +101,8 @@ def stated_errors(
     if seen.repeats is not None and seen.was_settled:
         off = settled_errors(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
+    if seen.steady_m is not None:
+        sure += SAFETY * np.abs(answer - seen.steady_m) / answer
     strict = _strict_run(scene, begin, seen, run)
     if strict.responses_m is not None and strict.is_together:
         off = np.abs(answer - strict.responses_m) / np.abs(answer)
