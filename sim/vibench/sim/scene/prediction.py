@@ -7,7 +7,7 @@ import numpy as np
 
 from ..specimen.outcome import Outcome
 from ..specimen.state import Floats
-from .shares import EscapeRate, Share
+from .shares import UNSURE, EscapeRate, Share
 
 State = tuple[float, float, float, float, float, float]
 """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
@@ -118,8 +118,21 @@ class TargetReport:
     """Whether more time may reach the requested error; False if that takes more than ten days."""
 
     @property
+    def unseen_share(self) -> float:
+        """Upper 95 % confidence limit of the share of starts with a motion that no start has reached.
+
+        The stated error does not include such motions if all starts are chaotic.
+        """
+        return 1.0 - UNSURE ** (1.0 / self.starts) if self.starts > 0 else 1.0
+
+    @property
     def text(self) -> str:
-        """Return requested and reached error and time as a phrase."""
+        """Return requested and reached error and time as a phrase, and the limits of several starts."""
+        missed = f"{self.starts} starts may miss motions of up to {_percent(self.unseen_share)} of starts"
+        return f"{self._reached}; {missed}" if self.starts > 1 else self._reached
+
+    @property
+    def _reached(self) -> str:
         if self.error is None:
             return f"no error is known after {_seconds(self.time_s)}"
         reached = _percent(self.error)
