@@ -350,9 +350,7 @@ def test_a_dwell_that_was_exported_and_imported_gives_the_same_results(dwell_fil
         ("base_acceleration", "base_acceleration", ""),
         ("m0_velocity", "m0_velocity", f"delay_s = {delay_s!r}"),
     ]
-    made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
-    with open_recording(made) as recording:
-        found = analyse(recording)
+    found = analyse(import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5"))
     assert found.response.response_i == pytest.approx(original.response.response_i, rel=1e-6)
     assert found.response.response_ii == pytest.approx(original.response.response_ii, rel=1e-6)
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
@@ -374,9 +372,7 @@ def test_noise_that_was_exported_and_imported_gives_the_same_transmission(noise_
         + " }\n"
     )
     channels = [(f"{role}.values", role, "") for role in roles]
-    made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
-    with open_recording(made) as recording:
-        found = analyse(recording)
+    found = analyse(import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5"))
     wanted = original.response.frequency_response
     np.testing.assert_array_equal(found.response.frequency_response.frequency_hz, wanted.frequency_hz)
     np.testing.assert_allclose(found.response.frequency_response.value, wanted.value, rtol=1e-4)

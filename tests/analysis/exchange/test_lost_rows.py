@@ -163,8 +163,7 @@ def test_times_that_show_lost_samples_are_reported_even_if_a_mapping_replaces_th
     places = kept_rows("single", share, np.random.default_rng(8), DWELL_SAMPLES)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     made = import_recording(path, meaning(10_000.0, time="even"), tmp_path / "a.h5")
-    with open_recording(made) as recording:
-        (check,) = (each for each in analyse(recording).checks if each.what == "Time of the imported file")
+    (check,) = (each for each in analyse(made).checks if each.what == "Time of the imported file")
     assert check.verdict is (Verdict.WARNING if share else Verdict.NOTE)
     assert ("frequencies and amplitudes are wrong" in check.text) == (share > 0)
 
@@ -172,14 +171,12 @@ def test_times_that_show_lost_samples_are_reported_even_if_a_mapping_replaces_th
 def test_a_dwell_with_missing_rows_is_refused_but_a_part_without_gaps_is_analysed(tmp_path):
     places = np.delete(np.arange(DWELL_SAMPLES), 16_500)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
-    with (
-        open_recording(import_recording(path, meaning(10_000.0), tmp_path / "a.h5")) as recording,
-        pytest.raises(UnusableData, match="import a part of the file without lost samples"),
-    ):
-        analyse(recording)
+    whole = import_recording(path, meaning(10_000.0), tmp_path / "a.h5")
+    with pytest.raises(UnusableData, match="import a part of the file without lost samples"):
+        analyse(whole)
     part = meaning(10_000.0, parts=[{"start_s": 0.1, "stop_s": 1.6}])
-    with open_recording(import_recording(path, part, tmp_path / "b.h5")) as recording:
-        assert analyse(recording).response.drive.frequency_hz == pytest.approx(150.0, abs=0.01)
+    found = analyse(import_recording(path, part, tmp_path / "b.h5"))
+    assert found.response.drive.frequency_hz == pytest.approx(150.0, abs=0.01)
 
 
 def test_a_file_with_more_gaps_than_a_recording_can_store_is_refused_without_leftovers(tmp_path):

@@ -318,8 +318,8 @@ def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, 
     volts, base = np.cos(phase), 3.0 * np.cos(phase + 0.4) + 1e-4 * rng.standard_normal(phase.size)
     velocity = np.clip(np.cos(phase + 1.0), low, high) + (noise + 1e-5) * rng.standard_normal(phase.size)
     meaning = dwell_at(tmp_path / "a.csv", volts, base, velocity, more=full_scale)
-    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
-        (check,) = (each for each in analyse(recording).checks if each.what == "Overloads")
+    checks = analyse(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")).checks
+    (check,) = (each for each in checks if each.what == "Overloads")
     if high < 1:
         assert check.verdict is Verdict.WARNING
         assert "flat tops: m0_velocity at 0.8" in check.text
@@ -559,7 +559,6 @@ def test_an_imported_dwell_with_a_burst_is_not_periodic(tmp_path, at_s, length_s
     content = dwell_at(tmp_path / "a.csv", np.cos(phase), base, velocity).model_dump()
     content["measurement"]["excitation"]["duration_s"] = 11.0
     meaning = validate(content, ImportMapping, "test")
-    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
-        verdict = analyse(recording).motion.verdict
+    verdict = analyse(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")).motion.verdict
     assert (verdict.kind == "periodic") == (share == 0), verdict.why
     assert ("burst" in verdict.why) == (share > 0)

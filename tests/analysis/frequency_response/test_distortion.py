@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.analysis import synthetic_recordings as synthetic
-from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
 from vibench.analysis.figures.noise import distortion_caption, distortion_figure
@@ -58,9 +57,9 @@ def analyse_with(tmp_path_factory):
         motion, acceleration = np.concatenate(motions, axis=1)
         base = synthetic.Motion(motion + drive_noise_m * rng.standard_normal(motion.size), acceleration)
         folder = tmp_path_factory.mktemp("odd")
-        path = synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="odd")
-        with open_recording(path) as recording:
-            return analyse(recording)
+        return analyse(
+            synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="odd")
+        )
 
     return record_and_analyse
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from tests.analysis import synthetic_recordings as synthetic
-from vibench.acquisition import Overload, open_recording
+from vibench.acquisition import Overload
 from vibench.analysis import (
     Estimator,
     FrequencyResponseRequest,
@@ -23,8 +23,7 @@ RATE = 6400.0
 
 
 def response(path, **asked):
-    with open_recording(path) as recording:
-        return analyse(recording, FrequencyResponseRequest(**asked)).response
+    return analyse(path, FrequencyResponseRequest(**asked)).response
 
 
 @pytest.mark.parametrize("noisy", ["base", "m0"])
@@ -42,8 +41,7 @@ def test_an_estimator_biased_by_noise_gives_a_remark(streamed_noise, tmp_path, e
     path = synthetic.write_recording(tmp_path, plan, base, velocity, parts)
     # A wrong noise ratio makes the HV estimate biased by noise on the other channel.
     ratio = {"noise_ratio": 1e6 if noisy == "base" else 0.0} if estimator is Estimator.HV else {}
-    with open_recording(path) as recording:
-        checks = analyse(recording, FrequencyResponseRequest(estimator=estimator, **ratio)).checks
+    checks = analyse(path, FrequencyResponseRequest(estimator=estimator, **ratio)).checks
     remarks = [each.text for each in checks if each.what == "Estimator"]
     assert bool(remarks) == (biased_by in (noisy, "both"))
     assert all(estimator.value in each and "drive" in each for each in remarks)

@@ -5,7 +5,6 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_recording
 from vibench.acquisition.plan import StreamedNoise
 from vibench.analysis import FrequencyResponseRequest, analyse
 from vibench.analysis.frequency_response.noise_response import streamed_response
@@ -64,8 +63,7 @@ def test_a_four_times_longer_record_needs_no_more_memory():
 
 def test_analysis_progress_reports_every_stage_and_its_completed_share(streamed_file):
     heard = []
-    with open_recording(streamed_file()) as recording:
-        analyse(recording, observer=heard.append)
+    analyse(streamed_file(), observer=heard.append)
     stages = ["streamed.h5: looking at every channel", "streamed.h5: analysing"]
     assert [each.note for each in heard if each.of == 0] == stages
     for stage in stages:

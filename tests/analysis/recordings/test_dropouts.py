@@ -12,7 +12,7 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.plan import Dwell, SineSweep, WhiteNoise
 from vibench.acquisition.recording import BridgedChannel, Dropout, bridge, find_dropouts
 from vibench.acquisition.rig import Rig
-from vibench.analysis import Simulation, analyse_files
+from vibench.analysis import Simulation, analyse, analyse_files
 from vibench.analysis.recordings.checks import Verdict, measurement_checks
 from vibench.analysis.recordings.facts import recording_facts
 from vibench.sim import shipped_specimens
@@ -148,7 +148,7 @@ def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(tmp_path):
     results = []
     for dropouts_per_s in (0.0, 4.0):
         path = measure(RIG, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
-        results.append(analyse_files([path], "d", Simulation.LEFT_OUT).results[0].analysis)
+        results.append(analyse(path))
     light, dark = (each.response for each in results)
     assert dark.response_i == pytest.approx(light.response_i, rel=2e-3)
     assert dark.response_ii == pytest.approx(light.response_ii, abs=4 * light.sd_response_ii)

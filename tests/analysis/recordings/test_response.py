@@ -5,7 +5,7 @@ import pytest
 
 from tests.analysis.conftest import A0_STRONG, A0_WEAK, DWELL_PART, dwell_plan, synthetic
 from vibench.acquisition import Overload, open_recording
-from vibench.analysis import Simulation, analyse_files
+from vibench.analysis import analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channel_levels import channel_levels
 from vibench.analysis.recordings.channels import RecordedChannels
@@ -47,10 +47,6 @@ def sensor_file(dwell_motions, tmp_path):
     return write
 
 
-def analysis_of(path):
-    return analyse_files([path], "response", Simulation.LEFT_OUT).results[0].analysis
-
-
 @pytest.mark.parametrize("rate_hz", [5120.0, 51200.0])
 @pytest.mark.parametrize("kernel", [integral_kernel, derivative_kernel])
 def test_integral_and_derivative_kernels_are_exact_from_5_hz_to_0_4_of_rate(kernel, rate_hz):
@@ -69,8 +65,8 @@ SENSORS = pytest.mark.parametrize("response", [ACCELERATION, DISPLACEMENT])
 @SENSORS
 @pytest.mark.parametrize("level", ["weak", "strong"])
 def test_dwell_responses_are_equal_for_any_sensor(dwell_file, sensor_file, level, response):
-    expected = analysis_of(dwell_file(level))
-    found = analysis_of(sensor_file(level, response, delay_s=1 / RATE))
+    expected = analyse(dwell_file(level))
+    found = analyse(sensor_file(level, response, delay_s=1 / RATE))
     assert found.response.response_i == pytest.approx(expected.response.response_i, rel=1e-4)
     assert found.response.response_ii == pytest.approx(expected.response.response_ii, rel=1e-4)
     assert found.motion.verdict.kind is expected.motion.verdict.kind
@@ -82,7 +78,7 @@ def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp
     plan, base, velocity, parts = noise_motion
     values = sensor_values(velocity, response)
     path = synthetic.write_recording(tmp_path, plan, base, values, parts, response=response)
-    expected, found = (analysis_of(each).response for each in (noise_file(), path))
+    expected, found = (analyse(each).response for each in (noise_file(), path))
     np.testing.assert_allclose(
         found.frequency_response.value, expected.frequency_response.value, rtol=1e-3, atol=1e-3
     )

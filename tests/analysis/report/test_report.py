@@ -12,6 +12,7 @@ from vibench.analysis import (
     CampaignResults,
     NotEnoughData,
     Simulation,
+    analyse,
     analyse_files,
     budgets_of,
     campaign_summary,
@@ -123,7 +124,7 @@ def test_every_figure_has_one_legend_without_repeated_entries(campaign):
 
 
 def test_important_warnings_are_at_the_top_and_minor_ones_at_their_recording(dwell_file, tmp_path):
-    analysis = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT).results[0].analysis
+    analysis = analyse(dwell_file("weak"))
     assert {each.what for each in analysis.checks} >= CHANGE_A_CONCLUSION - {"Copies", "Drop-outs"}
     for what, is_first in (("Overloads", True), ("Calibration", False)):
         checks = (Check(what, Verdict.WARNING, "look at it"),)

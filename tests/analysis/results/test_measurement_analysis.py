@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import NotEnoughData, analyse
@@ -18,11 +17,6 @@ from vibench.analysis.sine.sweep_analysis import SweepAnalysis, frequency_check
 from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0
-
-
-def analysis_of(path):
-    with open_recording(path) as recording:
-        return analyse(recording)
 
 
 def truth(frequency_hz):
@@ -39,7 +33,7 @@ def test_analyse_accepts_a_recording_as_path_or_text(dwell_file):
 
 
 def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file):
-    found = analysis_of(dwell_file("weak"))
+    found = analyse(dwell_file("weak"))
     assert isinstance(found, DwellAnalysis)
     assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
     assert found.response.drive.amplitude_m == pytest.approx(0.5e-6, rel=1e-4)
@@ -52,7 +46,7 @@ def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file)
 
 
 def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal_bands(dwell_file):
-    weak, strong = analysis_of(dwell_file("weak")), analysis_of(dwell_file("strong"))
+    weak, strong = analyse(dwell_file("weak")), analyse(dwell_file("strong"))
     assert strong.response.response_ii < 0.3 * weak.response.response_ii
     assert strong.response.response_i > 2 * strong.response.response_ii
     for quiet, loud in zip(weak.terminal, strong.terminal, strict=True):
@@ -60,7 +54,7 @@ def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal
 
 
 def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_file):
-    found = analysis_of(noise_file())
+    found = analyse(noise_file())
     assert isinstance(found, NoiseAnalysis)
     estimate = found.response
     lines = estimate.frequency_response.frequency_hz
@@ -75,7 +69,7 @@ def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_
 
 
 def test_a_sweep_matches_the_closed_form_below_its_collision_region(sweep_file):
-    found = analysis_of(sweep_file)
+    found = analyse(sweep_file)
     assert isinstance(found, SweepAnalysis)
     region = found.collisions.regions[0]
     before = found.response.frequency_hz < region.low_hz - 5
@@ -87,7 +81,7 @@ def test_a_sweep_matches_the_closed_form_below_its_collision_region(sweep_file):
 
 
 def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
-    found = analysis_of(stepped_file)
+    found = analyse(stepped_file)
     assert isinstance(found, SteppedSineAnalysis)
     assert found.response.frequency_hz == pytest.approx([150.0, 180.0], rel=1e-7)
     assert found.response.response_ii == pytest.approx(np.abs(truth([150.0, 180.0])), rel=1e-3)
@@ -96,7 +90,7 @@ def test_every_step_of_a_stepped_sine_is_analysed_like_a_dwell(stepped_file):
 
 def test_an_aborted_dwell_is_analysed_with_a_warning(dwell_file):
     path = dwell_file("weak", state=RecordingState.STOPPED, reason="cancelled", samples=round(4 * RATE))
-    found = analysis_of(path)
+    found = analyse(path)
     assert found.response.window_s < 2.0
     assert found.response.response_ii == pytest.approx(abs(truth(260.0)[0]), rel=2e-3)
     assert verdict(found, "How it ended") is Verdict.WARNING
@@ -106,18 +100,18 @@ def test_an_aborted_dwell_is_analysed_with_a_warning(dwell_file):
 def test_a_recording_that_ended_before_its_dwell_is_refused_with_the_reason(dwell_file):
     path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
     with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
-        analysis_of(path)
+        analyse(path)
 
 
 def test_a_dwell_with_a_gap_is_refused_with_the_number_of_lost_samples(dwell_file):
     path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
     with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
-        analysis_of(path)
+        analyse(path)
 
 
 def test_a_realisation_with_a_gap_is_excluded(noise_file):
     first = round(3.1 * RATE)
-    found = analysis_of(noise_file(hole=(first, first + 10)))
+    found = analyse(noise_file(hole=(first, first + 10)))
     assert found.response.left_out == 1
     assert found.response.periodic.realisations == 1
     assert found.facts.lost_samples == 10
@@ -130,7 +124,7 @@ def test_a_realisation_with_a_gap_is_excluded(noise_file):
 
 
 def test_a_faultless_recording_passes_its_checks(dwell_file):
-    found = analysis_of(dwell_file("weak"))
+    found = analyse(dwell_file("weak"))
     assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
     assert verdict(found, "Calibration") is Verdict.PASSED
     assert verdict(found, "Drive frequency") is Verdict.PASSED
@@ -149,7 +143,7 @@ def test_a_drive_at_another_frequency_than_the_plan_is_reported():
 )
 def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
     generator = load_rig("virtual_rig").generator.model_dump(mode="json")
-    facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})
+    facts = replace(analyse(dwell_file("weak")).facts, bench={"generator": generator})
     setting_v = facts.measurement.excitation.amplitude_vpp / 2
     levels = tuple(
         replace(each, peak=share * setting_v) if each.header.role == "drive_voltage" else each
@@ -174,7 +168,7 @@ def scaled(facts, channel, factor, **header):
 
 @pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-6), ("m0_velocity", 1e-5)])
 def test_a_scale_that_makes_the_response_absurd_is_reported(dwell_file, role, factor):
-    facts = analysis_of(dwell_file("weak")).facts
+    facts = analyse(dwell_file("weak")).facts
     assert "Scales" not in {each.what for each in measurement_checks(facts)}
     (found,) = [each for each in measurement_checks(scaled(facts, role, factor)) if each.what == "Scales"]
     assert found.verdict is Verdict.WARNING
@@ -190,7 +184,7 @@ def imported_base(unit, source):
 
 @pytest.mark.parametrize("case", ["small force", "sharp resonance", "base in V", "base from the drive"])
 def test_a_large_or_small_response_is_not_always_a_wrong_scale(dwell_file, case):
-    facts = analysis_of(dwell_file("weak")).facts
+    facts = analyse(dwell_file("weak")).facts
     match case:
         case "small force":
             found = scaled(facts, "m0_velocity", 1e-5, role="base_force", quantity="force")
@@ -209,13 +203,13 @@ def test_a_large_or_small_response_is_not_always_a_wrong_scale(dwell_file, case)
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
 def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
-    facts = replace(analysis_of(dwell_file("weak")).facts, bench={"generator": generator})
+    facts = replace(analyse(dwell_file("weak")).facts, bench={"generator": generator})
     (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
     assert found.verdict is Verdict.PASSED
 
 
 def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_no_age(dwell_file):
-    facts = analysis_of(dwell_file("weak")).facts
+    facts = analyse(dwell_file("weak")).facts
     channels = tuple(
         replace(each, header=replace(each.header, calibration_date="2098-02-10")) for each in facts.channels
     )
@@ -227,7 +221,7 @@ def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_n
 
 
 def test_a_channel_level_states_peak_and_rms(dwell_file, dwell_motions):
-    found = analysis_of(dwell_file("weak"))
+    found = analyse(dwell_file("weak"))
     velocity = dwell_motions["weak"][1]
     level = found.facts.level("m0_velocity")
     assert level.peak == pytest.approx(np.max(np.abs(velocity)), rel=1e-6)

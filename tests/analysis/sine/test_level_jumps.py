@@ -5,7 +5,6 @@ import pytest
 
 from tests.analysis import synthetic_recordings as synthetic
 from tests.analysis.virtual_measurements import record, sampled_at, simulated_with
-from vibench.acquisition import open_recording
 from vibench.acquisition.plan import SteppedLevel
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.kinds.analysis_kind import Result
@@ -21,9 +20,7 @@ def analysis(tmp_path_factory):
     plan = SteppedLevel(
         frequency_hz=195, amplitude_vpp=0.8, lowest_vpp=0.1, step_vpp=0.1, settle_s=1.5, record_s=0.7
     )
-    path = tmp_path_factory.mktemp("level") / "level.h5"
-    with open_recording(record(path, plan, rig)) as recording:
-        return analyse(recording)
+    return analyse(record(tmp_path_factory.mktemp("level") / "level.h5", plan, rig))
 
 
 def test_the_specimen_jumps_up_at_a_higher_level_than_down(analysis):
@@ -115,8 +112,8 @@ def test_a_jump_during_the_record_of_one_step_counts_as_one_jump(tmp_path, facto
         )
         for number, level in enumerate(levels)
     ]
-    with open_recording(synthetic.write_recording(tmp_path, plan, base, velocity, parts)) as recording:
-        (jump,) = level_jumps(analyse(recording).response)
+    found = analyse(synthetic.write_recording(tmp_path, plan, base, velocity, parts))
+    (jump,) = level_jumps(found.response)
     assert jump.factor == pytest.approx(factor, rel=0.05)
     assert (jump.before_vpp, jump.after_vpp) == (0.2, 0.4)
 

@@ -5,14 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_recording
 from vibench.analysis import analyse
 from vibench.analysis.sine.dwell_analysis import terminal_levels
 
 
 def test_a_terminal_level_is_the_line_amplitude_relative_to_the_drive_line(dwell_file):
-    with open_recording(dwell_file("weak")) as recording:
-        response = analyse(recording).response
+    response = analyse(dwell_file("weak")).response
     motion = response.displacement
     line_m = abs(response.order_displacement[response.orders.index(1.0)])
     time_s = np.arange(motion.samples.size) / motion.sample_rate_hz
