@@ -46,7 +46,7 @@ def edited_config(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -
         ("ahead_s = 0.5", "ahead_s = 60", r"daq\.output\.ahead_s = 60: .*less than or equal to 5"),
         ("ahead_s = 0.5", "ahead = 0.5", r"daq\.output\.ahead is not a known key"),
         ('plays = "tones_and_streams"', 'plays = "all"', r"'all': .*'streams' or 'tones_and_streams'"),
-        ("sample_rate_hz = 51200\n# Longest", "sample_rate_hz = 0\n# Longest", r"output\.sample_rate_hz = 0: .*0"),
+        ("sample_rate_hz = 51200\n# L", "sample_rate_hz = 0\n# L", r"output\.sample_rate_hz = 0: .*0"),
     ],
 )
 def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
