@@ -69,8 +69,9 @@ def test_a_second_path_is_refused_with_the_advice_to_give_one(vibench_here, tmp_
     assert "(b.h5); give one path, such as a folder" in " ".join(said.split())
 
 
-def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_of):
-    assert "needs about" in output_of("predict", *SCENE, "--error", "0.1%", "--time", "0.2s")
+@pytest.mark.parametrize(("error", "remark"), [("0.1%", "needs about"), ("1e-6", "is not reachable")])
+def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_of, error, remark):
+    assert remark in output_of("predict", *SCENE, "--error", error, "--time", "1s")
 
 
 @pytest.mark.parametrize("time", ["1e9h", "1e300h"])
