@@ -39,14 +39,6 @@ class Piece:
         shift = self.place - self.first
         return range(max(self.place, first + shift), min(self.end, stop + shift))
 
-    def without(self, span: range) -> "Iterator[Piece]":
-        """Yield the parts of this piece outside of times within it."""
-        for start, stop in (
-            ((self.place, span.start), (span.stop, self.end)) if span else ((self.place, self.end),)
-        ):
-            if start < stop:
-                yield Piece(self.first + start - self.place, start, stop - start)
-
 
 def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
     """Return the parts of a channel between jumps of its times; samples at repeated times are left out.

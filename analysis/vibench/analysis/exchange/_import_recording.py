@@ -133,6 +133,8 @@ class _ChannelImport:
     source: SourceChannel
     pieces: tuple[Piece, ...]
     late_s: float
+    held: tuple[range, ...] = ()
+    """Times without new values, which count as lost [sample intervals]."""
 
     def read(self, source: Source, start: int, stop: int) -> Reals:
         """Return samples of the common time axis from ``start`` to ``stop``; missing samples are NaN."""
@@ -144,6 +146,8 @@ class _ChannelImport:
             first, last = max(start, piece.place), min(stop, piece.end)
             shift = piece.first - piece.place
             values[first - start : last - start] = source.read(self.source, first + shift, last + shift)
+        for span in self.held:
+            values[max(0, span.start - start) : max(0, span.stop - start)] = np.nan
         return values
 
 
@@ -216,19 +220,15 @@ def _without_held(
     parts = [range(each.start, min(each.stop, samples)) for each in place_parts(mapping, rate_hz, samples)]
     excitation, remarks, end, kept = mapping.measurement.excitation, [], samples, []
     for each in wanted:
-        pieces = each.pieces
-        found = held_values(source, each.source, each.pieces, each.mapped, excitation, rate_hz)
-        for start, stop, what in found:
+        held: list[range] = []
+        for start, stop, what in held_values(source, each.source, each.mapped, excitation, rate_hz):
             spans = [span for piece in each.pieces if (span := piece.span(start, stop))]
-            if not any(max(part[0], span[0]) < min(part[-1], span[-1]) for part in parts for span in spans):
-                continue
-            if stop == each.source.samples:
-                end = min(end, spans[0][0])
-            else:
-                pieces = tuple(one for piece in pieces for one in piece.without(piece.span(start, stop)))
-            times = f"from {spans[0][0] / rate_hz:.6g} to {(spans[-1][-1] + 1) / rate_hz:.6g} s"
-            remarks.append(f"{each.mapped.role} {what} {times}")
-        kept.append(replace(each, pieces=pieces))
+            if any(max(part[0], span[0]) < min(part[-1], span[-1]) for part in parts for span in spans):
+                end = min(end, spans[0][0]) if stop == each.source.samples else end
+                held += spans
+                times = f"from {spans[0][0] / rate_hz:.6g} to {(spans[-1][-1] + 1) / rate_hz:.6g} s"
+                remarks.append(f"{each.mapped.role} {what} {times}")
+        kept.append(replace(each, held=tuple(held)))
     return tuple(kept), end, remarks
 
 

@@ -26,6 +26,8 @@ _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
 """Starting point of the search: parameters of a small electrodynamic shaker."""
 _REACH = np.log(300.0)
 """Largest natural logarithm of the ratio of a parameter to its typical value."""
+_PRIOR_SD = 1.0
+"""Prior standard deviation of the logarithm of each parameter, for their random values."""
 _STARTS = 12
 _NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
 
@@ -104,7 +106,9 @@ def fit_shaker(
             f"per degree of freedom, at most {LARGEST_CHI2:g}): the amplifier, the table or the specimen "
             "differs from its description, or masses collide; check the bench file, or choose weaker noise"
         )
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * max(chi2, 1.0)
+    # An undetermined parameter, such as a small inductance, hardly acts within this prior.
+    precision = best.jac.T @ best.jac / max(chi2, 1.0) + np.eye(len(_TYPICAL)) / _PRIOR_SD**2
+    covariance = np.linalg.inv(precision)
     return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)
 
 

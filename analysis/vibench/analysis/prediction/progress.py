@@ -519,14 +519,12 @@ class SimulationProgress:
         """Return the similarity of Response I of both models; None without common results."""
         if len(self._found) < 2:
             return None
-        first, second = (model for model in self.models if model in self._found)
-        both = sorted(self._found[first].keys() & self._found[second].keys())
-        frequency_hz = np.array(both, dtype=np.float64)
-        curves = []
-        for model in (first, second):
-            values = [self._found[model][key].response_i for key in both]
-            response = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
-            curves.append(SimilarityCurve(frequency_hz, response, self._amplitude_m))
+        columns = [self.column(model, "response_i") for model in self.models if model in self._found]
+        both_hz = np.intersect1d(columns[0][0], columns[1][0])
+        curves = [
+            SimilarityCurve(both_hz, response[np.isin(hz, both_hz)], self._amplitude_m)
+            for hz, response in columns
+        ]
         try:
             return similarity(curves[0], curves[1])
         except AnalysisError:
