@@ -221,7 +221,8 @@ def _without_held(
     excitation, remarks, end, kept = mapping.measurement.excitation, [], samples, []
     for each in wanted:
         held: list[range] = []
-        for start, stop, what in held_values(source, each.source, each.mapped, excitation, rate_hz):
+        found = held_values(source, each.source, each.pieces, each.mapped, excitation, rate_hz)
+        for start, stop, what in found:
             spans = [span for piece in each.pieces if (span := piece.span(start, stop))]
             if any(max(part[0], span[0]) < min(part[-1], span[-1]) for part in parts for span in spans):
                 end = min(end, spans[0][0]) if stop == each.source.samples else end
