@@ -24,6 +24,17 @@ def qapp():
 
 
 @pytest.fixture
+def closing(qtbot):
+    """Return a function that returns its widget, which is closed after the test."""
+
+    def keep(widget):
+        qtbot.addWidget(widget)
+        return widget
+
+    return keep
+
+
+@pytest.fixture
 def context(qapp, tmp_path):
     context = AppContext(Settings(tmp_path / "window.ini"))
     yield context

@@ -63,9 +63,8 @@ def type_into(widget, text):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", FORMS)
-def test_the_error_for_a_bad_value_names_its_field_and_unit(qtbot, name):
-    form = FORMS[name]()
-    qtbot.addWidget(form)
+def test_the_error_for_a_bad_value_names_its_field_and_unit(closing, name):
+    form = closing(FORMS[name]())
     assert form.value is not None, form.complaint  # a newly chosen kind begins with valid values
     asked = 0
     for field, row in rows(form.form):
@@ -85,9 +84,8 @@ def test_the_error_for_a_bad_value_names_its_field_and_unit(qtbot, name):
     assert asked >= len(BAD)
 
 
-def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(qtbot):
-    form = SweepForm()
-    qtbot.addWidget(form)
+def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(closing):
+    form = closing(SweepForm())
     refused, wanted = [], []
     form.refused.connect(refused.append)
     form.wanted.connect(lambda *given: wanted.append(given))

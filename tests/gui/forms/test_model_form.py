@@ -20,10 +20,8 @@ MEASUREMENTS = {
 
 
 @pytest.fixture
-def form(qtbot):
-    form = ModelForm(Measurement)
-    qtbot.addWidget(form)
-    return form
+def form(closing):
+    return closing(ModelForm(Measurement))
 
 
 @pytest.mark.parametrize("name", MEASUREMENTS)
@@ -83,9 +81,8 @@ def test_non_numeric_text_shows_an_error_at_its_field_and_keeps_the_plan(form, q
     assert form.content()["ramp_s"] == MEASUREMENTS["quick-dwell"].ramp_s
 
 
-def test_invalid_text_in_a_group_that_is_switched_off_does_not_block_the_plan(qtbot):
-    form = ValidatedForm(Measurement, "test")
-    qtbot.addWidget(form)
+def test_invalid_text_in_a_group_that_is_switched_off_does_not_block_the_plan(qtbot, closing):
+    form = closing(ValidatedForm(Measurement, "test"))
     form.show_value(next(iter(MEASUREMENTS.values())))
     until = form.form.editors["until"]
     until.show_content({})
@@ -117,11 +114,10 @@ def test_the_help_of_a_field_is_its_description_in_the_model(form):
     )
 
 
-def test_the_form_warns_when_spring_constants_belong_to_another_mass(qtbot, tmp_path):
+def test_the_form_warns_when_spring_constants_belong_to_another_mass(closing, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\nmodel = "gong2025"\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n')
-    form = ValidatedForm(SpecimenChoice, "scene", frozenset({"described"}))
-    qtbot.addWidget(form)
+    form = closing(ValidatedForm(SpecimenChoice, "scene", frozenset({"described"})))
     form.form.show_content({"specimen": str(path)})
     assert form.value is not None
     assert "single_frequencies_hz was kept; give stiffnesses_n_per_m = [" in form.warning.text()

@@ -56,10 +56,9 @@ def type_text(qtbot, edit, text, *keys):
 
 
 @pytest.fixture
-def field(qtbot):
+def field(closing):
     def make(unit, value, kind=float):
-        edit = QuantityEdit(unit, kind)
-        qtbot.addWidget(edit)
+        edit = closing(QuantityEdit(unit, kind))
         edit.show()
         edit.show_content(value)
         return edit
@@ -109,9 +108,8 @@ def test_a_value_1000_times_larger_than_before_must_be_confirmed(qtbot, field):
     assert edit.complaint == ""
 
 
-def test_an_unconfirmed_value_does_not_enter_the_form(qtbot, field):
-    form = ValidatedForm(Dwell, "dwell")
-    qtbot.addWidget(form)
+def test_an_unconfirmed_value_does_not_enter_the_form(qtbot, closing, field):
+    form = closing(ValidatedForm(Dwell, "dwell"))
     form.show_value(Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=8.0))
     type_text(qtbot, form.form.editors["duration_s"].widget, "9000")
     assert form.value is None

@@ -121,9 +121,8 @@ def texts_of(page):
                     yield axis.labelText
 
 
-def form_of_a_kind(qtbot, kind):
-    form = FormOfATest()
-    qtbot.addWidget(form)
+def form_of_a_kind(closing, kind):
+    form = closing(FormOfATest())
     form.show_value(Measurement(name="trial", excitation=DWELL))
     form.form.editors["excitation"].kind_choice.setCurrentText(kind.replace("_", " "))
     return form
@@ -156,8 +155,8 @@ def test_a_change_of_units_converts_every_number_and_can_be_undone(full_window):
 
 
 @pytest.mark.parametrize("kind", EXCITATION_KINDS)
-def test_every_field_of_a_test_shows_and_reads_the_new_unit(qtbot, kind):
-    form = form_of_a_kind(qtbot, kind)
+def test_every_field_of_a_test_shows_and_reads_the_new_unit(closing, kind):
+    form = form_of_a_kind(closing, kind)
     before = form.value
     assert before is not None, form.complaint
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
@@ -169,8 +168,8 @@ def test_every_field_of_a_test_shows_and_reads_the_new_unit(qtbot, kind):
     assert form.value == before
 
 
-def test_lists_of_numbers_are_read_in_the_displayed_unit(qtbot):
-    form = form_of_a_kind(qtbot, "resonance_tracking")
+def test_lists_of_numbers_are_read_in_the_displayed_unit(closing):
+    form = form_of_a_kind(closing, "resonance_tracking")
     levels = form.form.editors["excitation"].form.editors["accelerations_m_per_s2"]
     UNITS.choose({"m/s²": "g"})
     levels.widget.setText("0.1, 0.2 g, 3 m/s²")
@@ -216,9 +215,8 @@ def test_a_field_accepts_its_displayed_text_and_any_stated_unit(unit, shown, tex
     assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
 
 
-def test_a_value_keeps_its_digits_when_shown_in_a_coarser_unit(qtbot):
-    form = ValidatedForm(HeldDwell, "dwell")
-    qtbot.addWidget(form)
+def test_a_value_keeps_its_digits_when_shown_in_a_coarser_unit(closing):
+    form = closing(ValidatedForm(HeldDwell, "dwell"))
     form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})
     edit = form.form.editors["base_level"].form.editors["acceleration_m_per_s2"].widget
     UNITS.choose({"m/s²": "g"})

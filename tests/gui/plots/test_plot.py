@@ -18,9 +18,8 @@ from vibench.gui.widgets.units import UNITS
 
 
 @pytest.fixture
-def plot(qapp, qtbot):
-    made = Plot("a plot", TIME, PlotAxis("Velocity of the mass", "mm/s", 1e3, short="v"), LIGHT)
-    qtbot.addWidget(made)
+def plot(qapp, closing):
+    made = closing(Plot("a plot", TIME, PlotAxis("Velocity of the mass", "mm/s", 1e3, short="v"), LIGHT))
     made.resize(400, 300)
     return made
 

@@ -13,9 +13,8 @@ RATE_HZ = 51200.0
 
 
 @pytest.fixture
-def plot(qtbot):
-    plot = Plot("signal", TIME, PlotAxis("Velocity", "m/s"), LIGHT)
-    qtbot.addWidget(plot)
+def plot(closing):
+    plot = closing(Plot("signal", TIME, PlotAxis("Velocity", "m/s"), LIGHT))
     plot.resize(800, 300)
     plot.show()
     return plot

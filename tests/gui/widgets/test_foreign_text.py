@@ -33,18 +33,16 @@ def read(tip):
 
 
 @pytest.mark.parametrize("kind", [ElidedLabel, SentenceLabel])
-def test_labels_show_markup_as_plain_text(qtbot, kind):
-    label = kind(HOSTILE)
-    qtbot.addWidget(label)
+def test_labels_show_markup_as_plain_text(closing, kind):
+    label = closing(kind(HOSTILE))
     label.setToolTip(HOSTILE)
     assert label.text() == SHOWN
     assert label.textFormat() is Qt.TextFormat.PlainText
     assert read(label.toolTip()) == SHOWN
 
 
-def test_tables_show_markup_as_plain_text(qtbot):
-    table = ReadTable("findings", ("what",))
-    qtbot.addWidget(table)
+def test_tables_show_markup_as_plain_text(closing):
+    table = closing(ReadTable("findings", ("what",)))
     table.show_rows([(HOSTILE,)])
     assert table.item(0, 0).text() == SHOWN
     assert read(table.item(0, 0).toolTip()) == SHOWN
@@ -78,9 +76,8 @@ def test_curve_lists_show_markup_as_plain_text(qtbot):
     assert pair.pair() == (made[1], made[0])
 
 
-def test_plots_show_markup_in_names_and_units_as_plain_text(qtbot):
-    plot = Plot("picture", TIME, PlotAxis("velocity", HOSTILE), LIGHT).with_legend()
-    qtbot.addWidget(plot)
+def test_plots_show_markup_in_names_and_units_as_plain_text(closing):
+    plot = closing(Plot("picture", TIME, PlotAxis("velocity", HOSTILE), LIGHT).with_legend())
     plot.curve(curve_style(0), HOSTILE).setData([0.0, 1.0], [1.0, 1.0])
     plot.curve(curve_style(1), "other").setData([0.0, 1.0], [2.0, 2.0])
     line = plot.upright(LIMIT, 0.5, "{" + HOSTILE)
@@ -92,9 +89,8 @@ def test_plots_show_markup_in_names_and_units_as_plain_text(qtbot):
     assert line.label.toPlainText() == "{" + SHOWN
 
 
-def test_rig_lists_show_markup_as_plain_text(qtbot, tmp_path):
-    choice = RigChoice()
-    qtbot.addWidget(choice)
+def test_rig_lists_show_markup_as_plain_text(closing, tmp_path):
+    choice = closing(RigChoice())
     choice._add(tmp_path / "<h1>a\u202eb.toml")
     last = choice._box.count() - 1
     assert choice._box.itemText(last) == r"<h1>a\u202eb"

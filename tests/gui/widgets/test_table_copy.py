@@ -9,9 +9,8 @@ from vibench.gui.widgets.read_table import ReadTable
 
 
 @pytest.fixture
-def table(qapp, qtbot):
-    made = ReadTable("Loads", ("used", "quantity", "limit"))
-    qtbot.addWidget(made)
+def table(qapp, qtbot, closing):
+    made = closing(ReadTable("Loads", ("used", "quantity", "limit")))
     made.show_rows([("12 %", "stroke", "10 mm"), ("3 %", "force", "20 N")])
     made.show()
     made.activateWindow()
@@ -44,9 +43,8 @@ def test_every_table_of_the_window_can_be_copied(window):
 
 
 @pytest.mark.parametrize("width", [120, 240, 900])
-def test_the_last_column_stays_readable_in_a_narrow_table(qtbot, width):
-    made = ReadTable("Findings", ("finding", "measured", "expected"))
-    qtbot.addWidget(made)
+def test_the_last_column_stays_readable_in_a_narrow_table(qtbot, closing, width):
+    made = closing(ReadTable("Findings", ("finding", "measured", "expected")))
     made.resize(width, 200)
     made.show()
     made.show_rows([("calibration of the converter", "2026-02-10", "at most 730 days before")])

@@ -28,9 +28,8 @@ def test_the_abort_key_works_in_a_field(qtbot, abort_signals, key):
     assert abort_signals == ["abort"]
 
 
-def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, abort_signals):
-    window = QWidget()
-    qtbot.addWidget(window)
+def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, closing, abort_signals):
+    window = closing(QWidget())
     window.show()
     dialog = QDialog(window)
     dialog.setModal(True)
@@ -43,16 +42,14 @@ def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, abort_signal
     assert not dialog.isVisible()
 
 
-def test_other_keys_do_not_abort(qtbot, abort_signals):
-    field = QLineEdit()
-    qtbot.addWidget(field)
+def test_other_keys_do_not_abort(qtbot, closing, abort_signals):
+    field = closing(QLineEdit())
     qtbot.keyClicks(field, "stop 123")
     assert abort_signals == []
 
 
-def test_every_press_of_the_abort_key_sends_an_abort(qtbot, abort_signals):
-    field = QLineEdit()
-    qtbot.addWidget(field)
+def test_every_press_of_the_abort_key_sends_an_abort(qtbot, closing, abort_signals):
+    field = closing(QLineEdit())
     for _ in range(3):
         qtbot.keyClick(field, Qt.Key.Key_Escape)
     assert len(abort_signals) == 3

@@ -9,9 +9,8 @@ from vibench.gui.window.banner import Banner, StateIndicator
 READABLE = 4.5
 
 
-def test_the_banner_shows_the_state_by_a_symbol_a_word_and_a_colour(qtbot):
-    banner = Banner()
-    qtbot.addWidget(banner)
+def test_the_banner_shows_the_state_by_a_symbol_a_word_and_a_colour(closing):
+    banner = closing(Banner())
     banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
     label = banner.findChild(QLabel, "engine_state")
     assert label.text() == "▶  RUNNING"
@@ -19,9 +18,8 @@ def test_the_banner_shows_the_state_by_a_symbol_a_word_and_a_colour(qtbot):
     assert label.property("tone") == "active"
 
 
-def test_a_click_on_stop_requests_a_stop(qtbot):
-    banner = Banner()
-    qtbot.addWidget(banner)
+def test_a_click_on_stop_requests_a_stop(qtbot, closing):
+    banner = closing(Banner())
     with qtbot.waitSignal(banner.stop_requested):
         banner.findChild(QPushButton, "stop").click()
 
@@ -41,9 +39,8 @@ def test_text_and_accents_have_enough_contrast_on_every_background(theme, contra
     assert contrast(theme.base, theme.accent) >= READABLE
 
 
-def test_the_stop_button_states_its_action_and_does_not_move(qtbot):
-    banner = Banner()
-    qtbot.addWidget(banner)
+def test_the_stop_button_states_its_action_and_does_not_move(qtbot, closing):
+    banner = closing(Banner())
     banner.resize(1000, 60)
     banner.show()
     button = banner.findChild(QPushButton, "stop")

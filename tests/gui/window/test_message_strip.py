@@ -18,9 +18,8 @@ def button(strip, text):
     return next(each for each in strip.findChildren(QPushButton) if each.text() == text)
 
 
-def test_the_message_strip_shows_the_event_the_reaction_and_advice(qtbot):
-    strip = MessageStrip()
-    qtbot.addWidget(strip)
+def test_the_message_strip_shows_the_event_the_reaction_and_advice(closing):
+    strip = closing(MessageStrip())
     strip.say(Notice(NoticeKind.WARNING, "The disk is nearly full.", "Recording goes on.", "Make room."))
     text = shown_text(strip)
     assert (
@@ -29,17 +28,15 @@ def test_the_message_strip_shows_the_event_the_reaction_and_advice(qtbot):
     assert text.startswith("⚠")
 
 
-def test_the_copy_button_puts_the_whole_message_on_the_clipboard(qtbot):
-    strip = MessageStrip()
-    qtbot.addWidget(strip)
+def test_the_copy_button_puts_the_whole_message_on_the_clipboard(closing):
+    strip = closing(MessageStrip())
     strip.say(notice_of(LimitExceeded("noise: the stroke would be 5 mm")))
     button(strip, "Copy").click()
     assert QGuiApplication.clipboard().text() == "FAULT: [LimitExceeded] noise: the stroke would be 5 mm"
 
 
-def test_dismissed_messages_remain_in_details(qtbot):
-    strip = MessageStrip()
-    qtbot.addWidget(strip)
+def test_dismissed_messages_remain_in_details(closing):
+    strip = closing(MessageStrip())
     strip.say(Notice(NoticeKind.INFO, "first"))
     button(strip, "Dismiss").click()
     assert not strip.is_said
@@ -50,9 +47,8 @@ def test_dismissed_messages_remain_in_details(qtbot):
     assert details.toPlainText() == "INFO: second\n\nINFO: first"
 
 
-def test_a_message_disappears_after_success_and_remains_in_details(qtbot):
-    strip = MessageStrip()
-    qtbot.addWidget(strip)
+def test_a_message_disappears_after_success_and_remains_in_details(closing):
+    strip = closing(MessageStrip())
     for kind in NoticeKind:
         strip.say(Notice(kind, "Nothing is armed."))
         assert strip.is_said

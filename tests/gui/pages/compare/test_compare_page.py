@@ -32,9 +32,8 @@ def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):
 
 
 @pytest.fixture
-def page(context, qtbot):
-    page = ComparePage(context)
-    qtbot.addWidget(page)
+def page(context, closing):
+    page = closing(ComparePage(context))
     page.resize(1300, 800)
     page.show()
     return page

@@ -357,11 +357,10 @@ def test_an_impossible_folder_name_is_refused(page, typed):
     assert page._folder_line.text() == str(page._folder)
 
 
-def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, wait_for, qtbot):
+def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, wait_for, closing):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
-    page = FilesPage(shared_context)
-    qtbot.addWidget(page)
+    page = closing(FilesPage(shared_context))
     page.list_folder()
     assert page.table.is_listing
     wait_for(lambda: len(page.table.recordings.entries) == 2)

@@ -119,10 +119,9 @@ def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
     page.simulator.cancel()
 
 
-def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot):
+def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot, closing):
     """With a recorded level the axis ran from 10 to 10^6 um."""
-    page = MapsPage(context)
-    qtbot.addWidget(page)
+    page = closing(MapsPage(context))
     page.resize(900, 700)
     page.show()
     page.map.show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), ()))

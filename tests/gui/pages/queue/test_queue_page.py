@@ -7,10 +7,8 @@ from vibench.gui.pages.queue.queue_page import QueuePage
 
 
 @pytest.fixture
-def page(shared_context, qtbot):
-    made = QueuePage(shared_context)
-    qtbot.addWidget(made)
-    return made
+def page(shared_context, closing):
+    return closing(QueuePage(shared_context))
 
 
 def test_rows_of_an_earlier_campaign_cannot_be_removed(page, wait_for):

@@ -8,10 +8,9 @@ from vibench.gui.pages.rig.rig_page import KnobSheetForm
 CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"
 
 
-def test_the_knob_sheet_requires_every_tick_and_an_operator_name(qtbot):
+def test_the_knob_sheet_requires_every_tick_and_an_operator_name(closing):
     rig = load_rig(CONFIGS / "lab_rig.toml")
-    form = KnobSheetForm()
-    qtbot.addWidget(form)
+    form = closing(KnobSheetForm())
     form.show_rig(rig)
     assert len(form.ticks) == len(rig.knobs)
     for tick in form.ticks:
@@ -26,9 +25,8 @@ def test_the_knob_sheet_requires_every_tick_and_an_operator_name(qtbot):
     assert form.sheet() is None
 
 
-def test_a_simulated_rig_needs_no_knob_sheet(qtbot):
-    form = KnobSheetForm()
-    qtbot.addWidget(form)
+def test_a_simulated_rig_needs_no_knob_sheet(closing):
+    form = closing(KnobSheetForm())
     form.show_rig(load_rig(CONFIGS / "virtual_rig.toml"))
     assert form.ticks == ()
     assert form.isHidden()

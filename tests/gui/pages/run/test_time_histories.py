@@ -18,9 +18,8 @@ OTHERS = (("base_acceleration", "m/s²"), ("m0_velocity", "V"))
 
 
 @pytest.fixture
-def time_histories(qapp, qtbot):
-    made = TimeHistoryPlots(LIGHT)
-    qtbot.addWidget(made)
+def time_histories(qapp, closing):
+    made = closing(TimeHistoryPlots(LIGHT))
     made.resize(1000, 700)
     made.show()
     return made

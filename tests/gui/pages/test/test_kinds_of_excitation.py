@@ -13,9 +13,8 @@ RIG = load_rig("virtual_rig")
 
 
 @pytest.fixture
-def form(qapp, qtbot):
-    form = _test_form.TestForm()
-    qtbot.addWidget(form)
+def form(qapp, closing):
+    form = closing(_test_form.TestForm())
     form.show_value(shipped_tests()[0].measurement)
     return form
 
