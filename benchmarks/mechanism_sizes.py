@@ -55,8 +55,8 @@ def git(*arguments: str) -> str:
     return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 
 
-def lines_and_files(names: list[str], patterns: list[str], commit: str) -> tuple[int, int]:
-    """Return the number of lines and of files that match any pattern, at a commit."""
+def lines_of(names: list[str], patterns: list[str], commit: str) -> int:
+    """Return the number of lines of the files that match any pattern, at a commit."""
     matching = [
         name
         for name in names
@@ -65,7 +65,7 @@ def lines_and_files(names: list[str], patterns: list[str], commit: str) -> tuple
         and any(fnmatch(name, pattern) for pattern in patterns)
     ]
     texts = (git("show", f"{commit}:{name}") for name in matching)
-    return sum(text.count("\n") for text in texts), len(matching)
+    return sum(text.count("\n") for text in texts)
 
 
 def main() -> None:
@@ -74,13 +74,13 @@ def main() -> None:
     options.add_argument("--before", default=BEFORE, metavar="COMMIT")
     before = options.parse_args().before
     names = {each: git("ls-tree", "-r", "--name-only", each).splitlines() for each in (before, "HEAD")}
-    print("| mechanism | lines before | lines now | files before | files now |\n|---|---|---|---|---|")
+    print("| mechanism | before | now |\n|---|---|---|")
     for mechanism, patterns in MECHANISMS.items():
         old, new = (
-            lines_and_files(names[commit], places, commit)
+            lines_of(names[commit], places, commit)
             for commit, places in zip((before, "HEAD"), patterns, strict=True)
         )
-        print(f"| {mechanism} | {old[0]:,} | {new[0]:,} | {old[1]} | {new[1]} |")
+        print(f"| {mechanism} | {old:,} | {new:,} |")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 // Flight (motion without contact) under a harmonic drive up to the first touch, exact (decision 0004). Each
 // displacement is Re sum a_j V_j exp(l_j t) over the modes of eq. 1 without F, with the drive as the last
-// term. The search for a touch computes only p, sixteen grid steps at once (decision 0027).
+// term. The search for a touch computes only p, sixteen grid steps at once (decision 0008).
 #pragma once
 #include "clock.hpp"
 #include "detection.hpp"
