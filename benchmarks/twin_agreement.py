@@ -140,6 +140,20 @@ def random_rig(rng: np.random.Generator) -> tuple[Rig, str]:
     return rig, f"gap {1e6 * gap_m:.0f} um, damping {1e6 * damping_s:.0f} us"
 
 
+def noise_plan(level_vpp: float, seed: int) -> WhiteNoise:
+    """Return four realisations of noise from 50 to 600 Hz."""
+    return WhiteNoise(
+        amplitude_vpp=level_vpp,
+        band_start_hz=50,
+        band_stop_hz=600,
+        repetition_hz=2,
+        realisations=4,
+        periods=2,
+        settle_s=1.5,
+        seed=seed,
+    )
+
+
 def random_scenes(count: int, seed: int) -> Iterator[Comparison]:
     """Measure a dwell and noise on each of ``count`` random rigs."""
     rng = np.random.default_rng(seed)
@@ -148,16 +162,7 @@ def random_scenes(count: int, seed: int) -> Iterator[Comparison]:
         level_vpp = float(10 ** rng.uniform(-0.7, 0.9))
         frequency_hz = float(np.round(rng.uniform(90, 480), 1))
         dwell = Dwell(amplitude_vpp=level_vpp, frequency_hz=frequency_hz, settle_s=1.5, duration_s=4.0)
-        noise = WhiteNoise(
-            amplitude_vpp=level_vpp,
-            band_start_hz=50,
-            band_stop_hz=600,
-            repetition_hz=2,
-            realisations=4,
-            periods=2,
-            settle_s=1.5,
-            seed=int(rng.integers(1, 1 << 30)),
-        )
+        noise = noise_plan(level_vpp, int(rng.integers(1, 1 << 30)))
         scene = f"rig {number}: {words}, {level_vpp:.2g} Vpp"
         yield from compare(rig, dwell, f"{scene}, dwell {frequency_hz:g} Hz")
         yield from compare(rig, noise, f"{scene}, noise")
@@ -173,16 +178,7 @@ def shifted_channels(count: int, seed: int) -> Iterator[Comparison]:
         level_vpp, at_hz = float(10 ** rng.uniform(-1.3, 0.5)), float(np.round(rng.uniform(90, 480), 1))
         plan = (
             Dwell(amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=1.5, duration_s=4.0),
-            WhiteNoise(
-                amplitude_vpp=level_vpp,
-                band_start_hz=50,
-                band_stop_hz=600,
-                repetition_hz=2,
-                realisations=4,
-                periods=2,
-                settle_s=1.5,
-                seed=number,
-            ),
+            noise_plan(level_vpp, number),
             SteppedSine(
                 amplitude_vpp=level_vpp,
                 frequencies_hz=tuple(at_hz + step for step in range(0, 40, 5)),

@@ -37,7 +37,7 @@ LOOK_S = 1.0
 DRAWS = 8
 """Number of simulation runs per test: half of the default of `vibench analyse`, to save time."""
 PROCESSES = 2
-"""Number of analysis processes; each of them, like the measurement, needs up to 0.5 GB."""
+"""Number of analysis processes; the largest needed 0.7 GB."""
 
 
 class Analyst:

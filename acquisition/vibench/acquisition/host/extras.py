@@ -1,4 +1,4 @@
-"""Check that the installed packages and the computer suffice for a command; errors say what to do."""
+"""Check before a command that its packages are installed and memory suffices; errors say what to do."""
 
 import sys
 from collections.abc import Callable, Mapping

@@ -78,7 +78,7 @@ class FittedValue:
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Return one parameter of a specimen; the damping time is that of link 0, even if other links differ."""
+    """Return the value of a parameter; for the damping time, the value of link 0 (the others may differ)."""
     masses, stiffnesses = specimen.masses, specimen.stiffnesses
     match parameter:
         case Parameter.DAMPING_TIME:

@@ -126,7 +126,7 @@ class Leakage:
         )
 
     def ringing_sd(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the scatter of each line due to ringing: size is the sd of one part, phase is that of dH/df.
+        """Return the scatter of each line due to ringing, as the sd of one part with the phase of dH/df.
 
         Parameters
         ----------
