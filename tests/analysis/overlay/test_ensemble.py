@@ -189,14 +189,26 @@ def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
 
 
 @pytest.mark.parametrize(
-    ("requested", "shift", "made"), [(16, 0.0, 8), (16, 2.0, 16), (24, 0.0, 24), (5, 0.0, 5)]
+    ("requested", "shift", "alike_each", "made"),
+    [
+        (16, 0.0, 1, 8),
+        (16, 2.0, 1, 16),
+        (24, 0.0, 1, 24),
+        (5, 0.0, 1, 5),
+        # Five of 48 draws are improbable if none of the first 12 shows the measured motion.
+        (16, 0.0, 1000, 12),
+        (8, 0.0, 1000, 8),
+        (8, 0.0, 4, 20),
+    ],
 )
-def test_drawing_stops_at_clear_agreement_unless_more_draws_are_requested(requested, shift, made):
+def test_drawing_stops_at_clear_agreement_or_if_too_few_draws_are_alike(requested, shift, alike_each, made):
     def estimate(number):
         value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
-        return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value),), (), 100.0, 1.0)
+        state = np.full(3, (number + 1) % alike_each)
+        return Draw(lambda: number, (Quantity("q", FREQUENCY_HZ[:3], value, state),), (), 100.0, 1.0)
 
     run = SimulatedRun(gong2025(), Driven.GENERATOR, Accuracy.STANDARD, None)
     source = DrawSource(run, requested, 1000, lambda number: number)
-    found = all_draws(source, estimate, [Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)))])
+    measured = Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)), np.zeros(3, dtype=np.int64))
+    found = all_draws(source, estimate, [measured])
     assert (found.run.draws, len(found.quantities), found.response) == (made, made, 0)

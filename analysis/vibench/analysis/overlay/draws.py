@@ -9,6 +9,7 @@ from threading import Lock
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
+import scipy
 from scipy import fft
 from scipy.optimize import brentq
 
@@ -268,6 +269,8 @@ _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
 _NOISE = 0.15
 """Uncertainty of the natural logarithm of a channel's noise, estimated in its quietest part."""
 _MORE = 3
+_HOPELESS = 0.2
+"""Probability of enough draws for a comparison below which no more draws are made."""
 _SEED = 17
 _BLOCK = 1 << 17
 """Number of samples per block of added noise."""
@@ -394,7 +397,8 @@ def all_draws(
     """Return all draws of a source, each analysed like the recording.
 
     Fewer draws are made if the first draws agree clearly. Up to three times as many are made if few draws
-    show the ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
+    show the ``measured`` kind of motion, unless enough of them are improbable. Raises UnusableData when a
+    simulation did not finish.
     """
     responses: list[R] = []
 
@@ -416,10 +420,12 @@ def all_draws(
         most = usual if source.most == 1 else _MORE * usual
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
-            if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
-                # More draws than the default were requested for narrower bands, so all are made.
-                len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
-            ):
+            alike = float(np.median(np.concatenate([each.count for each in curves])))
+            # More draws than the default were requested for narrower bands, so all are made.
+            if alike < FEWEST_DRAWS:
+                if _chance_of_enough(alike, len(found), most) < _HOPELESS:
+                    break
+            elif len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves)):
                 break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
             found += pool.map(estimate_draw, range(len(found), stop))
@@ -428,6 +434,12 @@ def all_draws(
     return DrawSet(
         run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
     )
+
+
+def _chance_of_enough(alike: float, made: int, most: int) -> float:
+    """Return the chance that `FEWEST_DRAWS` of ``most`` draws are alike, if ``alike`` of ``made`` are."""
+    further = scipy.stats.betabinom(most - made, 1 + alike, 1 + made - alike)
+    return float(further.sf(FEWEST_DRAWS - alike - 1))
 
 
 def _random_channels(
