@@ -118,7 +118,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
-    line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).real
+    line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).samples()
     inside = line[edge:-edge]
     # Remove sensor drift: it would jump where the record is continued, and integration amplifies jumps.
     data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
