@@ -14,9 +14,9 @@ _TABLE = 2
 STEADY = 2e-3
 """Scatter of the points allowed in a steady motion, relative to the orbit, because real drives fluctuate."""
 _NOISE_MARGIN = 1.5
-"""Largest ratio of measured to expected scatter of the points that is attributed to noise."""
+"""Largest ratio of the points' measured scatter to their expected scatter at which noise explains it."""
 _REPEATED = 0.25
-"""For periods n above one: largest variance of points n apart, relative to the variance of all points."""
+"""Largest variance of every n-th point, relative to the variance of all points, for a period n above one."""
 _BLOCKS = 10
 _DRIFT = 5.0
 """Largest drift [standard errors]; 1 of 250 settled records exceeds it (4 slopes, 8 degrees of freedom)."""
@@ -115,7 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the points' scatter about their mean, however small, changes by a tenth or more."""
+    """Return whether the points' scatter changes by a tenth or more over the record, even if it is small."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

@@ -1,6 +1,6 @@
 """Verdict on a recorded motion: periodic, quasi-periodic, chaotic or undecided.
 
-A chaotic transient may end during a dwell, so the part of the record with the last motion is found first.
+A chaotic transient may end during a dwell, so the verdict applies to the last motion in the record.
 """
 
 import math
@@ -94,15 +94,15 @@ def _residual(centred: Reals, turns: float) -> float:
 
 _BLOCKS = 10
 _SHORTEST_BLOCK = 50
-"""Number of drive periods per block, enough to see whether a motion repeats."""
+"""Minimum number of drive periods per block, enough to see whether a motion repeats."""
 
 
 def begin_of_last_motion(points: Points) -> int:
     """Return the index at which the last motion of a record starts; 0 if the motion never changes.
 
-    Each block of the record is tested for repetition within its noise. One change of the result means that a
-    transient ended or a motion was lost. Several changes mean chaos with periodic intervals, which counts as
-    one motion.
+    Each block of the record is tested for repetition within its noise. If the result changes once, a
+    transient ended or a motion was lost. If it changes several times, the motion is chaos with periodic
+    intervals, which counts as one motion.
     """
     count = len(points.value)
     edges = np.linspace(0, count, max(min(_BLOCKS, count // _SHORTEST_BLOCK), 1) + 1).astype(int)
@@ -121,7 +121,7 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Maximum number of points for tests of the shape, from the end of a record; more only take time."""
+"""Maximum number of points in tests of the shape, from the end of a record; more cost only time."""
 ABOVE_NOISE = 5.0
 """Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
@@ -138,7 +138,7 @@ _LOW_PERIOD = 4
 """Longest period that counts as short; mains hum at half the drive frequency causes such periods."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Required distance below the surrogates' mean [standard deviations]; a rank test alone errs once in 40."""
+"""Minimum `margin` for a series replaced by normal scores; a rank test alone errs once in 40."""
 _ASYMMETRIC = 2.5
 """Minimum `margin` of the time symmetry; in 4 % of cases, noise in one of two coordinates exceeds it."""
 _SURELY = 3.0
@@ -159,7 +159,7 @@ class MotionKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Results of the tests for a verdict; None if a test was not needed."""
+    """Results of the tests for a verdict; the result of a test that was not needed is None."""
 
     drive_hz: float
     periods: int
@@ -210,12 +210,12 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     """Return the verdict on a motion from its points, one per drive period.
 
     A motion is *periodic* if its points repeat within their noise, and *quasi-periodic* if they lie on a
-    closed curve. It is *chaotic* only if all tests agree: it is settled, far above the noise and on no closed
-    curve, the 0-1 test is near one without oversampling, and surrogates reject linear noise. Each test alone
-    would accept some noise as chaos; if any fails, the verdict is undecided. If the motion changes once, as
-    when a chaotic transient ends, the last part is classified: always if its period is at most 4, otherwise
-    only if it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
-    InvalidRequest when the drive frequency is not positive and finite.
+    closed curve. It is *chaotic* only if all tests agree: the points are settled, far above the noise and on
+    no closed curve, the 0-1 test is near one without oversampling, and surrogates reject linear noise. Each
+    test alone would accept some noise as chaos. If any test fails, the verdict is undecided. If the motion
+    changes once, as when a chaotic transient ends, the last part is classified: always if its period is at
+    most 4, otherwise only if it is the longer part. With noise above a tenth of the orbit, the verdict is
+    undecided. Raises InvalidRequest when the drive frequency is not positive and finite.
 
     Parameters
     ----------

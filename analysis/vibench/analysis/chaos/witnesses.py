@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""At most four times this number of nearest points are searched for one that is distant in time."""
+"""A neighbour distant in time is searched for among at most four times this number of nearest points."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -97,7 +97,7 @@ FEWEST_PAIRS = 50
 
 @dataclass(frozen=True, eq=False)
 class Divergence:
-    """Growth of the distance between points that start close together: its mean logarithm after each step."""
+    """Growth of the mean logarithmic distance between points that start close together."""
 
     first: int
     last: int
@@ -151,7 +151,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
 
 
 def _typical(points: Reals) -> float:
-    """Return the mean logarithm of the distance of points that are half the record apart."""
+    """Return the mean logarithm of the distance between points half a record apart in time."""
     half = points.shape[0] // 2
     distance = np.linalg.norm(points[half : 2 * half] - points[:half], axis=1)
     return float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
@@ -208,9 +208,9 @@ class ZeroOne:
 def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     """Apply the 0-1 test to a series with one value per drive period.
 
-    Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
-    oscillatory term removed (eqs. 3.1 to 3.6). It takes noise for chaos, and an oversampled chaotic flow for
-    regular motion, so the test is never used alone.
+    Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the oscillatory
+    term removed (eqs. 3.1 to 3.6). The test mistakes noise for chaos, and oversampled chaos for regular
+    motion, so it is never used alone.
 
     Raises NotEnoughData when the series is too short.
 
@@ -249,7 +249,7 @@ def _correlation(series: Reals, frequency: float) -> float:
 
 
 SURROGATES = 39
-"""Number of surrogates; with probability 1/40 = 0.025, linear noise has the smallest of all statistics."""
+"""Number of surrogates; the probability that linear noise has the smallest statistic is 1/40 = 0.025."""
 _DELAYS, _NEIGHBOURS = 4, 10
 """Number of values in a delay vector, and number of similar vectors that predict the next value."""
 _ITERATIONS = 200
@@ -346,7 +346,7 @@ def time_symmetry(series: Reals) -> float:
 def surrogate_test(
     series: Reals, statistic: Callable[[Reals], float] = prediction_error, *, seed: int = 0
 ) -> SurrogateTest:
-    """Compare a statistic, small for deterministic series, with its values for surrogates.
+    """Compare a statistic of a series, small if the series is deterministic, with its values for surrogates.
 
     Parameters
     ----------

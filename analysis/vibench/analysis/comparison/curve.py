@@ -79,7 +79,7 @@ class Curve(Tabular):
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Return frequencies and bounds at up to ``columns`` points, because filled areas draw slowly."""
+        """Return frequencies and bounds at up to ``columns`` points, because drawing filled areas is slow."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -169,11 +169,11 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """Minimum height of a peak above the neighbouring valley [dB]."""
 _LEAST_RISE_SD = 8.0
-"""Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 of these."""
+"""Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 standard deviations."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance [half widths]): at most n peaks, including the mode's own, lie this close to a mode."""
+"""Pairs (n, distance [half widths]): within this distance of a mode lie at most n peaks, its own included."""
 _CROWD_RISE = 0.3
-"""Minimum height of the peaks counted for `_CROWDS`, relative to the height required of a mode's peak."""
+"""Minimum height of a peak that is counted for `_CROWDS`, relative to the minimum height of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01
 """Relative half width assumed for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)

@@ -23,7 +23,7 @@ from ..sine.sweep import SweptMotion
 from .curve import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
-"""Largest difference of frequencies that count as equal [Hz]."""
+"""Largest difference between two frequencies that count as equal [Hz]."""
 
 
 def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
@@ -133,7 +133,7 @@ class AnalysisOptions(FrozenModel):
 
     @model_validator(mode="after")
     def _is_allowed(self) -> Self:
-        """Refuse invalid combinations of options: building the request raises the error."""
+        """Refuse invalid combinations of options, for which building the noise request raises an error."""
         self.request  # noqa: B018 - making it is the check
         return self
 
@@ -144,5 +144,5 @@ class AnalysisOptions(FrozenModel):
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation to compute: none, or driven by the recorded voltage or the recorded base motion."""
+        """Simulation to compute: none, or one driven by the recorded voltage or base motion."""
         return _SIMULATIONS[self.model]
