@@ -57,7 +57,7 @@ class BranchLine(Tabular):
     states: Reals
     """x, y, z, vx, vy, vz at time zero of the drive, shape (n, 6) [m, m/s]."""
     multiplier_real: Reals
-    """Floquet multipliers over the period of the motion, largest first, shape (n, 6)."""
+    """Real parts of the Floquet multipliers over the period of the motion, largest first, shape (n, 6)."""
     multiplier_imaginary: Reals
     impacts: NDArray[np.int64]
     """Number of contacts per period of the motion, shape (n,)."""
@@ -69,7 +69,7 @@ class BranchLine(Tabular):
     shape: str
     """``"mirrored"`` if the motion is its own mirror image after half its period, else ``"repeated"``."""
     has_twin: bool
-    """Whether the mirror images of these motions form another branch."""
+    """Whether the mirror images of the branch's motions form another branch."""
     is_isolated: bool
     """Whether the branch closes on itself."""
     origin: str
@@ -186,7 +186,7 @@ class BranchDiagram(Tabular):
 
     @property
     def largest_error(self) -> float:
-        """Largest of the branches' median errors, since errors grow near folds; NaN without branches."""
+        """Largest median error of a branch; medians, because errors grow near folds; NaN without branches."""
         errors = [np.median(line.error_estimate) for line in self.lines]
         return float(max(errors, default=float("nan")))
 
@@ -226,13 +226,13 @@ class BranchDiagram(Tabular):
 
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """For each branch, whether the bench can hold each of its motions; None without a bench."""
+        """Whether the bench can hold each motion, one array per branch; None if no loop time is given."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 
     @property
     def holding_sentence(self) -> str:
-        """Return a sentence on the unstable motions that the bench can hold; empty without a bench."""
+        """Return a sentence on the unstable motions that the bench can hold; empty without a loop time."""
         holdable = self.holdable
         if not holdable:
             return ""
@@ -248,12 +248,12 @@ class BranchDiagram(Tabular):
 
     @property
     def least_growth_time_s(self) -> float | None:
-        """Shortest e-folding time [s] of an unstable motion that the bench can hold; None without a bench."""
+        """Shortest e-folding time [s] of a motion that the bench can hold; None if no loop time is given."""
         loop_s = self.request.loop_time_s
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return curves of Responses I and II of m0 for stable and unstable motions; empty over amplitude."""
+        """Return curves of Responses I and II of m0, stable and unstable; none if the amplitude varies."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []
@@ -268,7 +268,7 @@ class BranchDiagram(Tabular):
         return tuple(found)
 
     def _join(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
-        """Return all stable (or unstable) stretches in one curve, separated by NaN."""
+        """Join all stable (or all unstable) stretches into one curve, separated by NaN."""
         places: list[Reals] = []
         sizes: list[Reals] = []
         for line in self.lines:

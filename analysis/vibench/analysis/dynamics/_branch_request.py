@@ -73,13 +73,13 @@ class BranchRequest(SpecimenChoice):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of the random initial states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
-    """When the amplitude varies: follow the phase resonance of the mode between these frequencies [Hz]."""
+    """Two frequencies [Hz] around a mode whose phase resonance is followed while the amplitude varies."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
-    """For a phase resonance: the quantity of m0 that lags the base by a quarter of a period."""
+    """Motion of m0 that lags the base by a quarter of a period at the phase resonance."""
     loop_time_s: PositiveFloat | None = None
-    """Latency of the bench's feedback loop [s], to report which motions the bench can hold."""
+    """Latency of the bench's feedback loop [s], which limits the unstable motions that the bench can hold."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
-    """Pairs of frequency [Hz] and base amplitude [m] of a recorded level, instead of one amplitude."""
+    """Recorded base amplitude over frequency, as pairs [Hz, m], instead of one constant amplitude."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -193,8 +193,8 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     Parameters
     ----------
     frequency_hz, drive_amplitude_m
-        Measured values in any order, shape (n,). The median of each bin is taken, so that one bad value has
-        no effect.
+        Measured values in any order, shape (n,). The median of each bin is used, so that one outlier has no
+        effect.
     """
     known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
     place, level = frequency_hz[known], drive_amplitude_m[known]

@@ -43,7 +43,7 @@ LINES = 800
 MOST_SHOWN = 4
 """Maximum number of cells to draw if there is only one chain."""
 ABOVE_BANDS = 1.15
-"""Highest frequency of the transmissibility, relative to the upper edge of the highest band."""
+"""Highest frequency of results without contact, relative to the upper edge of the highest band."""
 REACHED = Outcome.REACHED_END.text
 DECIBELS = 20.0 / math.log(10.0)
 
@@ -70,7 +70,7 @@ class ChainRun(Tabular):
     largest_m: Reals
     """Largest |p| = |y - z| of every cell during the observation, shape (cells,)."""
     impacts: NDArray[np.int64]
-    """Number of contacts while observed, shape (cells,)."""
+    """Number of contacts of every cell during the observation, shape (cells,)."""
     observed_s: float
     energy_j: Reals
     """Mean energy of every cell with its link to the previous cell, shape (cells,)."""
@@ -83,7 +83,7 @@ class ChainRun(Tabular):
     """Time axis of `motion_m`, shape (n,)."""
     motion_m: Reals
     """Displacement x of m0 in every cell, shape (n, cells), over the last periods of a steady sine. Under
-    other drives, the RMS of x over equal stretches of the run."""
+    other drives, the RMS of x over equal parts of the run."""
     impact_time_s: Reals
     """Times of the contacts within the range of `time_s`, shape (contacts,)."""
     impact_cell: NDArray[np.int64]
@@ -127,7 +127,7 @@ class ChainAnswer(Tabular):
 
     @cached_property
     def linear_hz(self) -> Reals:
-        """Frequencies for results without contact; denser near peaks."""
+        """Evenly spaced frequencies for results without contact."""
         top = ABOVE_BANDS * float(self.bands_hz.max())
         return np.linspace(top / LINES, top, LINES)
 
@@ -199,10 +199,10 @@ MOST_NUMBERS = 3e7
 """Maximum number of values stored for a run: 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
-"""Maximum number of equal parts of a whole run; the RMS of each part is shown."""
+"""Maximum number of equal parts of a sweep or recording; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, the averaging time is at most this share of the time simulated before."""
+time was requested, the averaging time is at most `ENERGY_SHARE` of the time simulated before."""
 SWEEP_PARTS = 120
 """Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
@@ -338,7 +338,7 @@ def _bare_run(
     observed_s: float,
     frequency_hz: float = math.nan,
 ) -> ChainRun:
-    """Return the result of a run that stopped early, which has only its outcome and impacts."""
+    """Return a result with only outcome and impacts, as for a run that stopped early."""
     unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
     return ChainRun(
         cells=chain.size,
@@ -380,7 +380,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Return frequencies and relative amplitudes at the drive frequency, by Hann-weighted means over time."""
+    """Return drive frequencies and relative amplitudes at them, from Hann-weighted parts of the sweep."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
     turning = np.exp(-2j * np.pi * drive.turns(run.time_s))

@@ -47,7 +47,7 @@ class ChainRequest(SpecimenChoice):
     stop_hz: PositiveFloat = 220.0
     """Last frequency of a sine; below the first for a sweep downwards."""
     step_hz: PositiveFloat = 10.0
-    """Frequency step of a steady sine."""
+    """Step between the frequencies of steady sines."""
     recording: str = ""
     """Path of the recording whose base motion drives the chain."""
     duration_s: PositiveFloat = 2.0
@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """If an error or time is requested, refuse unsteady drives and options that are derived from it."""
+        """If an error or time is requested, refuse unsteady drives, and options that it determines."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:

@@ -38,7 +38,7 @@ _COLUMNS = (
 )
 """Columns of a branch; each column is an HDF5 dataset."""
 _WIDTHS = {"response_i": 4, "response_ii": 4, "states": 6, "multiplier_real": 6, "multiplier_imaginary": 6}
-"""Numbers per row of the columns that have several."""
+"""Numbers per row, for columns with several numbers per row."""
 _WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
 """Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")

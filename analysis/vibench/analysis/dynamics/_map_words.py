@@ -29,7 +29,7 @@ NO_NUMBERS = ("name", "about", "sources")
 
 @dataclass(frozen=True, eq=False)
 class RecordedLevel:
-    """Measured base amplitude and Response I of a recording over frequency."""
+    """Base amplitude and Response I of a recording over frequency."""
 
     name: str
     pairs: Sequence[tuple[float, float]]
@@ -59,7 +59,7 @@ def motion_classes(results: MapResults) -> Reals:
 
 
 def motion_words(results: MapResults, motion: MapMotion) -> str:
-    """Return the name of a motion and its share of the points, with an interval if the share is estimated."""
+    """Return a motion's name and the fraction of points with it, with an interval if it is an estimate."""
     kind = motion.motion.removesuffix(" so far") if motion.period is None else f"period {motion.period}"
     kind = kind if motion.has_impacts else "no impacts"
     text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"
@@ -93,7 +93,7 @@ def map_caption(results: MapResults) -> str:
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return a specimen's name and its differences from the shipped specimen of that name, or the paper's."""
+    """Return a specimen's name, and its differences from the shipped specimen of that name or the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"

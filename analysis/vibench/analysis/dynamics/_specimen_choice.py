@@ -37,7 +37,7 @@ class SpecimenChoice(FrozenModel):
     """Contact law: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...
     (`vibench specimen` describes each); the specimen's own if not given."""
     damping_time_s: DampingTime | None = None
-    """Damping over stiffness of every link, c_i = damping time * k_i; the specimen's own if not given."""
+    """Ratio of damping to stiffness of every link, c_i / k_i; the specimen's own values if not given."""
     gap_m: PositiveFloat | None = None
     """Clearance at both stops; the specimen's own if not given."""
     described: SpecimenTable | None = None
@@ -81,7 +81,7 @@ class SpecimenChoice(FrozenModel):
 
     @property
     def specimen_text(self) -> str:
-        """The specimen and its changed values in words, for a caption."""
+        """Text for a caption: the specimen, its contact law, and its changed values."""
         parts = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
         if self.gap_m is not None:
             parts.append(f"gap {1e6 * self.gap_m:g} µm")

@@ -115,7 +115,7 @@ class SpectrumPoint:
     motion: str
     source: str
     blocks: int
-    """Number of independent blocks for the least certain exponent; few blocks give wide intervals."""
+    """Smallest number of independent blocks behind a standard error; few blocks give wide intervals."""
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
