@@ -31,7 +31,7 @@ class Piece:
 
     @property
     def end(self) -> int:
-        """Time one past the stretch's last sample, in sample intervals since the channel's start."""
+        """Time one interval after the stretch's last sample, in sample intervals since the start."""
         return self.place + self.samples
 
     def span(self, first: int, stop: int) -> range:
@@ -75,7 +75,7 @@ class Alignment:
 
     rate_hz: float
     places: int
-    """Length of the axis in sample intervals: from the earliest sample to the last that all channels have."""
+    """Length of the axis in sample intervals, from the earliest sample to the last one in all channels."""
     pieces: tuple[tuple[Piece, ...], ...]
     """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]
@@ -130,7 +130,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
 
 
 def _or_ignore(channels: Sequence[SourceChannel]) -> str:
-    """Return the advice to ignore the times; empty if they show lost samples, which must be counted."""
+    """Return the advice to ignore the file's times; empty if the times show lost samples."""
     if any(len(each.runs) > 1 for each in channels):
         return ""
     return ', or, if no samples are missing, give time = "even" and sample_rate_hz to ignore its times'
@@ -195,7 +195,7 @@ def _in_unit(channel: SourceChannel, unit: str) -> SourceChannel:
 
 
 def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> float:
-    """Return the sample rate of the mapping, or that of the file if the mapping gives none."""
+    """Return the mapping's sample rate; if the mapping gives none, the file's sample rate."""
     rates_hz = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz

@@ -170,7 +170,7 @@ def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
 
 
 def _licence_name(address: str) -> str:
-    """Return "CC BY 4.0" and similar for Creative Commons; for other addresses, their last part."""
+    """Return a Creative Commons licence's name, such as "CC BY 4.0"; else the address's last part."""
     found = _CREATIVE_COMMONS.search(address)
     if found is None:
         return address.rstrip("/").rpartition("/")[2]

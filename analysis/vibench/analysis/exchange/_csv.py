@@ -68,7 +68,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Read a date, day or month first, whichever is nearer to the last date; return False if invalid."""
+        """Read a date in the order of its parts that is nearest to the last date; return False if invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -79,7 +79,7 @@ class ClockTimes:
 
 
 def _orders(text: str) -> Iterator[date | None]:
-    """Yield the date read in three orders (year, day or month first); None for an invalid date."""
+    """Yield the date as read in three orders (year, day or month first); None for an invalid date."""
     parts = [
         int(each) if each.isdecimal() else _MONTHS.get(each[:3].casefold(), 0)
         for each in re.split("[-/.]", text)
@@ -95,7 +95,7 @@ def _orders(text: str) -> Iterator[date | None]:
 TIME_FORMAT = "%.9f"
 """Format of the seconds since the recording's first sample, to nanoseconds."""
 VALUE_FORMAT = "%.10g"
-"""Format of values: one digit more than needed for steps of 2^-30 of the range; ``nan`` if lost."""
+"""Format of values: one digit more than needed for steps of 2^-30 of the range; lost values are ``nan``."""
 
 
 def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
@@ -152,7 +152,7 @@ class _Layout:
     empty: int
     """Number of empty cells after the last number of each line, as spreadsheets write them."""
     has_text: bool
-    """Whether cells are dates, times or numbers in Fortran's notation."""
+    """Whether some cells are dates, times or numbers in Fortran's notation."""
 
     @property
     def width(self) -> int:

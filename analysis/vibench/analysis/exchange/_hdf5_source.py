@@ -140,7 +140,7 @@ def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
 
 
 def _facts_above(group: h5py.Group, known: dict[str, Facts]) -> Facts:
-    """Return the facts of all groups that contain a group, the nearest group first."""
+    """Return the facts of all groups above a group, the nearest group first."""
     if group.name == "/":
         return ()
     return (*_facts(group.parent, known), *_facts_above(group.parent, known))
@@ -161,7 +161,7 @@ def _value(dataset: h5py.Dataset) -> Any:
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> float:
-    """Return an attribute as a number; for one number per row or column, the number at ``place``."""
+    """Return an attribute as a number; if it has one number per row or column, the number at ``place``."""
     numbers = np.ravel(dataset.attrs.get(name, otherwise))
     if numbers.size not in {1, min(dataset.shape)}:
         raise UnusableData(f"{dataset.name}: {name} has {numbers.size} numbers; export the file again")

@@ -13,20 +13,20 @@ from ._mapping import KNOWN_ROLES, ChannelMapping
 from ._source_channel import Source, SourceChannel
 
 _VIBRATING = {"velocity", "acceleration", "displacement", "force"}
-"""Quantities that are not constant during a test; others, such as a temperature or a trigger, may be."""
+"""Quantities that vary during every test; others, such as a temperature or a trigger, may stay constant."""
 _DRIVEN = {DRIVE, "amplifier_voltage", BASE}
 _FEWEST, _LONGER = 16, 4
-"""Fewest equal samples at the end that count as held; their least ratio to the longest other run."""
+"""Minimum number of equal last samples that count as held, and its ratio to the longest other run."""
 _WEAK_STEPS = 3.0
-"""Distance from a held value, in steps of the converter, at which its neighbours are weak signals."""
+"""Largest distance of a held value's neighbours [converter steps] at which the signal is only weak."""
 _PATTERN, _FEWEST_VALUES = 64, 16
-"""Number of last samples that are searched in the record before them, and of different values in them."""
+"""Number of last samples that are searched for earlier in the record; minimum number of distinct values."""
 _SEARCHED = 1 << 17
-"""Number of samples at the end of a record in which repeated samples are searched."""
+"""Number of samples at the end of a record in which repeated samples are searched for."""
 _JUMP = 0.02
-"""Least jump at the start of repeated samples, relative to their span; a periodic motion has none."""
+"""Minimum jump at the start of repeated samples, relative to their span; a periodic motion has no jump."""
 _SAME_TURNS = 1e-3
-"""Difference from whole periods of the drive up to which repeated samples are a periodic motion."""
+"""Largest difference from whole drive periods at which repeated samples count as a periodic motion."""
 
 
 def held_values(
@@ -37,7 +37,7 @@ def held_values(
     excitation: AbstractExcitation,
     rate_hz: float,
 ) -> Iterator[tuple[int, int, str]]:
-    """Yield first sample, one past the last sample, and description of each stretch without new values.
+    """Yield first sample, end and description of each stretch without new values.
 
     A driven channel is not constant for a period of the lowest frequency. Exceptions are weak signals of a
     coarse converter (also until the next hit or burst), and exact zeros before a hit or, in drive and base,

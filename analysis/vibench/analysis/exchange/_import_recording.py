@@ -122,7 +122,7 @@ LEAST_PEAK, MOST_PEAK = 1e-100, 1e30
 _LEAST_MARK = 99.0
 """Smallest number that may mark lost samples, such as 99 or -9999."""
 NEAR_FULL_SCALE = 0.95
-"""Share of full scale at and above which a sample counts as overloaded, as during acquisition."""
+"""Fraction of full scale from which a sample counts as overloaded, as during acquisition."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class _ChannelImport:
     pieces: tuple[Piece, ...]
     late_s: float
     held: tuple[range, ...] = ()
-    """Times without new values, which count as lost [sample intervals]."""
+    """Stretches of the time axis without new values, whose samples count as lost [sample intervals]."""
 
     def read(self, source: Source, start: int, stop: int) -> Reals:
         """Return samples of the common time axis from ``start`` to ``stop``; missing samples are NaN."""
@@ -213,9 +213,9 @@ def import_recording(
 def _without_held(
     source: Source, wanted: tuple[_ChannelImport, ...], mapping: ImportMapping, rate_hz: float, samples: int
 ) -> tuple[tuple[_ChannelImport, ...], int, list[str]]:
-    """Return the channels without held values in the plan's parts, the number of samples, and remarks.
+    """Mark held values within the plan's parts; return the channels, the number of samples, and remarks.
 
-    A record ends where values are held to its end; elsewhere held values count as lost samples.
+    If a value is held up to the end, the record ends at its start. Other held values count as lost samples.
     """
     parts = [range(each.start, min(each.stop, samples)) for each in place_parts(mapping, rate_hz, samples)]
     excitation, remarks, end, kept = mapping.measurement.excitation, [], samples, []

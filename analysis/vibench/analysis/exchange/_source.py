@@ -119,7 +119,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
 
 
 def _rank(time: SourceChannel, channel: SourceChannel, *, is_named: bool) -> tuple[bool, bool, int]:
-    """Return a key that ranks how likely it is that times belong to a channel; all zero if they do not."""
+    """Return a key that ranks time columns for a channel; all zero if the times cannot belong to it."""
     if time.samples != channel.samples:
         return False, False, 0
     is_above = _group(channel).startswith(_group(time))

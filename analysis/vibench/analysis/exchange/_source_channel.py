@@ -78,7 +78,7 @@ def unit_among(facts: Iterable[tuple[str, Any]], place: int = 0) -> str:
 
 
 def own_facts(facts: Iterable[tuple[str, Any]], label: str) -> tuple[tuple[str, Any], ...]:
-    """Return the facts of the channel with a label, such as ``v_gain`` or ``Unit v``, without the label."""
+    """Return the facts named after a channel's label, such as ``v_gain`` or ``Unit v``, without the label."""
     before = re.compile(rf"{re.escape(label)}(?=[A-Z _.-])[ _.-]*(.+)|(.+?)[ _.-]+(?:of )?{re.escape(label)}")
     found = ((before.fullmatch(name), value) for name, value in facts if label and label in name)
     return tuple((name[1] or name[2], value) for name, value in found if name)
@@ -94,7 +94,7 @@ def _text_at(texts: NDArray[Any], place: int) -> str:
 
 
 def scale_among(facts: Iterable[tuple[str, Any]], *, are_counts: bool = False) -> str:
-    """Return a stated scale, such as ``"gain = 0.001"``, which may or may not be applied to the numbers.
+    """Return a stated scale, such as ``"gain = 0.001"``, whether or not it was applied to the numbers.
 
     A sensitivity or a calibration is usually already applied, except to integers.
     """

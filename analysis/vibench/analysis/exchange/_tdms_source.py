@@ -87,9 +87,9 @@ def open_tdms(path: Path) -> Iterator[Source]:
 
 
 def _unlike_segments(counts: Mapping[str, Mapping[int, int]]) -> Iterator[tuple[str, str]]:
-    """Yield path and segments of channels as long as other channels but divided into different segments.
+    """Yield path and segments of channels that are as long as another channel but divided differently.
 
-    Channels may share all segments, follow one another, or take turns.
+    Channels that share all segments, follow one another, or take turns are left out.
     """
     layouts = {tuple(each.items()): each for each in counts.values()}
     for one, other in combinations(layouts.values(), 2):

@@ -55,17 +55,17 @@ _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03
 SAME_RATE = 1e-4
 """Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
-"""Largest spread of times around an even axis whose rate counts as exact [sample intervals]."""
+"""Largest spread of times around an even axis at which the rate counts as exact [sample intervals]."""
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Smallest relative distance of irregular intervals from multiples of the usual one; their largest share."""
+"""Smallest deviation of irregular intervals from multiples of the usual one; largest fraction of these."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 3
 """Minimum number of differing intervals to recognize rounding; fewer could be due to regular losses."""
 _JITTER, _OUTLIERS = 0.04, 0.03
-"""Largest allowed range of jitter beyond rounding [sample intervals]; share of outliers on each side."""
+"""Largest range of jitter beyond rounding [sample intervals]; fraction of outliers ignored on each side."""
 _COARSE_SPREAD = 1.25
 """Largest range of deviations of coarse times from a line [last digits]; lost samples exceed this range."""
 _RISING = 0.9
@@ -342,7 +342,7 @@ def _resolution(times: Reals, interval: float) -> Reals:
 
 
 def _jitter(times: Reals, distance: Reals, interval: float, unit: float) -> float:
-    """Return the largest range of distances from a line that rounding to ``unit`` or more cannot explain."""
+    """Return the largest range of distances from a line, minus the part that rounding explains."""
     width = min(_BIN, times.size)
     starts = np.minimum(np.arange(0, times.size, width), times.size - width)
     rows, off = (sliding_window_view(each, width)[starts] for each in (times, distance))

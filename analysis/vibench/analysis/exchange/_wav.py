@@ -63,7 +63,7 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 
 
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
-"""Byte orders of the sizes; RF64 files above 4 GiB store sizes elsewhere and are not read."""
+"""Byte order by first bytes of the file; RF64 files above 4 GiB store sizes elsewhere and are not read."""
 FIRST_CHUNK = 12
 FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
 """Size of a format chunk, and of a format chunk that states how many bits of a sample are used."""
