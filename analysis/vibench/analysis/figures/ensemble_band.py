@@ -17,7 +17,7 @@ from ..tables import Table, columns, table
 from . import style
 
 ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
-"""Name of a result's attribute for each response to sines, keyed by the name of the response."""
+"""Attribute of a result that contains each response to sines, keyed by the name of the response."""
 RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
 
 
@@ -79,7 +79,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return the end of a sentence, with agreement and escape rate; empty if the input is the base motion."""
+    """Return the end of a sentence with agreement and escape rate; empty if simulated from base motion."""
     if not overlay.run.driven.by_voltage:
         return ""
     parts = [*overlay.agreement]

@@ -113,7 +113,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
 
 
 def _percent(share: float) -> str:
-    """Return a percentage with two digits, without powers of ten; in chaos, it often exceeds 100 %."""
+    """Return a percentage with two digits, not as a power of ten, because it often exceeds 100 % in chaos."""
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 
@@ -189,7 +189,7 @@ _EXCITATION_HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8
 """Samples per period of the highest frequency: enough for a figure, and few enough for a long sweep."""
 _SMALLEST_PART = 0.2
-"""The frequency axis contains all lines above this share of the largest spectral line (-14 dB)."""
+"""The frequency axis contains all spectral lines above this fraction of the largest line (-14 dB)."""
 _EXCITATION_COLUMNS = 2000
 
 

@@ -56,9 +56,9 @@ _EDGE = 1e-3
 """Relative margin at both ends of a frequency axis; measured frequencies differ from round values by ppm."""
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
-"""Ratios of the ends of a frequency axis: linear axis below the first, more ticks below the second."""
+"""Ratios of highest to lowest frequency below which an axis is linear (first) or has more ticks (second)."""
 _FEW_DECADES = (1.5, 0.5)
-"""Numbers of decades: ticks between powers of ten have some labels below the first, all below the second."""
+"""Numbers of decades below which some (first) or all (second) ticks between powers of ten have labels."""
 _POWERS_BELOW = 1e-3
 _ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
