@@ -115,7 +115,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
 def track_recordings(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track colliding recordings; return the parameters of the recording with the narrowest gap bounds.
 
-    If no recording can be tracked, the first result is None and the second the reason, else empty.
+    If no recording can be tracked, return None and the reason; otherwise the reason is empty.
     """
     found: list[CollisionNumbers] = []
     why: list[str] = []
@@ -145,7 +145,7 @@ def numbers_from_statistics(
 ) -> tuple[CollisionNumbers | None, str]:
     """Return parameters by comparing statistics of the first suitable recording with simulated specimens.
 
-    If no recording is suitable, the first result is None and the second the reason, else empty.
+    If no recording is suitable, return None and the reason; otherwise the reason is empty.
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:

@@ -34,7 +34,7 @@ _LEAST_INTERVALS = 3
 
 @dataclass(frozen=True)
 class Onset:
-    """Onset of collisions in a sweep, or among dwells at one frequency, and the gap that it gives."""
+    """Onset of collisions in a sweep, or among dwells at one frequency, and the gap derived from it."""
 
     frequency_hz: float
     gap_m: float
@@ -106,7 +106,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
 
 
 def _apart(measured: Reals | float, linear: Reals) -> float:
-    """Return the largest relative difference of measured and linear motion of m0."""
+    """Return the largest relative difference between measured and linear motion of m0."""
     return float(np.max(np.abs(np.log(measured / linear))))
 
 
@@ -124,7 +124,7 @@ def swept_response(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float
 
 
 def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate_hz_per_s: float) -> float:
-    """Return the relative standard deviation of the relative motion due to the linear fit."""
+    """Return the relative standard deviation of p due to the uncertainty of the linear fit."""
     if fit is None:
         return 0.0
     slopes = []

@@ -21,7 +21,7 @@ LEAST_RELATIVE_SD = 1e-4
 _LEAST_CLEAR = 10.0
 """Smallest ratio of a line's magnitude to the median scatter nearby, so that ln(magnitude) is normal.
 
-The line's own scatter is estimated from few averages. With it, lines whose scatter is small by chance
+The line's own scatter is estimated from few averages. If it were used, lines with a small scatter by chance
 would be selected, and a correct model refused.
 """
 _NEIGHBOURS = 31
@@ -98,7 +98,7 @@ class LineFit:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines and settings of a fit for parameters (as logarithms), channel phases and a scale."""
+    """Spectral lines and options of a fit of parameters (as logarithms), channel phases and a scale."""
 
     frequency_hz: Reals
     measured: Complexes
@@ -177,7 +177,7 @@ def lines_of(
 ) -> Lines:
     """Select the spectral lines well above their scatter; raises NotEnoughData if too few are left.
 
-    The magnitudes of a fitted specimen, if given, replace the measured ones, so that noise selects no lines.
+    Magnitudes of a fitted specimen, if given, decide the selection, so that measurement noise does not.
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz

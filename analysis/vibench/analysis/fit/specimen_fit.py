@@ -27,7 +27,7 @@ from .parameters import (
 from .suspects import Assumption, Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
-"""Relative standard deviation of a converter clock, whose error recordings do not reveal."""
+"""Relative standard deviation of a converter's clock; recordings do not reveal the clock's error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +135,14 @@ def fit_specimen(
 
 
 def not_linear(nominal: Specimen, sentence: str) -> SpecimenFit:
-    """Return a refused fit for a recording that contradicts any linear model, as ``sentence`` explains."""
+    """Return a refused fit for a recording that no linear model explains; ``sentence`` states the reason."""
     suspect = Suspect(Assumption.LINEARITY, sentence, np.nan, mends=False, behind=0.0)
     nan = float("nan")
     return SpecimenFit(nominal, (), np.zeros((0, 0)), 0, nan, nan, (suspect,), nan, (nan, nan))
 
 
 def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
-    """Return the covariance due to the clock error, which scales frequencies, and scales times inversely."""
+    """Return the covariance due to the clock error, which scales frequencies and, inversely, times."""
     frequencies = (*LINEAR[1:], *DAMPERS)
     direction = np.array([float(each in frequencies) - (each is Parameter.DAMPING_TIME) for each in free])
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)

@@ -35,7 +35,7 @@ _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
 """Number of principal components of the statistics along which the observed statistics are checked."""
 _FAR = 1.05
-"""Largest distance of the observed statistics, relative to that of the furthest run, if the model fits.
+"""Largest distance of the observed statistics at which the model fits, relative to the furthest run.
 
 A correct model exceeds the furthest of n runs in at most one of n + 1 cases. The margin allows for small
 differences between rig and recording.
@@ -170,7 +170,7 @@ def _distances(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals)
 _SEGMENT_S = 0.1
 _LOWEST_HZ, _HIGHEST_HZ = 40.0, 12_000.0
 _HIGHEST_PART = 0.4
-"""Highest evaluated frequency as a share of the sample rate; it is within the converter's pass band."""
+"""Highest evaluated frequency as a fraction of the sample rate, inside the converter's pass band."""
 _BANDS = 18
 _ABOVE_NOISE = 4.0
 _COHERENT_HZ = 1_000.0
@@ -270,7 +270,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range of each parameter as a factor; for gaps, of geometric mean and of sqrt(upper / lower)."""
+"""Search range of each parameter, as a factor; gaps: geometric mean, and "apart" is sqrt(upper / lower)."""
 _WIDEST = 0.5
 """Largest width of bounds relative to the search range; wider bounds leave a parameter undetermined."""
 _LIKELY = 2.0
@@ -339,7 +339,7 @@ def statistical_numbers(
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """Simulated runs with given parameters and random starts."""
+    """Simulated runs with given parameters and random initial states."""
 
     draws: StretchDraws
     specimen: Specimen
@@ -361,7 +361,7 @@ class _Runs:
 
 
 def _relative(logarithms: Reals) -> dict[Hidden, Reals]:
-    """Return logarithms relative to the description for parameters of shape (5,) or (5, draws)."""
+    """Return parameters by name, as logarithms relative to the description; shape (5,) or (5, draws)."""
     mean, apart, m1, c1, force = logarithms
     return {
         Hidden.LOWER_GAP: mean - apart,

@@ -48,7 +48,7 @@ class TableFit:
 
     @property
     def z(self) -> float:
-        """Difference of fitted and described mass in standard deviations."""
+        """Difference between fitted and described mass in standard deviations."""
         return float(np.log(self.mass_kg / self.described_kg) * self.mass_kg / self.sd_kg)
 
     @property
@@ -126,13 +126,13 @@ class UpdatedSpecimen(Tabular):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Assumptions that recordings contradict; for each source, the most likely first."""
+        """Contradicted assumptions: of the linear fit (most likely first), table mass, and collisions."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit; omit its values if its simulation of the noise in ``results`` disagrees."""
+        """Return the fit, without values if a simulation with them disagrees with the noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]
