@@ -58,7 +58,7 @@ class Resonance:
 
     @property
     def remark(self) -> str:
-        """Warning if the fit does not match the spectral lines or modes overlap; otherwise empty."""
+        """Warning if the fit does not match the spectral lines or if modes overlap; otherwise empty."""
         if self.is_explained and self.overlap > 1.0:
             return f"two modes overlap at {self.frequency_hz:.5g} Hz; the bounds include this overlap"
         if self.is_explained:
@@ -126,7 +126,7 @@ class Leakage:
         )
 
     def ringing_sd(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Return the scatter of each line due to ringing, as the sd of one part with the phase of dH/df.
+        """Return the sd of each line's real or imaginary part due to ringing, with the phase of dH/df.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class Leakage:
         return np.asarray(ringing * np.divide(most, size, out=np.ones_like(size), where=size > most))
 
     def covariance(self, line: Integers, rung: Complexes, spread: Reals) -> Complexes:
-        """Return the covariance of the real (or imaginary) errors, lower bands, shape (far lines, lines)."""
+        """Return the lower bands of the real (or imaginary) errors' covariance, shape (far lines, lines)."""
         noise = np.sqrt(spread**2 - np.abs(rung) ** 2)
         alike = self.ringing / (self.ringing[0] or 1.0)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
@@ -170,8 +170,8 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
     """Return the correlations of errors at distance k [lines] due to sensor noise and due to ringing.
 
-    Both are sums over j of (1 - |j| / K) conj(c_j(k)) d_j(k), for K segments with hop D. c_j transforms
-    w(n) w(n + j D). For noise, d_j = c_j; for ringing, d_j has w' instead of w.
+    Both are sums over j of (1 - |j| / K) conj(c_j(k)) d_j(k), for K segments with hop D. c_j is the Fourier
+    transform of w(n) w(n + j D). For noise, d_j = c_j; for ringing, w' replaces w in d_j.
     """
     values = taper(window, _PROXY_SAMPLES)
     weights = cosine_weights(window)
@@ -229,7 +229,7 @@ _STEADY_AVERAGES = 49.0
 """Equivalent number of averages of a scatter that is smoothed over neighbouring spectral lines."""
 _LEAST_LINES_ABOUT = 8
 _OVERLAP = 1.5
-"""If two modes are closer than this [half-power bandwidths], their bounds are widened for a third mode."""
+"""If two modes are closer than this [half-power bandwidths], a third mode between them is considered."""
 _EDGE = 1e-3
 """A fit that ends closer than this to a bound, relative to the search reach, has found no minimum."""
 
@@ -274,7 +274,7 @@ class Lines:
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 
     def independent(self, columns: Complexes) -> Reals:
-        """Convert complex values of lines to uncorrelated real ones of variance one, shape (2 lines, ...)."""
+        """Convert complex values of lines to uncorrelated real values of variance 1, shape (2 lines, ...)."""
         if self._root is None:
             shape = (-1,) + (1,) * (columns.ndim - 1)
             scaled = columns / self._spread.reshape(shape)

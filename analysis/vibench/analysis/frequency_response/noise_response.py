@@ -45,7 +45,7 @@ _LEAST_PERIODS = 2
 _SURELY = 3.0
 """Smallest median difference of two estimators that counts as bias, in standard deviations of the median."""
 _ALIKE_LINES = 4
-"""Variance of a median over lines correlated by a window, relative to a mean over independent lines."""
+"""Ratio of the variance of a median over windowed lines to that of a mean over independent lines."""
 
 
 @dataclass(frozen=True)

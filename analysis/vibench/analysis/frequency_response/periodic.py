@@ -24,7 +24,7 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Share of a period that may be missing at the end of a record; this part is continued periodically."""
+"""Fraction of a period that may be missing at the end of a record; it is then continued periodically."""
 _WEAKEST_LINE = 1e-3
 """Minimum amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""Largest ratio of a deviation used to find a drift to the median deviation; applies only above `_SMALL`."""
+"""A deviation above `_SMALL` is used to find a drift up to this multiple of the median deviation."""
 
 
 class Scatter(StrEnum):

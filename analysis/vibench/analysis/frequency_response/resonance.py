@@ -41,7 +41,7 @@ _USUAL_HZ = 300.0
 _LARGEST_SD_UNRESOLVED = 0.1
 """Largest relative uncertainty of an unresolved peak (line or damping); less certain peaks may be ripples."""
 _BACKGROUND_DEGREES = (1, 2, 3)
-"""Degrees of the background, tried in turn; near broad peaks, a straight line is not enough."""
+"""Degrees of the background polynomial, tried in turn; near broad peaks, a straight line is not enough."""
 _LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
 """Relative uncertainty of damping above which a peak counts as noise, not as a resonance."""
 
@@ -237,7 +237,7 @@ def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...
 
 
 def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
-    """Fit all modes of a band together, from the single fits; return the single fits if this fails.
+    """Fit all modes of a band together, starting from the single fits; return these if the joint fit fails.
 
     H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
     exact for a linear specimen with any damping. If these modes do not explain the band, the mode with the

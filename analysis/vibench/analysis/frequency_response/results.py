@@ -46,7 +46,7 @@ def require_estimator(estimator: Estimator, noise_ratio: float | None, confidenc
 
 @dataclass(frozen=True)
 class FrequencyResponseSettings:
-    """Settings of a frequency response."""
+    """Settings with which a frequency response was estimated."""
 
     estimator: Estimator
     sample_rate_hz: float
@@ -61,8 +61,8 @@ class FrequencyResponseSettings:
     delay_s: float = 0.0
     """Delay of the response channel behind the drive channel [s], removed from the phase."""
     decay_per_s: float | None = None
-    """Decay of the exponential window for hits [1/s], 0 without a window; None for noise. The damping it adds
-    is removed from resonances, but not from lines."""
+    """Decay of the exponential window for hits [1/s], 0 without a window; None for noise. The damping that
+    the window adds is removed from resonances, but not from spectral lines."""
 
     @property
     def segment_s(self) -> float:

@@ -13,7 +13,7 @@ from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings, require_estimator
 
 _ENOUGH_FREEDOM = 24.0
-"""Degrees of freedom at which the variance of a spectral line is accurate to a third."""
+"""Degrees of freedom at which the estimated variance of a spectral line is accurate to a third."""
 _FREEDOM = 96.0
 """Degrees of freedom, summed over neighbouring lines, for estimating the noise levels."""
 _FEWEST_FREEDOM = 4.0
