@@ -37,7 +37,7 @@ _LAW_UNKNOWN = 0.15
 """Error of a gap if the contact law is not Hertz's, relative to the mean depth of contacts."""
 FEWEST_IMPACTS = 8
 _LEAST_SPREAD = 0.3
-"""A line is fitted only if the middle 90 % of contact depths span this fraction of their mean."""
+"""A line is fitted only if the middle 90 % of contact depths span at least this fraction of their mean."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
 """Largest scatter of |p| at the impacts of a valid block, relative to the gap."""
@@ -176,7 +176,7 @@ def _extrapolate(values: Reals, far: int, near: int, place: float) -> float:
 
 
 def _interpolate(values: Reals, slopes: Reals, t: float) -> float:
-    """Interpolate between two samples by the cubic that has both values and slopes (per sample)."""
+    """Interpolate between two samples by the cubic that matches their values and slopes (per sample)."""
     (a, b), (da, db) = values, slopes
     return float(
         a * (1 + 2 * t) * (1 - t) ** 2 + da * t * (1 - t) ** 2 + b * t**2 * (3 - 2 * t) + db * t**2 * (t - 1)

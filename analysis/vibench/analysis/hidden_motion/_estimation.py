@@ -1,7 +1,7 @@
 """Estimate gaps, m1, springs, dampers and contact law while the motion is tracked.
 
 The parameters are constant states of the filter. At first the filter assumes a larger velocity noise, so that
-it keeps the track with wrong parameters. After 0.1 s of tracked motion it uses the true noise.
+it keeps the track even with wrong parameters. After 0.1 s of tracked motion it uses the true noise.
 """
 
 import math
@@ -31,7 +31,7 @@ from ._tracking_model import STATES, StepTables, TrackedSpecimen, indentation_m,
 _WANDER = 0.02
 """Random walk of parameters per block, relative to their prior sd; avoids overconfidence of the filter."""
 REBUILT_S = 0.05
-"""Interval after which the tables are updated to the current parameters [s]."""
+"""Interval at which the filter's tables are updated to the current parameters [s]."""
 _LOST = (
     f"during the search for parameters, each track was lost within {REBUILT_S:g} s, so values that are not "
     "searched (m0, m2, k1, kind of contact) may be described wrongly"
@@ -41,7 +41,7 @@ _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
 _LEAST_OF_START = 0.05
 """Lower limit of a parameter relative to its start value; only the loss may be negative."""
 _FURTHEST = 8.0
-"""Deviation from the description at which the search stops, in prior standard deviations."""
+"""Deviation of a parameter from its start value [prior standard deviations] at which the search stops."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Estimate:
     moved: Reals
     """Deviations from the start values in prior standard deviations, shape (parameters,)."""
     covariance: Reals
-    """Covariance of the filter in units of the prior, shape (parameters, parameters)."""
+    """Covariance of the parameters in units of the prior, shape (parameters, parameters)."""
     wandered: float
     """Variance that the random walk added to each parameter, in units of the prior."""
     followed_s: float
@@ -210,7 +210,7 @@ _FREE_S = 3.0
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return start values without a contact model, and their prior or the reason why there is no prior."""
+    """Return start values found without a contact model, with their prior or the reason if it is missing."""
     rate = motion.sample_rate_hz
     fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
@@ -243,12 +243,12 @@ def search_start(
 
 
 def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
-    """Return the parameters ``near`` without the gap of a side that has no stop in the description."""
+    """Return ``near`` without the gap of a side for which no stop is described."""
     return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 
 
 def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Return the gaps from impacts of similar strength: |p| minus the depth by the described law."""
+    """Return the gaps from impacts of similar strength: |p| minus the depth that the described law gives."""
 
     def gap(side: float) -> FreeGap | None:
         here = impacts.sides == side

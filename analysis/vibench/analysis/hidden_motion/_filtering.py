@@ -98,7 +98,7 @@ class FilterPredictions:
     """Predictions of the filter for each sample, before that sample was used."""
 
     first: int
-    """Index of the first sample in the motion."""
+    """Index in the motion of the first predicted sample."""
     states: Reals
     covariances: Reals
     innovations: Reals
@@ -143,7 +143,7 @@ def run_filter(
     loss_limit: float = np.inf,
     force_variance: Reals = _NOTHING,
 ) -> FilterPredictions:
-    """Advance ``at`` by ``count`` samples, or until the mean innovation exceeds the limit.
+    """Advance ``at`` by ``count`` samples, or until the mean squared innovation exceeds the limit.
 
     ``force_variance`` is the variance of an unknown contact force held over each sample [N^2].
     """

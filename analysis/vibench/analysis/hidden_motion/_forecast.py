@@ -33,7 +33,7 @@ class Forecast(Tabular):
     OWN_UNITS: ClassVar = {"p": "m", "error": "m"}
 
     first: int
-    """Index of the first sample in the recording."""
+    """Index in the recording of the first forecast sample."""
     p: Reals
     """Relative displacement p = y - z [m]."""
     error: Reals

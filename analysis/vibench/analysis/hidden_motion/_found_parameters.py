@@ -24,21 +24,21 @@ from ._tracking_model import TrackedSpecimen
 _STRETCH_S = 1.2
 """Length of the part of the motion in which each restart searches for parameters [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Number of restarts; in a short motion, their stretches overlap and only the start values differ."""
+"""Smallest and largest number of restarts; in a short motion, they differ only in their start values."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
-"""Mean squared innovation of a track up to which the described parameters are only refined."""
+"""Largest mean squared innovation of a track with which the described parameters are only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
-"""Shifts of gaps found without a contact model, in standard deviations, tried if tracking fails."""
+"""Shifts [standard deviations] of gaps found without a contact model, tried if tracking fails."""
 _LARGEST_SD = 0.5
 """Largest standard deviation of a determined parameter, relative to that of the described value."""
 _WIDE = 3.0
-"""Standard deviation of the wide prior, which replaces the narrow one, over that of the described value."""
+"""Standard deviation of the wide prior relative to that of the described value."""
 _FAR = 3.0
-"""Largest standard deviation of a determined parameter, relative to the narrow prior."""
+"""Largest standard deviation of a determined parameter, relative to that of the narrow prior."""
 _SETTLED = 1.0
-"""Largest distance between the values without and with the narrow prior, in sd of this prior."""
+"""Largest change of a value if the narrow prior is removed, in standard deviations of this prior."""
 _ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
@@ -93,7 +93,7 @@ class FoundParameter:
     value: float
     low: float
     high: float
-    """95 % bounds from the scatter of restarts and the uncertainty of each."""
+    """95 % bounds from the scatter of restarts and the uncertainty of each restart."""
     described: float
     not_determined: str = ""
     """Reason why the value is missing; empty if there is a value."""
@@ -105,7 +105,7 @@ class FoundParameter:
 
     @property
     def is_determined(self) -> bool:
-        """Return whether there are a value and bounds."""
+        """Return whether the parameter has a value and bounds."""
         return not self.not_determined
 
     @property
@@ -243,7 +243,7 @@ class _CombinedEstimate:
     assumed: Reals
     """Standard deviation of the described values."""
     beyond: Reals
-    """Distance between the values without and with the narrow prior."""
+    """Change of each value if the narrow prior is removed."""
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _CombinedEstimate:
@@ -302,7 +302,7 @@ def _undetermined(described: TrackedSpecimen, why: str, *, searched: bool = Fals
 
 
 def without_values(found: FoundSpecimen, why: str) -> FoundSpecimen:
-    """Return the parameters without their values, and ``why`` as the reason."""
+    """Return the parameters without their values, with ``why`` as the reason."""
     nan = float("nan")
     parameters = tuple(
         each if each.not_determined else replace(each, value=nan, low=nan, high=nan, not_determined=why)

@@ -140,7 +140,7 @@ def measured_masses(recording: Recording, motion: PreparedMotion) -> Iterator[Me
 
 MICRO = 1e6
 _LEAST_HELD = 0.95
-"""Smallest tracked share of a motion if the parameters are correct."""
+"""Smallest fraction of a motion that is tracked if the parameters are correct."""
 _HIGHEST_LEVEL = 1.25
 """Largest mean squared innovation in flight if the parameters are correct; 0.8 to 1.1 are usual."""
 
@@ -164,7 +164,7 @@ class TrackedMotion(Tabular):
 
     @property
     def tracked_share(self) -> float:
-        """Share of the samples that were tracked."""
+        """Fraction of the samples that were tracked."""
         return float(np.mean(~np.isnan(self.p)))
 
     @property
@@ -181,7 +181,7 @@ class HiddenMotion(Tabular):
     name: str
     sample_rate_hz: float
     first_sample: int
-    """Index of the first sample in the recording."""
+    """Index in the recording of the first sample of the motion."""
     noise: ChannelNoise
     specimen: TrackedSpecimen
     """Parameters used for tracking."""
@@ -274,7 +274,7 @@ def hidden_motion(
     Parameters
     ----------
     recording
-        Recording of base acceleration and m0's velocity at 10 kHz or more (51.2 kHz to find the law).
+        Recording of base acceleration and m0's velocity at 10 kHz or more (51.2 kHz to find the contact law).
     specimen
         Description of the specimen, by default from the recording; m0, m2 and k1 must be exact, the rest
         within a few per cent.

@@ -36,14 +36,14 @@ class HiddenViewRequest:
 
 @dataclass(frozen=True, eq=False)
 class HiddenView(Tabular):
-    """Data to plot."""
+    """Hidden motion to plot, and the parameters used."""
 
     OWN_UNITS: ClassVar = {"p": "m", "free_p": "m"}
 
     request: HiddenViewRequest
     time_s: Reals
     p: Samples
-    """Relative displacement by the tracked method, NaN without a track [m]."""
+    """Relative displacement from tracking, NaN without a track [m]."""
     free_p: Samples
     """Relative displacement without a contact model [m]."""
     stops_m: tuple[float, float]

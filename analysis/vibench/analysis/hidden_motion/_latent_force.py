@@ -23,7 +23,7 @@ _WINDOW_S = 6e-5
 """Half width of a window around a peak of the contact force [s]."""
 _PEAK_OVER_MEDIAN = 6.0
 _LEAST_PEAK = 0.1
-"""Smallest peak relative to the first guess of the force."""
+"""Smallest peak of the force at an impact, relative to the first guess of the force."""
 CLOSED_SHARE = 3e-4
 """Standard deviation of the force between impacts, relative to the first guess of the force."""
 _LEAST_GUESS_N = 1e-3
@@ -47,7 +47,7 @@ class LatentMotion:
     is_open: Flags
     """Flags of samples with a possible contact force."""
     is_dropout: Flags
-    """Flags of samples in or near drop-outs that may have a contact force."""
+    """Flags of samples in or near drop-outs, which may hide a contact."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation without its largest 0.1 %; 1 for a good fit."""

@@ -61,7 +61,7 @@ _HASH_DIGITS = 16
 
 
 class Level(FrozenModel):
-    """Mean squared normalised innovation of blocks without contact, with clipped outliers."""
+    """Usual innovation level of blocks: mean squared normalised innovation in flight, outliers clipped."""
 
     mean: float
     sd: float
@@ -174,7 +174,7 @@ HELD_S = 3.0
 """Length of the newest motion that is stored for finding parameters [s]."""
 _NOISE_S = 0.5
 _LOOKED_S = 0.25
-"""Length of the newest samples searched for drop-outs [s]."""
+"""Length of the newest stretch that is searched for drop-outs [s]."""
 _FIND_S = 2.4
 """Length of motion from which parameters are found [s]."""
 _PATIENCE = 2.0
@@ -182,10 +182,10 @@ _PATIENCE = 2.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
 """First and longest time between attempts to start a track while the motion does not fit [s]."""
 _CLIPPED = 25.0
-"""Upper limit of squared innovations, so that one late impact does not count as a change."""
+"""Value at which squared innovations are clipped, so that one late impact does not count as a change."""
 _STEADY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1)
 _APART = 3.0
-"""Smallest reported change of a parameter, relative to the root sum square of both half widths."""
+"""Smallest reported change of a parameter, relative to the root sum square of both bounds' half widths."""
 
 
 class LiveTwin:

@@ -28,14 +28,14 @@ class Hidden(StrEnum):
 
 
 class Search(NamedTuple):
-    """Settings of the search for one parameter, relative to its value."""
+    """Standard deviations and step of the search for one parameter, relative to its value."""
 
     prior_sd: float
     """Prior standard deviation about the described value."""
     step: float
     """Step of the parameter for numerical derivatives."""
     near: float
-    """Prior standard deviation about the description, if the description suffices to track the motion."""
+    """Prior standard deviation about the described value, if the described values suffice for tracking."""
     least_sd: float = 0.0
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
