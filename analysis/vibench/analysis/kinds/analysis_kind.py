@@ -51,7 +51,7 @@ class AnalysisKind(Generic[P, A, L]):
     """Functions that analyse recordings of one kind of excitation."""
 
     family: str
-    """Name of the results in JSON; kinds with equal results share it."""
+    """Name of the results in JSON; kinds with the same type of result share this name."""
     analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
     draws: Callable[[A], Callable[[SimulatedChannels], Draw[Any]]]
     """Return the function that estimates the measured quantities from simulated channels."""

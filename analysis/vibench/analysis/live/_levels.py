@@ -9,9 +9,9 @@ from ..signals.arrays import Reals
 from ._ring import Values
 
 OVER_SHARE = 0.95
-"""Share of full scale at and above which a channel is close to clipping."""
+"""Fraction of full scale from which a channel is close to clipping."""
 QUIET_SHARE = 0.01
-"""Share of full scale below which the input range is too large or the sensor is missing."""
+"""Fraction of full scale below which the input range is too large or the sensor is missing."""
 QUIET_AFTER_S = 3.0
 HOLD_S = 1.5
 

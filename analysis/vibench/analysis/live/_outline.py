@@ -197,7 +197,7 @@ _COARSER = 16
 _LEAST_BINS = 20_000
 """Number of bins up to which no coarser level is needed; reducing these bins to columns takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Parts of a long recording in which periods are counted: number, columns of each, maximum samples."""
+"""Parts of a long recording in which periods are counted: number, and columns and maximum samples of each."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
