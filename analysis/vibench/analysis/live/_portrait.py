@@ -98,7 +98,7 @@ class PoincareSection:
         self._newest = -np.inf
 
     def add(self, found: Portrait) -> None:
-        """Add the new points: those at least half a period later than the newest collected point."""
+        """Add points that are at least half a period later than the newest collected point."""
         if found.strobe_sample.size == 0:
             return
         spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0

@@ -48,7 +48,7 @@ class Ring:
         return 0 if self._begun is None else min(self.next_sample - self._begun, self._capacity)
 
     def add(self, first_sample: int, values: Values) -> None:
-        """Add samples, shape (channels, samples); missing samples become NaN, known samples are skipped."""
+        """Add samples, shape (channels, samples); missing samples become NaN, repeated ones are skipped."""
         if self._begun is None:
             self._begun = self.next_sample = first_sample
         late = self.next_sample - first_sample
@@ -70,7 +70,7 @@ class Ring:
         return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def samples_since(self, sample: int) -> RingWindow:
-        """Return the samples from index ``sample``, as far as they are still available."""
+        """Return the samples from index ``sample`` on that are still available."""
         return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

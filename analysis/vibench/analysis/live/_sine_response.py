@@ -14,9 +14,9 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Minimum share of a sine's power in its strongest spectral line and the neighbouring lines."""
+"""Minimum fraction of a signal's power near its strongest spectral line if the signal is a sine."""
 _NEIGHBOURS = 3
-"""Number of lines on each side of the strongest line of a sine (Hann window), even in a slow sweep."""
+"""Number of neighbouring lines on each side; enough for a sine under a Hann window, even in a slow sweep."""
 _LEAST_LINE = 4
 """Minimum number of periods to analyse; with fewer, the lines of the sine and of the offset merge."""
 
@@ -65,8 +65,8 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
     """Return the times of the maxima of the drive signal, a cosine or a slow sweep [samples].
 
-    The drive is demodulated with its frequency and low-pass filtered at half this frequency; a slow phase
-    remains. A tenth of the stretch at each end is left out, because the filter is inaccurate there.
+    The drive is demodulated with its frequency and low-pass filtered at half this frequency, which leaves its
+    slow phase. A tenth of the stretch at each end is left out, because the filter is inaccurate there.
     """
     half = max(2, int(0.5 * frequency_hz * drive.size / sample_rate_hz))
     if half < _LEAST_LINE:
@@ -90,9 +90,9 @@ _BAND_BELOW = 0.3
 """High-pass frequency for displacement, divided by the drive frequency; passes half orders but no drift."""
 _BAND_ABOVE_HZ = 10_000.0
 _LOOK_S = 0.5
-"""Length [s] of newest signal from which the drive frequency is found; five periods of 10 Hz."""
+"""Length [s] of the newest samples from which the drive frequency is found; five periods at 10 Hz."""
 _STRETCH_PERIODS = 25
-"""Number of drive periods for one point of the responses, without disturbed ends; at least 0.1 s."""
+"""Number of drive periods for one point of the responses, without the disturbed ends; at least 0.1 s."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9

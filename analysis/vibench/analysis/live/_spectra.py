@@ -169,9 +169,9 @@ class LiveSpectra:
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
-"""Half-power width of a spectral line under a Hann window, times the length of the window."""
+"""Product of a spectral line's half-power width and the window length, for a Hann window."""
 _SEGMENTS_IN_SIGHT = 250
-"""Ratio of the visible time to the default segment length, which has lower and upper limits."""
+"""Ratio of the shown time span to the default segment length, within the limits of that length."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0
@@ -187,7 +187,7 @@ class RowSpacing(StrEnum):
 
 @dataclass(frozen=True)
 class SpectrogramRequest:
-    """Samples ``start`` to ``stop`` (exclusive) of a channel, and the settings of the picture."""
+    """Samples ``start`` to ``stop`` (exclusive) of a channel, and the frequency rows of the picture."""
 
     path: Path
     role: str
@@ -218,7 +218,7 @@ class DensityPicture:
 
 
 def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
-    """Return the spectrogram of part of a recording; every sample contributes.
+    """Return the spectrogram of part of a recording, to which every sample contributes.
 
     Raises RecordingError, InvalidRequest or NotEnoughData for an unusable file, channel or stretch.
     """

@@ -28,19 +28,19 @@ from ._spectra import LiveSpectra, LiveSpectrum
 # impacts. Only contacts that change m0's motion by less than the noise are missed.
 
 _SPAN_S = 78e-6
-"""Step of the sixth difference; a longer step passes more of the motion, a shorter step more noise [s]."""
+"""Step of the sixth difference [s]; a longer step passes more of the motion, a shorter step more noise."""
 _DAMPING_TIME_S = 2e-5
-"""Damping time of the springs at m0: ratio of the acceleration step to the change of its slope."""
+"""Damping time of m0's springs [s]: at an impact, ratio of acceleration step to change of its slope."""
 _CONTACT_S = 30e-6
 """Assumed duration of a contact; contacts last 20 to 40 us."""
 _APART_S = 100e-6
-"""Distance [s] below which two kinks are counted as one."""
+"""Time [s] between two kinks below which they are counted as one."""
 _LEAST_FRESH_S = 20e-3
 """Shortest piece of signal from which noise is estimated [s]."""
 _MOST_FRESH_S = 0.1
 """Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
-"""Threshold of a kink in standard deviations of the noise, which exceeds it once in two minutes."""
+"""Threshold of a kink in standard deviations of the noise; noise exceeds it once in two minutes."""
 _SMOOTH_FACTOR = 3.0
 """Threshold of a kink relative to the filter output for a sine at the mean frequency of the motion."""
 _REST_SHARE = 0.2
@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise (impacts affect higher ones); its value for unit noise."""
+"""Quantile of |noise| that measures the noise, since impacts affect higher ones; its value for unit noise."""
 
 
 class ImpactCounter:
@@ -135,7 +135,7 @@ def _noise(data: Reals) -> float:
 
 
 def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
-    """Return the filtered motion after one impact; the motion grows as t^power / power!."""
+    """Return the filtered motion after one impact, which adds a motion that grows as t^power / power!."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)
