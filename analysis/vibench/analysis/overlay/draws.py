@@ -30,7 +30,7 @@ from .shaker_fit import FittedShaker
 from .simulated_channels import SimulatedChannels, base_band_hz, under_base_motion
 
 _FEWEST_LINES = 50
-"""Minimum number of spectral lines in silence, which determine the noise level to 25 %."""
+"""Minimum number of spectral lines in silence; this number determines the noise level to 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Number of blocks in which noise is estimated, in addition to the first 1 s and the last 1 s."""
@@ -65,7 +65,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Return the rms noise over all quiet blocks; that of the quietest block is a few per cent too low."""
+    """Return the rms noise over all quiet blocks; the quietest block alone is a few per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)
@@ -87,9 +87,9 @@ def _white(samples: Reals) -> float:
 _COMPARED_HZ = (100.0, 2000.0)
 """Band in which drive noise is visible in the base motion, below further resonances of a table [Hz]."""
 _MEDIAN_SD = 1.44
-"""Relative standard deviation of the median of N exponentially distributed values, times sqrt(N)."""
+"""sqrt(N) times the relative standard deviation of the median of N exponentially distributed values."""
 _HANN_LINES = 1.5
-"""Spectral lines of a Hann window per statistically independent line."""
+"""Number of spectral lines per statistically independent line, with a Hann window."""
 UNKNOWN_NOISE = (
     "The noise of the amplifier is unknown, because neither its voltage nor a silence in a bench check was "
     "recorded; bands of simulated weak motion may be too narrow"
@@ -164,13 +164,13 @@ def _base_over_voltage(rig: DrivenRig, frequency_hz: Reals) -> Complexes:
 
 
 _FRAME_SAMPLES = 1 << 15
-"""Frame length [samples], 0.5 to 1 s; long enough to resolve the drive's lines from noise."""
+"""Frame length [samples], 0.5 to 1 s; long enough to separate the drive's lines from noise."""
 _BATCH_FRAMES = 16
 """Number of frames per batch of about 10 MB."""
 _LEVEL_LINES = 256
 """Number of lines whose median is the noise level; a few lines of the drive hardly change it."""
 _SURELY = 20.0
-"""Ratio of a line's power to the noise level that noise alone exceeds once in 5e8 lines."""
+"""Ratio of a line's power to the noise level; noise alone exceeds this ratio once in 5e8 lines."""
 
 
 class PlayedVoltage:
@@ -193,7 +193,7 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the filtered voltage, and for each batch the square root of the kept share of each line."""
+        """Return the filtered voltage, and per batch the square root of the kept fraction of each line."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
         # Synthesis window, with which half-overlapping frames add up to the signal.
@@ -255,7 +255,7 @@ class PlayedVoltage:
 
 
 DRAWS, MOST_DRAWS = 16, 1000
-"""Usual and largest number of draws of a colliding motion; 16 draws determine the 95 % band to 20 %."""
+"""Usual and maximum number of draws of a colliding motion; 16 draws determine the 95 % band to 20 %."""
 FIRST_DRAWS = 8
 """Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
@@ -265,9 +265,9 @@ START_M = 5e-9
 CLOCK_TOLERANCE = 50e-6
 """Relative error of the converter clock (NI 9234), which shifts resonances."""
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
-"""Lead-in before the simulated part, fade-in at the start of the lead-in, faded tail after the part [s]."""
+"""Lead-in before the evaluated part, fade-in at the start of the lead-in, fade-out after the part [s]."""
 _NOISE = 0.15
-"""Uncertainty of the natural logarithm of a channel's noise, estimated in its quietest part."""
+"""Uncertainty of the natural logarithm of a channel's noise, which is estimated in its quietest part."""
 _MORE = 3
 _HOPELESS = 0.2
 """Probability of enough draws for a comparison below which no more draws are made."""
@@ -281,7 +281,7 @@ _BYTES_PER_SAMPLE = 16
 
 @dataclass(frozen=True, eq=False)
 class SimulatedRun:
-    """Facts on the simulation of a recording."""
+    """Specimen, drive, accuracy and impacts of the simulation of a recording."""
 
     DOCUMENT: ClassVar = (
         "drive=driven why draws base_band_hz accuracy masses_kg=specimen.masses "
@@ -292,7 +292,7 @@ class SimulatedRun:
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
-    """Accuracy of simulated contacts if the base motion drives the specimen; *standard* if a voltage does."""
+    """Accuracy of simulated contacts; always *standard* if a voltage drives the simulation."""
     base_band_hz: tuple[float, float] | None
     """Band of the base displacement that drives the specimen; None if a voltage drives it."""
     why: str = ""
@@ -318,7 +318,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, eq=False)
 class Draw(Generic[R]):
-    """One simulated run with random start and noise, analysed like the recording."""
+    """One simulated run with random initial state and noise, analysed like the recording."""
 
     response: Callable[[], R]
     """Function that computes the complete response; comparisons need only ``quantities``."""
@@ -343,7 +343,7 @@ class DrawSource:
     """Source of draws; the draw with a given number is always the same."""
 
     run: SimulatedRun
-    """Facts on the simulation that are known before the first draw."""
+    """Properties of the simulation that are known before the first draw."""
     most: int
     samples: int
     channels: Callable[[int], SimulatedChannels]
@@ -396,9 +396,8 @@ def all_draws(
 ) -> DrawSet[R]:
     """Return all draws of a source, each analysed like the recording.
 
-    Fewer draws are made if the first draws agree clearly. Up to three times as many are made if few draws
-    show the ``measured`` kind of motion, unless enough of them are improbable. Raises UnusableData when a
-    simulation did not finish.
+    Fewer draws are made if the first draws agree clearly. Up to three times as many draws are made if few of
+    them show the ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
     """
     responses: list[R] = []
 
@@ -496,7 +495,7 @@ def _with_noise(samples: Samples, role: str, rms: float, rate_hz: float, rng: np
 
 @dataclass(frozen=True, eq=False)
 class StretchDraws:
-    """Source of draws of part of a recording for any specimen, for statistics of irregular motion.
+    """Source of draws of one part of a recording, for any specimen; used for statistics of irregular motion.
 
     A run starts from rest half a second before this part, with the recorded voltage faded in.
     """

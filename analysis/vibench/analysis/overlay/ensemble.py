@@ -23,7 +23,7 @@ MIXED = -1
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Share of the limit of |z|; if all values are within it after half of the draws, no more are made."""
+"""Fraction of the limit of |z|; no more draws are made if half of them keep all values within it."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -49,8 +49,8 @@ class Phase(Quantity):
 class EnsembleCurve(Tabular):
     """One quantity, measured and in every draw.
 
-    Square roots are compared because they are nearly normal, both for accurate and for random magnitudes
-    (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
+    Square roots are compared because they are nearly normally distributed, both for accurate and for random
+    magnitudes (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
 
     The limit of |z| accounts for the number of frequencies (Sidak 1967), few draws (Student's t), and long
     tails (each draw compared with the others). 1 % of correct simulations exceed it.
@@ -67,7 +67,7 @@ class EnsembleCurve(Tabular):
     measured: Reals
     """Measured values of the quantity, shape (points,)."""
     draws: Reals
-    """Simulated values of the quantity, shape (draws, points); NaN if the draw has another kind of motion."""
+    """Simulated values of the quantity, shape (draws, points); NaN where the kind of motion differs."""
 
     @cached_property
     def count(self) -> Integers:
@@ -103,7 +103,7 @@ class EnsembleCurve(Tabular):
     def z(self) -> Reals:
         """Measured value as an equivalent normal deviate, shape (points,); NaN if not compared.
 
-        z is as probable as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
+        z has the same probability as Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)).
         """
         return np.where(self._is_compared, _deviates(self._root, self._mean, self._sd, self.count), np.nan)
 
@@ -153,7 +153,7 @@ class EnsembleCurve(Tabular):
 
     @property
     def share_in_band(self) -> float:
-        """Share of compared points within the 95 % band."""
+        """Fraction of compared points within the 95 % band."""
         inside = np.abs(self._root - self._mean) <= self._reach
         return float(np.mean(inside[self._is_compared])) if self.compared else np.nan
 
@@ -183,7 +183,7 @@ class EnsembleCurve(Tabular):
 
     @cached_property
     def _z_of_draws(self) -> Reals:
-        """Value z of each draw relative to the other draws, shape (draws, points); NaN for too few draws."""
+        """The z of each draw relative to the other draws, shape (draws, points); NaN with too few draws."""
         left = self.count - 1
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -228,9 +228,9 @@ class EnsembleCurve(Tabular):
 
 
 class PhaseCurve(EnsembleCurve):
-    """Phases, measured and in every draw [rad]; turns from the draws' mean direction are compared.
+    """Phases, measured and in every draw [rad]; compared are their angles from the draws' mean direction.
 
-    The turns lie within half a turn, so the band may extend beyond pi. Phases that scatter over the whole
+    These angles lie within half a turn, so the band may extend beyond pi. Phases that scatter over the whole
     circle do not disagree.
     """
 
@@ -258,7 +258,7 @@ class PhaseCurve(EnsembleCurve):
 
 
 def _turn(angle_rad: Reals) -> Reals:
-    """Return angles within half a turn [rad]."""
+    """Return the angles, reduced to -pi to pi [rad]."""
     return np.asarray(np.angle(np.exp(1j * angle_rad)))
 
 
@@ -274,8 +274,8 @@ def largest_of_chance(largest: Reals) -> float:
     """Return the limit that, in 99 % of cases, the largest |z| of another draw does not exceed.
 
     ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
-    distribution with their mean and deviation. It is widened, because few draws determine these poorly:
-    otherwise it would be exceeded in 2 % of cases with 16 draws, and in 5 % with five. The factor is fitted.
+    distribution with their mean and deviation. A fitted factor widens it, because few draws determine both
+    poorly: otherwise, 2 % of cases with 16 draws would exceed it, and 5 % with five.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -301,7 +301,7 @@ def ensemble_curves(
 
 
 def _comparable(measured: Quantity, drawn: Quantity) -> Reals:
-    """Return a draw's values; NaN where its points or its kind of motion differ from the measured ones."""
+    """Return a draw's values; NaN where its points or its kind of motion differ from the measurement."""
     if drawn.value.shape != measured.value.shape:
         return np.full(measured.value.shape, np.nan)
     if measured.state is None or drawn.state is None:
@@ -311,7 +311,7 @@ def _comparable(measured: Quantity, drawn: Quantity) -> Reals:
 
 
 def _over_draws(values: Reals, reduce: object) -> Reals:
-    """Reduce over draws; NaN at points with fewer than two draws, without a warning."""
+    """Apply ``reduce`` over the draws; NaN, without a warning, at points with fewer than two draws."""
     some = np.sum(np.isfinite(values), axis=0) > 1
     found = np.full(values.shape[1:], np.nan)
     if some.any():
@@ -349,7 +349,7 @@ class CurveDifference(Tabular):
 
     @property
     def share_within_two(self) -> float:
-        """Share of points within two standard errors; 0.95 is expected if all differences are scatter."""
+        """Fraction of points within two standard errors; 0.95 is expected for scatter alone."""
         known = self.standard_errors[~np.isnan(self.standard_errors)]
         return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
 
@@ -370,7 +370,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If the motion ends within this interval [s] in all runs, the cause is common, such as the record's end."""
+"""If the ends of the motion in all runs lie within this interval [s], the cause is not chance."""
 
 
 @dataclass(frozen=True)
@@ -400,7 +400,7 @@ class EscapeRate:
     ends: int
     measured: Ending
     exposure_s: float
-    """Total time of all runs in which an end was counted [s]."""
+    """Total time of all runs during which an end would have been counted [s]."""
     events: int
     """Number of counted ends, excluding the end at ``from_s``."""
     from_s: float

@@ -15,10 +15,10 @@ from .prediction import ResponsePrediction, predict
 MOST_POINTS = 60
 """Maximum number of simulated frequencies; their simulation takes a few seconds."""
 SIMULATED_S = 6.0
-"""Duration from rest at each frequency; the transient decays to 0.1 % in half of this time."""
+"""Simulated time from rest at each frequency; the transient decays to 0.1 % in half of this time."""
 FOLLOWED_POINTS = 200
 FOLLOWED_S = 2.0
-"""Number of frequency steps that imitate a sweep (small steps disturb little), and time per step [s]."""
+"""Number of frequency steps that imitate a sweep (small steps cause small transients); time per step [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
 
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
-    """Return the bands of points flagged in ``is_inside``; a band ends half way to the next point outside."""
+    """Return the bands of points flagged in ``is_inside``; bands end halfway to the next unflagged point."""
     middles = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     lows = np.concatenate([frequency_hz[:1], middles])
     highs = np.concatenate([middles, frequency_hz[-1:]])

@@ -59,9 +59,9 @@ class AbstractOverlay(Tabular, Generic[R]):
 
     run: SimulatedRun
     response: R
-    """Response of the first draw, one of several equivalent runs."""
+    """Response of the first draw; all draws are equivalent."""
     ensemble: tuple[EnsembleCurve, ...]
-    """Every compared quantity, measured and in all draws; with bands if there are five or more draws."""
+    """Every compared quantity, measured and in all draws, with bands if there are at least five draws."""
     escape: EscapeRate | None
     """Rate at which the motion ends, if its end is random."""
     difference: CurveDifference
@@ -141,7 +141,7 @@ PHASE = "phase of the response over the base"
 def _difference(
     drawn: DrawSet[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
 ) -> CurveDifference:
-    """Compare the measurement with the median of the draws, or with a single draw and its deviation."""
+    """Compare the measurement with the median of the draws, or with a single draw and its sd."""
     (found,) = ensemble_curves([measured], drawn.quantities)
     if drawn.run.draws > 1:
         simulated = found.median, found.relative_sd
@@ -229,7 +229,7 @@ _EDGE_S = 1.0
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
     """Return the quantities of a sweep that are compared with draws.
 
-    Points are compared where both sweeps collide or neither does, except within a second of a region's edge.
+    Points are compared where both sweeps collide or neither does, but not within a second of a region's edge.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))
@@ -273,7 +273,7 @@ _LEAST_BAND = 1e-3
 def dwell_quantities(
     response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
 ) -> tuple[Quantity, ...]:
-    """Return the quantities of a dwell that are compared with draws: both responses and bands with motion."""
+    """Return a dwell's quantities that are compared with draws: responses, phase, bands and spectrum."""
     at = np.array([response.drive.frequency_hz])
     state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
     columns_hz, size = spectrum_columns(response)

@@ -27,7 +27,7 @@ _TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
 _REACH = np.log(300.0)
 """Largest natural logarithm of the ratio of a parameter to its typical value."""
 _PRIOR_SD = 1.0
-"""Prior standard deviation of the logarithm of each parameter, for their random values."""
+"""Prior standard deviation of the logarithm of each parameter, for drawing random shakers."""
 _STARTS = 12
 _NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
 
@@ -63,7 +63,7 @@ class FittedShaker:
         )
 
     def random_shaker(self, rng: np.random.Generator) -> Shaker:
-        """Return a random shaker within this uncertainty."""
+        """Return a random shaker within the uncertainty of the parameters."""
         logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
         return _shaker(logarithms)
 
@@ -113,7 +113,7 @@ def fit_shaker(
 
 
 def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
-    """Search from several starting points, as the data determine mainly products of the parameters."""
+    """Search from several starting points, because the data determine mainly products of the parameters."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
     bounds = (typical - _REACH, typical + _REACH)
@@ -136,7 +136,7 @@ def _shaker(logarithms: Reals) -> Shaker:
 
 @dataclass(frozen=True, eq=False)
 class _VoltageAndBase(RecordedChannels):
-    """Channels with the voltage in place of the base, and the base in place of m0, for noise estimators."""
+    """Channels for noise estimators, with the voltage in place of the base and the base in place of m0."""
 
     role: str = field(kw_only=True)
 
@@ -155,7 +155,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Return base acceleration / voltage, multiplied by s as in a ratio of velocity to acceleration."""
+    """Return s times base acceleration / voltage, analogous to m0's velocity / base acceleration."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     plan = analysis.excitation

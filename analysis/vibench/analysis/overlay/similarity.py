@@ -12,12 +12,12 @@ from ..tables import Tabular
 SIMILARITY_THRESHOLD = 0.1
 """Largest `Similarity.difference` of similar points (Gong et al. 2025, section 4)."""
 DRAWS = 2000
-"""Number of bootstrap resamples; an interval's limits scatter by about a fortieth of its width."""
+"""Number of bootstrap resamples, with which an interval's limits scatter by about a fortieth of its width."""
 CONFIDENCE = 0.95
 
 
 class LogarithmOf(StrEnum):
-    """Argument of the logarithm in eq. 6; the paper does not state it, but the rates depend on it."""
+    """Argument of the logarithm in eq. 6; similarity rates depend on it, but the paper does not state it."""
 
     NORMALISED = "normalised"
     """Response over drive amplitude, x / A0."""
@@ -84,7 +84,7 @@ class Similarity(Tabular):
     logarithm_of: LogarithmOf
     threshold: float
     rate: float
-    """Share of points at which both curves are similar (eq. 7)."""
+    """Fraction of points at which the two curves are similar (eq. 7)."""
     low: float
     high: float
     """95 % interval of the similarity rate for other choices of frequencies in the same band."""
@@ -118,8 +118,8 @@ def similarity(
         Response of the piece-wise model (or a measurement) and of its substitute, at the same frequencies;
         `SimilarityCurve.at` interpolates.
     logarithm_of
-        Unit in the logarithm, which the paper does not state. Where the reference is 1 in this unit, points
-        are similar only if both curves are equal, since the difference is otherwise infinite.
+        Unit inside the logarithm, which the paper does not state. Where the reference is 1 in this unit, a
+        point is similar only if both curves are equal, because the difference is otherwise infinite.
     threshold
         Largest difference of a similar point.
     seed

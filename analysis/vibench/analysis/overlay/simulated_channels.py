@@ -25,9 +25,9 @@ _HIGHEST_PART = 0.33
 def recorded_base_motion(recording: Recording, measurement: Measurement) -> Reals:
     """Return the base displacement: the recorded acceleration, integrated twice in the frequency domain.
 
-    It has no mean and no drift, and the delay of the accelerometer channel is corrected; shape (samples,)
-    [m]. The whole recording is used, because it starts and ends in silence. Raises UnusableData when samples
-    were lost.
+    The displacement has no mean and no drift, and the accelerometer channel's delay is corrected; shape
+    (samples,) [m]. The whole recording is used, because it starts and ends in silence. Raises UnusableData
+    when samples were lost.
     """
     acceleration = recording.read(BASE)
     lost = int(np.count_nonzero(np.isnan(acceleration)))
@@ -64,7 +64,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Return the signal advanced by any number of samples (even a fraction), via its spectrum's phase."""
+    """Return the signal advanced by a number of samples (may be fractional), via its spectrum's phase."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -75,14 +75,14 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 _PIECE_S = 5.0
 """Duration that is simulated at once, to limit memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; each sample multiplies the end effect of a spline by 0.27."""
+"""Extra samples on each side of a piece; each extra sample reduces a spline's end effect to 0.27 of it."""
 _VX = 3
 _STATE = 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedChannels(RecordedChannels):
-    """A simulated draw with the drive, the parts and the flags of a recording, for the same estimator."""
+    """A simulated draw with the drive, parts and flags of a recording, so that estimators accept it."""
 
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]."""
@@ -91,7 +91,7 @@ class SimulatedChannels(RecordedChannels):
     base_acceleration: Samples
     """Acceleration of the simulated or recorded table that drove the specimen, shape (samples,) [m/s2]."""
     has_sensors: bool
-    """Whether the velocity includes delay and gain of the recorded channel; if not, it is the true motion."""
+    """Whether the velocity includes delay and gain of the recorded channel; the true velocity does not."""
 
     @property
     def response_delay_s(self) -> float:
