@@ -1,8 +1,8 @@
 """Simulations for the window: requests, results as they arrive, and computing times.
 
 A request has one specimen, one drive over frequency, and up to two models. A separate process computes one
-request after the other, sends results in pieces, and can be cancelled. docs/accuracy.md shows error and
-computing time of each accuracy.
+request after the other and sends results in pieces; requests can be cancelled. docs/accuracy.md shows error
+and computing time of each accuracy.
 
 >>> from vibench.analysis.prediction.progress import SimulationRequest
 >>> from vibench.analysis.prediction.accuracy_cost import cost_sentences

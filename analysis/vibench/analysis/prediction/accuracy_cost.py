@@ -7,7 +7,7 @@ from vibench.sim import Accuracy, PowerLaw
 from .progress import Exponent, SimulationRequest
 
 MACHINE = "one core of a 2-core AMD EPYC"
-"""Machine on which speeds and errors were measured; `vibench tradeoff` measures them on any machine."""
+"""Machine on which speeds and errors were measured; `vibench tradeoff` measures them on your machine."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class MeasuredLevel:
     power: float
     """Speed with the contact law power:3, whose force acts at every p: 150 Hz and 10 um."""
     state_error: float
-    """Error of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
+    """Error of the state of a periodic motion after 2 s, in units of 100 um and 0.1 m/s."""
     response_i_error: float
     """Relative error of Response I of a periodic motion, compared with the level `reference`."""
 

@@ -23,7 +23,7 @@ def field_docstring(model: type[BaseModel], name: str) -> str:
 
 @cache
 def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
-    """Read the docstrings of all fields in a module's classes, when one is first needed.
+    """Read the docstrings of all fields in a module's classes, as soon as one of them is needed.
 
     Pydantic's ``use_attribute_docstrings`` reads them when a class is defined: 22 ms at every start.
     """

@@ -105,7 +105,7 @@ class MapRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class MapPicture:
-    """A map as far as it is computed; cells that are not computed show the nearest computed cell."""
+    """A map as far as it is computed; a cell not yet computed shows the nearest computed cell."""
 
     frequency_hz: tuple[float, float]
     """Lower and upper edge of the picture [Hz]."""
@@ -145,7 +145,7 @@ class SettledMotion:
 
 
 class PicturingStore(MemoryStore):
-    """Store of a map in memory that sends a picture at most every 0.5 s."""
+    """Store that keeps a map in memory and sends a picture at most every 0.5 s."""
 
     def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
         super().__init__(plan)
@@ -240,7 +240,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
 
 @dataclass(frozen=True)
 class SimulatedPoint:
-    """Result of one model at one frequency; values are None if not requested or not found."""
+    """Result of one model at one frequency; a value is None if it was not requested or not found."""
 
     model: str
     frequency_hz: float
@@ -316,7 +316,7 @@ class SimulationRequest(SpecimenChoice):
     window_s: PositiveFloat = 5.0
     """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Maximum processor time per point for other initial states if the motion depends on them; 0: none."""
+    """Maximum processor time per point to find motions from other initial states, if they differ; 0: none."""
     error: TargetError | None = None
     """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
@@ -328,7 +328,7 @@ class SimulationRequest(SpecimenChoice):
 
     @model_validator(mode="after")
     def _is_a_study(self) -> Self:
-        """Refuse requests that are invalid as a study (with the study's error) or would take too long."""
+        """Refuse requests that would take too long, or that the study refuses (with the study's error)."""
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
@@ -386,7 +386,7 @@ MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Shar
 
 
 def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
-    """Return the table cells of a motion: responses, error, share of initial states, kind."""
+    """Return the table cells of a motion: responses, error, fraction of initial states, kind."""
     share, period = motion.share, "" if motion.period is None else f", period {motion.period}"
     return (
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
@@ -443,7 +443,7 @@ class SimulationProgress:
 
     @property
     def smallest_and_largest_response(self) -> tuple[float, float]:
-        """Smallest and largest of all responses so far; zeros before the first response."""
+        """Smallest and largest response so far; zeros before the first response."""
         points = [point for found in self._found.values() for point in found.values()]
         known = [v for p in points for v in (p.response_i, p.response_ii) if v is not None and v > 0]
         return (min(known), max(known)) if known else (0.0, 0.0)
@@ -454,7 +454,7 @@ class SimulationProgress:
         return tuple(self._troubles)
 
     def column(self, model: str, name: str) -> tuple[Reals, Reals]:
-        """Return the frequencies and one quantity of a model; NaN if unknown."""
+        """Return the frequencies and the values of one quantity of a model; unknown values are NaN."""
         points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
         values = [getattr(point, name) for point in points]
         frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)

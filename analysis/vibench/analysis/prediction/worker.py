@@ -39,7 +39,7 @@ SAMPLES_PER_PERIOD = 400
 
 
 class _TellingStore(MemoryStore):
-    """Store of results in memory that sends each result once."""
+    """Store that keeps results in memory and sends each result once."""
 
     def __init__(self, study: Study, tell: Tell) -> None:
         super().__init__(study)
