@@ -15,7 +15,7 @@ from .channels import BASE, DRIVE, OnRead, ignore_reading
 
 _BLOCK_S = 2.0
 _AT_FULL_SCALE = 0.999
-"""Share of full scale that counts as clipped; converters clip a few counts from the nominal range."""
+"""Fraction of full scale from which a sample counts as clipped; converters clip just below full scale."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class ChannelLevel:
     full_scale: float
     """Full scale of the converter's input [unit of the channel]."""
     share_at_full_scale: float
-    """Share of the samples at or above 99.9 % of full scale."""
+    """Fraction of the samples at or above 99.9 % of full scale."""
     flat_tops: tuple[float, ...] = ()
-    """Values at which the peaks are clipped, above, below or on both sides [unit of the channel]."""
+    """Values at which upper, lower or both peaks are clipped; empty if none are [unit of the channel]."""
 
     @property
     def share_of_range(self) -> float:
@@ -111,22 +111,22 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
 _COUNTED = 2**16 + 1
 """Number of bins over the input range, used to find flat tops."""
 _TOPS = (0.1, 0.03, 0.01)
-"""Heights of the tops of peaks that are examined for clipping, relative to the height of the peak."""
+"""Heights of the top parts of a peak that are examined for clipping, relative to the peak's height."""
 _FLAT = 0.88
-"""Minimum share of a clipped top's samples in its upper half; 0.71 for smooth, 0.84 for straight peaks."""
+"""Minimum fraction of a clipped top's samples in its upper half; smooth peaks have 0.71, straight 0.84."""
 _FLAT_VALUE = 0.4
-"""Minimum share of the samples in a clipped peak's upper half that have the clipped value."""
+"""Minimum fraction of the samples in a clipped peak's upper half that have the clipped value."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
-"""Minimum number of converter steps to a peak: a sine with 16 steps has 0.42 of its samples at two values."""
+"""Minimum height of a peak [converter steps]: a sine of 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
-"""Largest empty range of values in a smooth, well sampled peak, relative to the heights of peak and top."""
+"""Largest range without values in a smooth, well sampled peak, relative to heights of peak and of top."""
 _AS_FREQUENT = 0.4
 """Largest number of samples at one value below a clipped peak, relative to the number of clipped samples."""
 
 
 def _lasting(bins: Reals) -> tuple[int, int]:
-    """Return the highest bin that three successive samples reach, for the signal and the mirrored signal."""
+    """Return the highest bin that three successive samples reach, in the signal and in its mirror image."""
     if bins.size < 3:
         return 0, 0
     three = np.stack((bins[:-2], bins[1:-1], bins[2:]))
@@ -136,9 +136,9 @@ def _lasting(bins: Reals) -> tuple[int, int]:
 def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
     """Return the value at which the upper peaks are clipped; None if not, or if this is unclear.
 
-    If the sample clock is locked to the drive, every period has the same few values. A smooth peak may then
-    have the histogram of a clipped peak, but with an empty range above ``lasting``, the highest bin that
-    three successive samples reach.
+    If the sample clock is locked to the drive, every period has the same few values. The histogram of a
+    smooth peak may then look clipped, but has an empty range above ``lasting``, the highest bin that three
+    successive samples reach.
     """
     filled = np.flatnonzero(counts)
     if filled.size < 2:
@@ -172,7 +172,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
-    """Return whether an envelope stays near a value for long, such as that of a free body before a hit.
+    """Return whether an envelope stays near a value for long, such as for a free body before a hit.
 
     If a signal has only one value, it counts as rest only at zero: a saturated amplifier is also constant.
     """
@@ -187,7 +187,7 @@ def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
 
 
 _REST = 0.05, 0.02
-"""Range of values at rest, relative to the span; shortest rest relative to the recording."""
+"""Range of values at rest, relative to the signal's span; shortest rest, relative to the recording."""
 _LEAST_HEIGHT = 0.1
 """Smallest height of a peak above the median, relative to the span; a lower top is a signal at rest."""
 
@@ -202,13 +202,13 @@ def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
 
 
 _CLIPPED_SHARE = 0.2
-"""Largest share of samples at full scale in a usable channel; a sine just up to full scale has 3 %."""
+"""Largest fraction of samples at full scale in a usable channel; a sine just up to full scale has 3 %."""
 
 
 def require_moving_channels(levels: Sequence[ChannelLevel], response: str) -> None:
     """Refuse unusable channels; ``response`` is the analysed channel.
 
-    Raises UnusableData with one sentence that names every unusable channel and what to check.
+    Raises UnusableData with one sentence that names every unusable channel and says what to check.
     """
     used = (DRIVE, BASE, response)
     faults = [each for level in levels if level.header.role in used for each in _faults(level)]

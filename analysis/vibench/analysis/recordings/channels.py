@@ -223,7 +223,7 @@ class RecordedChannels:
 
 
 def far_from(marks: Flags, reach: int) -> Flags:
-    """Return flags of samples more than ``reach`` samples away from every marked sample, shape (samples,)."""
+    """Return flags of the samples that are over ``reach`` samples from every marked one, shape (samples,)."""
     if not marks.any():
         return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))

@@ -38,16 +38,16 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""Minimum share of the input range that a channel should use, so that the converter resolves it."""
+"""Minimum fraction of the input range that a channel should use, so that the converter resolves it."""
 _FARTHEST = 1000.0
 """Largest plausible ratio of the motions of mass and base, or of base and mass, far from a resonance."""
 _OFTEN_DARK = 0.01
-"""Share of a recording in vibrometer drop-outs above which a warning is given."""
+"""Fraction of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
-"""Largest relative overshoot of the drive over its setting that noise and the converter's filter explain."""
+"""Largest relative overshoot of the drive over its set level that noise and converter filter explain."""
 _SHORTFALL = 0.15
-"""Largest relative shortfall of the drive peak below its setting; also the limit of a bench check."""
+"""Largest relative shortfall of the drive peak below its set level; also the limit of a bench check."""
 
 
 P = TypeVar("P")
@@ -175,7 +175,7 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
 def _least_peak_v(facts: RecordingFacts) -> float:
     """Return the lowest expected peak of the drive; 0 if no peak can be expected.
 
-    Feedback control may stay below its setting, and the peak of streamed noise is random. With few samples
+    Feedback control may stay below its set level, and the peak of streamed noise is random. With few samples
     per period, the peak of a sine may fall between samples.
     """
     excitation = facts.measurement.excitation

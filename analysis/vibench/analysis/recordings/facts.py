@@ -34,7 +34,7 @@ from .response import (
 )
 
 MOST_BYTES = 1e9
-"""Memory need [bytes] up to which a recording is not checked against the size of its file."""
+"""Required memory [bytes] up to which a recording is not checked against the size of its file."""
 BYTES_A_SAMPLE = 80
 """Memory per sample of a stretch analysed at once: three channels and intermediate results [bytes]."""
 LARGEST_PACKING = 16.0
@@ -90,7 +90,7 @@ class RecordingFacts(RecordingDescription):
     measurement: Measurement
     channels: tuple[ChannelLevel, ...]
     overload_s: Mapping[str, float]
-    """Time near full scale [s], keyed by role; channels that stayed below are left out."""
+    """Time near full scale [s], keyed by role; channels that never came near full scale are left out."""
     dropouts: int
     """Number of vibrometer drop-outs, which every analysis bridges."""
     dropout_s: float

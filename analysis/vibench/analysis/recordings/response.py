@@ -25,9 +25,9 @@ LOWEST_INTEGRATED_HZ = 5.0
 """Lowest frequency of exact integration [Hz]; below it, the velocity decreases to zero."""
 _HELD_S, _REACH_S = 0.2, 1.0
 _TAPER = 12.0
-"""Parameter beta of the Kaiser window; truncation errors of the integral are below 3e-5 above 5 Hz."""
+"""Parameter beta of the Kaiser window; above 5 Hz, truncation errors of the integral are below 3e-5."""
 _DERIVATIVE_REACH, _EXACT_BAND = 64, 0.45
-"""Derivative: samples on each side, and share of the sample rate up to which errors are at most 1e-4."""
+"""Derivative: samples on each side, and fraction of the sample rate up to which errors are at most 1e-4."""
 _FIT_POINTS, _REST_WEIGHT = 1500, 1e-4
 """Derivative: number of fitted frequencies, and weight above the exact band, which limits the gain there."""
 _BLOCK_REACHES, _LEAST_BLOCK = 4, 1 << 16
@@ -59,8 +59,8 @@ def derivative_kernel(rate_hz: float) -> Reals:
 def _derivative_weights() -> Reals:
     """Return the second half of the derivative kernel, fitted for a sample rate of 1, shape (L,).
 
-    The fit minimises the squared relative error. Windowed ideal weights would err by 2e-3 at 100 Hz: their
-    step at half the sample rate leaks to low frequencies, where a derivative is small.
+    The fit minimises the squared relative error. Windowed ideal weights would err by 2e-3 at 100 Hz, because
+    their step at half the sample rate leaks to low frequencies, where a derivative is small.
     """
     angle = 2 * np.pi * np.linspace(0.0, 0.5, _FIT_POINTS + 1)[1:]
     inside = angle <= 2 * np.pi * _EXACT_BAND
@@ -76,7 +76,7 @@ _CONVERSIONS: MappingProxyType[str, tuple[Callable[[float], Reals], float]] = Ma
         DISPLACEMENT: (derivative_kernel, 2.0),
     }
 )
-"""Kernel, and factor ``about``: the assumed signal beyond an end is about * end sample - mirrored sample."""
+"""Kernel and factor ``about``; beyond an end, the signal is taken as about * end sample - mirrored sample."""
 
 
 @dataclass(eq=False)
