@@ -52,7 +52,7 @@ def write_comparison(
     recordings
         Recordings for the report.
     pair
-        Two of the curves; their difference is shown too.
+        Two of the curves, whose difference is also shown.
     markers_hz
         Frequencies of vertical lines in pictures [Hz].
     """

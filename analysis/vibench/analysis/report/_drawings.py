@@ -108,7 +108,7 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
-    """Yield sentences on the limits of these results."""
+    """Yield sentences on the limits of a campaign's results."""
     if any(each.is_simulated for each in results.facts):
         yield (
             "The instruments were simulated: the samples result from a simulated generator, amplifier, "
@@ -161,7 +161,7 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True)
 class Drawing(Generic[A, L]):
-    """Presentation of results of one kind: each result on a card, and several results in common figures."""
+    """Presentation of results of one kind: a card for each result, and common figures of several results."""
 
     figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
     """Figures of a card; the first figure is visible, all other figures are folded."""

@@ -38,7 +38,7 @@ _REST = "The table shows all results."
 
 
 def summary(results: CampaignResults, verdicts: Sequence[Agreement]) -> str:
-    """Return the findings and the agreement of the simulation in at most 120 words."""
+    """Return a summary of at most 120 words: the findings, and the agreement of the simulation."""
     last = _agreement(verdicts)
     kept: list[str] = []
     for each in _sentences(results):
@@ -106,7 +106,7 @@ def _resonances(result: NoiseResult) -> str:
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
-    """Yield one sentence per frequency on the kind of motion at each level."""
+    """Yield one sentence per dwell frequency on the kind of motion at each level."""
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
@@ -190,7 +190,7 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each branch diagram; if over frequency, with the results of stepped sines and sweeps."""
+    """Draw each branch diagram, with the results of stepped sines and sweeps if it is over frequency."""
     levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest multipliers at a level without a resonance, or that no motion exists."""
+    """State the model's largest Floquet multipliers at a level without a tracked resonance, if any."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -235,7 +235,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
 
 
 def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
-    """State the ratio of the base amplitudes of a recording and of the branches, where both exist."""
+    """State the ratio of a recording's base amplitude to that of the branches, where both have values."""
     request = diagram.request
     ratios = [
         amplitude / request.path.drive(frequency)[1]
@@ -297,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return the result and age of the last bench check and its findings that are not ok, as one text."""
+    """Return as one text: result and age of the last bench check, and its findings that are not ok."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -468,7 +468,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
 
 
 def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
-    """Return whether the measurement could be one of the simulated draws, and a remark or reason.
+    """Return whether the measurement could be one of the simulated draws, and a remark or the reason why not.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
 
 _NEAR = 0.08
-"""Largest relative distance of resonances in one table row; modes are at least 9 % apart."""
+"""Largest relative distance between resonances in one table row; modes are at least 9 % apart."""
 ABSENT = "–"
 _SMALLEST_BIAS = 1e-3
 """Smallest noise bias that is printed; a smaller bias does not matter."""
@@ -46,7 +46,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
 
 
 def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
-    """Return a table of the contribution of each cause to the uncertainty of each quantity."""
+    """Return a table of each quantity's uncertainty, with the contribution of each cause."""
     return ReportTable(
         "Contributions to the uncertainty",
         ("recording", "quantity", "value", *(each.value for each in Cause)),
@@ -204,7 +204,7 @@ def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, s
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's median level in all draws [dB]; for one run or a low level, use the first draw."""
+    """Return a band's median level in all draws [dB]; for one run or a low level, that of the first draw."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]

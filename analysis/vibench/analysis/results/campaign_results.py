@@ -120,7 +120,7 @@ class AnalysisFailure:
 
     @property
     def with_recording(self) -> str:
-        """The sentence, preceded by the recording's name if the sentence does not contain it."""
+        """The reason, preceded by the recording's name if the reason does not contain the name."""
         return self.sentence if self.name in self.sentence else f"{self.name}: {self.sentence}"
 
 
@@ -182,8 +182,8 @@ def analyse_files(
     """Analyse recordings one after the other with `analyse`, and overlay a simulation on each.
 
     Copies of a recording are counted once. By default, the simulation uses each recording's bench
-    configuration. If that describes no shaker, one is fitted to the weakest noise among the recordings.
-    Raises NotEnoughData when no path is given.
+    configuration. If this configuration describes no shaker, one is fitted to the weakest noise among the
+    recordings. Raises NotEnoughData when no path is given.
 
     Parameters
     ----------
@@ -372,8 +372,8 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
     Returns
     -------
     Budgets (JCGM 100:2008). A dwell has budgets for A0 and Responses I and II, a sweep or stepped sine for
-    its largest responses, noise for frequency, damping and transmissibility at each resonance. If the
-    recording lasted until a bound was met, budgets are widened: see `Budget.widen`.
+    its largest responses, noise for frequency, damping and transmissibility at each resonance. Budgets of a
+    recording that lasted until a bound was met are widened: see `Budget.widen`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.overlay)
     has_chosen_end = result.analysis.facts.measurement.until is not None
@@ -381,7 +381,7 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:
-    """Yield one sentence for each main number, with its uncertainty and the contributions to it."""
+    """Yield one sentence for each main number, with its uncertainty and the uncertainty's contributions."""
     for each in results.in_order:
         for budget in budgets_of(each):
             yield f"{each.analysis.facts.name}: {budget.sentence}."

@@ -1,8 +1,8 @@
 """Process that computes the bounds of a recording's results while it is being recorded.
 
 It runs as ``python -m vibench.analysis.results.growing_bounds``. The first output line means that the process
-is ready. Then each input line requests bounds, and one output line answers. All lines are JSON objects. A run
-that lasts until a bound is small enough starts this process (`vibench.acquisition.run.until`).
+is ready. Then each input line requests bounds and is answered by one output line. All lines are JSON objects.
+A run that lasts until a bound is small enough starts this process (`vibench.acquisition.run.until`).
 """
 
 import json
@@ -57,7 +57,7 @@ class _ChannelsSoFar(RecordedChannels):
 
 
 def bounds_of(result: AnyResult) -> dict[str, float | None]:
-    """Return the largest relative 95 % random bound of each result that a plan can wait for.
+    """Return the largest relative 95 % random bound of each result for which a plan can wait.
 
     An undetermined bound is None; results that were not found are left out.
     """
@@ -80,8 +80,8 @@ def random_bound(budget: Budget) -> float | None:
 def result_so_far(recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float) -> AnyResult:
     """Return the result of a recording up to a time [s] within a stretch.
 
-    ``stretch`` is the number of the step, or 1. For noise, only complete realisations are analysed. Raises
-    AnalysisError when nothing can be analysed.
+    ``stretch`` is the number of the step; 1 for recordings without steps. For noise, only complete
+    realisations are analysed. Raises AnalysisError when nothing can be analysed.
     """
     plan = facts.measurement.excitation
     samples = round(recorded_s * recording.sample_rate_hz)

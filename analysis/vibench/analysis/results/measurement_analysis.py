@@ -20,7 +20,7 @@ from ..recordings.response import scanned_role
 from ..uncertainty.expected import until_checks
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
-"""Errors that calculations raise for a well-formed recording whose parts contradict each other."""
+"""Errors that calculations raise if the parts of a well-formed recording contradict each other."""
 
 
 def analyse(

@@ -25,7 +25,7 @@ from ..spectra.spectra import DensitySums
 from .measurement_analysis import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Line spacing [Hz] of a density from the longest segments, with Hann window and 50 % overlap."""
+"""Line spacing [Hz] of a density from the longest segments, of 1 s, with Hann window and 50 % overlap."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})
@@ -104,7 +104,7 @@ def _is_scanned_noise(path: Path) -> bool:
 
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
-    """Return a function at the lines of the scan's first point; clock drift shifts lines of later points."""
+    """Return a function at the lines of the scan's first point, because clock drift shifts later lines."""
     values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
     return replace(function, frequency_hz=lines_hz, values=values)
 
@@ -139,7 +139,7 @@ class _PlayedParts:
     """The parts of an excerpt over which densities are averaged."""
 
     stretches: tuple[Excerpt, ...]
-    """Parts of the excerpt with excitation, each at least one segment long."""
+    """Parts of the excerpt with excitation; each part is at least one segment long."""
     labels: tuple[str, ...]
     segment: int
     """Number of samples per segment."""
