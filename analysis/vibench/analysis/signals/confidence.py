@@ -35,8 +35,8 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 def standard_uncertainty(values: Reals | Complexes) -> float:
     """Return the standard uncertainty of the mean of a few values; twice this value covers 95 % of cases.
 
-    It is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008, G.3.2). For
-    complex values it applies to the real and to the imaginary part separately.
+    The uncertainty is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008,
+    G.3.2). For complex values it applies to the real and to the imaginary part separately.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
     error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)
@@ -85,7 +85,7 @@ def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[
 
 
 _ONE_IN = 1e-3
-"""Share of correct models that exceed the limit of chi square."""
+"""Fraction of correct models that exceed the limit of chi square."""
 
 
 def chi_square_of(squared: Reals, n_eff: float) -> Reals:

@@ -17,13 +17,13 @@ TRUSTED_BAND = 0.4
 """Fraction of the sample rate up to which the interpolation is exact to about 1e-9."""
 
 _KAISER_BETA = 19.9
-"""Kaiser's formula for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
+"""Parameter of the Kaiser window for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
 _PHASES = 512
-"""Number of tabulated fractions of a sample; cubic interpolation between them has an error of 1e-10."""
+"""Number of tabulated fractions of a sample interval; cubic interpolation between them errs by 1e-10."""
 
 
 def _weights_of_phases() -> Reals:
-    """Return the windowed sinc at every tap, from one phase before a sample to one phase after the next."""
+    """Return the windowed sinc at every tap, from one phase before a sample to one after the next sample."""
     fraction = np.arange(-1, _PHASES + 2, dtype=np.float64) / _PHASES
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
@@ -70,7 +70,7 @@ _CLOSE = 0.125
 
 
 def sizes_with_maxima(samples: Reals) -> Reals:
-    """Return |value| of every sample, or of the maximum beside the sample, shape (n,).
+    """Return |value| of every sample, or of an interpolated maximum next to the sample, shape (n,).
 
     At 16 samples per period, the largest sample may be 2 % below the maximum.
 
@@ -106,7 +106,7 @@ TRUSTED_FRACTION = 0.4
 
 
 class Decimator:
-    """Low-pass filter that keeps every n-th sample; sample k of the result is at input sample k n."""
+    """Low-pass filter that keeps every n-th sample; output sample k is at the time of input sample k n."""
 
     def __init__(self, channels: int, factor: int) -> None:
         if factor < 1:
@@ -129,7 +129,7 @@ class Decimator:
         return self._filter(np.concatenate((self._pending, block), axis=1))
 
     def finish(self) -> Reals:
-        """Return the last output samples, assuming zeros after the record."""
+        """Return the last output samples; after the end, the input is assumed to be zero."""
         if self._factor == 1:
             return self._pending
         zeros = np.zeros((self._pending.shape[0], self._half))

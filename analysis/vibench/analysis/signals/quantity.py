@@ -53,7 +53,7 @@ _TRANSITION = 0.5
 _EDGE_PERIODS = 6
 """Periods of the lower band edge after which its ringing is below 1e-3 of the disturbance."""
 _ROW_SAMPLES = 1024
-"""Number of samples of a steady line per computed exponential; products cost a tenth of an exponential."""
+"""Number of samples of a steady line per computed exponential; a product costs a tenth of an exponential."""
 hann = lru_cache(maxsize=4)(np.hanning)
 """Hann window of a given length, shared by all lines and all draws; do not change its values."""
 

@@ -27,8 +27,8 @@ _COSINES = {
     Window.FLAT_TOP: (0.21557895, -0.41663158, 0.277263158, -0.083578947, 0.006947368),
     Window.BLACKMAN_HARRIS: (0.35875, -0.48829, 0.14128, -0.01168),
 }
-"""Weights of 1, cos, cos of twice the angle, ... over one turn (F. J. Harris, Proc. IEEE 66, 1978, 51-83;
-the flat top as in D'Antona and Ferrero, Digital Signal Processing for Measurement Systems, 2006)."""
+"""Weights of 1, cos(a), cos(2 a), ... with a over one turn (F. J. Harris, Proc. IEEE 66, 1978, 51-83; the
+flat top as in D'Antona and Ferrero, Digital Signal Processing for Measurement Systems, 2006)."""
 
 
 def taper(window: Window | str, samples: int) -> Reals:
@@ -41,7 +41,7 @@ def taper(window: Window | str, samples: int) -> Reals:
 
 
 def cosine_weights(window: Window | str) -> tuple[float, ...]:
-    """Return the weights of 1, cos, cos of twice the angle, ... in a window."""
+    """Return the weights of 1, cos(a), cos(2 a), ... in a window."""
     return _COSINES[window_by_name(window)]
 
 
@@ -91,7 +91,7 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
 
 
 def line_correlation(window: Window | str) -> tuple[float, float]:
-    """Return the number of correlated neighbouring lines of a windowed spectrum, for values and for squares.
+    """Return the number of correlated neighbouring lines of a windowed spectrum: for values, and for squares.
 
     Errors of lines k apart have the correlation |W(k) / W(0)|, with W the transform of the squared window.
     """
