@@ -16,15 +16,15 @@ _NOISE_FACTOR = 4.0
 _DISTORTION = 0.02
 """Largest residual of a smooth motion relative to order 1, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
-"""Minimum ratio of the residual to the residual simulated without contact in the same sweep."""
+"""Minimum ratio of the residual to the residual that a simulation of the sweep without contact has."""
 _TOO_FAST = 0.5
-"""Residual relative to order 1 that collisions usually exceed; ringing above this can hide collisions."""
+"""Residual relative to order 1 that collisions usually exceed; larger ringing can hide collisions."""
 _IMPACTS = 0.1
-"""Minimum ratio of order 2 or 3 to order 1 that shows impacts; ringing causes at most 0.05 between modes."""
+"""Minimum ratio of order 2 or 3 to order 1 that shows impacts; between modes, ringing causes at most 0.05."""
 _RING_CYCLES = 5_000.0
 """Number of cycles in which a mode with a damping ratio of 0.02 % decays to 1/500."""
 _ENOUGH = 0.25
-"""Minimum share of a region in which orders 2 and 3 show impacts; required if no specimen is known."""
+"""Minimum fraction of a region in which orders 2 and 3 show impacts; required if no specimen is known."""
 _SMOOTH_AT_MOST = 0.1
 """Residual relative to order 1 above which a motion is never smooth."""
 _QUIET_QUANTILE = 0.1
@@ -35,11 +35,11 @@ _RISE = 1.2
 _ALONE = 10.0
 """Ratio of the residual to noise, distortion and ringing above which one interval may have impacts."""
 _UNLIKE = 2.0
-"""Factor between Response II and that without contact above which an interval may have impacts."""
+"""Factor between Response II and Response II without contact above which an interval may have impacts."""
 _QUIET = 0.7
 """Ratio of the residual to noise, distortion and ringing below which an interval has no impacts."""
 _VOTE_S = 1.0
-"""Time around an interval in which most intervals must exceed the threshold, as collisions persist."""
+"""Time around an interval in which most intervals must exceed the threshold, because collisions persist."""
 _MERGE_S = 3.0
 """Quiet intervals shorter than this do not split a region: motion may settle briefly between impacts."""
 
@@ -52,7 +52,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: the nearest interval certainly without collisions, and the nearest certainly with impacts."""
+    """Bounds: the nearest interval that surely has no collisions, and the nearest that surely has impacts."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Collisions(Tabular):
     """Flags of intervals inside a region, shape (intervals,)."""
     is_unexplained: Flags
     """Flags of intervals with a residual above the noise and distortion of the sensors, shape (intervals,).
-    The threshold, in contrast, mistakes rattling during a whole sweep for noise."""
+    The threshold of a region, in contrast, counts rattling during a whole sweep as noise."""
     too_fast_hz: tuple[tuple[float, float], ...]
     """Frequency ranges in which collisions are not determined, because ringing may hide them."""
     noise_rms: float
@@ -102,16 +102,16 @@ class Collisions(Tabular):
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find the intervals of a sweep with collisions, where the motion is not a slowly varying sine.
+    """Find the intervals of a sweep in which the masses collide, where the motion is no slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
     sweep. The residual has three limits: 4 times the noise, 2 % of order 1, and twice the residual simulated
     without contact. The noise is the larger of two estimates: from the sixth difference of the samples, and
     from the quietest tenth of the sweep if it can be smooth. An interval collides if most neighbours exceed
     the limits, also in drop-outs, or if two successive intervals exceed twice the limits and show impacts.
-    Above twice the limits without impacts, the interval is undetermined. Impacts show as orders 2 and 3 above
-    a tenth of order 1 and above twice their value without contact. The residual of a region must rise; if no
-    specimen is known, it must show impacts at frequencies whose double and triple the sweep has not passed.
+    Above twice the limits without impacts, it is undetermined. Impacts show as orders 2 and 3 above a tenth
+    of order 1 and above twice their value without contact. The residual of a region must rise. If no specimen
+    is known, the region must show impacts at frequencies whose double and triple the sweep has not passed.
     """
     whole = np.flatnonzero(sweep.is_clear)
     residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
@@ -207,7 +207,7 @@ def _trim_run(above: Flags, first: int, last: int, votes: int) -> tuple[int, int
 
 
 def _best_split(part: Flags) -> int:
-    """Return the first interval of a region: the sum of flags before it and gaps after it is smallest."""
+    """Return the first interval of a region, chosen for the fewest flags before it and gaps after it."""
     before = np.concatenate(([0], np.cumsum(part)[:-1]))
     after = np.cumsum(~part[::-1])[::-1]
     return int(np.argmin(before + after))
@@ -216,7 +216,7 @@ def _best_split(part: Flags) -> int:
 def _region(
     sweep: SweptMotion, first: int, last: int, is_clear: Flags, is_evident: Flags, is_quiet: Flags
 ) -> CollisionRegion:
-    """Return a region; bounds extend from quiet intervals to the first clear and the last evident impacts."""
+    """Return a region; its edges lie between quiet intervals and the first clear or last evident impacts."""
     clear, evident = (np.flatnonzero(each[first : last + 1]) + first for each in (is_clear, is_evident))
     before, after = np.flatnonzero(is_quiet[:first]), np.flatnonzero(is_quiet[last:]) + last
     return CollisionRegion(

@@ -33,11 +33,11 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Largest ratio of residual to noise in silence for noise; a silence is shorter than a mode's ring-down."""
+"""Largest ratio of a residual that is noise to noise in silence; a silence is shorter than a ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
-By chance, a mode excited by noise is this faint in one of 400 short silences. A silence also lacks the noise
+By chance, a mode excited by noise is this weak in one of 400 short silences. A silence also lacks the noise
 of the generator.
 """
 BETWEEN = "residual of the motion between its spectral lines"
@@ -130,26 +130,26 @@ _LEAST_CYCLES = 4.0
 """Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Correlation of neighbouring blocks; in one of a hundred records, ten random blocks exceed it by chance."""
+"""Largest correlation of neighbouring random blocks; ten random blocks exceed it in 1 % of records."""
 _ONCE = 0.5
-"""Share of the variance at one cycle per record above which the change may continue after the record."""
+"""Fraction of the variance at one cycle per record above which the change may continue after the record."""
 _TREND, _CLEAR_TREND = 2.0, 8.0
-"""Squares of a trend over its variance, below which it counts as random, and above which as slow change.
+"""Ratios of a trend's square to its variance: random below the first value, slow change above the second.
 
-Chance exceeds them in 14 % and in 0.4 % of records.
+By chance, records exceed them in 14 % and in 0.4 % of cases.
 """
 _BEYOND = 3.0
 """Minimum ratio of the remaining decay to the observed scatter."""
 _LONGEST_DECAY = 10.0
-"""Longest time constant of a decay, in lengths of the record, that bounds include."""
+"""Longest time constant of a decay that the bounds include, in lengths of the record."""
 
 
 def slow_change(parts: Complexes | Reals) -> float:
     """Return the relative standard uncertainty that slow change adds to a mean or maximum.
 
-    0 if the parts scatter at random, because their standard error then suffices. A change that may continue
-    after the record counts as an exponential decay; the curvature of the parts limits its time constant. NaN
-    if more than 0.6 % may remain, because the final value is then unknown.
+    Returns 0 if the parts scatter at random, because their standard error then suffices. A change that may
+    continue after the record counts as an exponential decay; the curvature of the parts limits its time
+    constant. Returns NaN if a change of more than 0.6 % may remain, because the final value is then unknown.
 
     Parameters
     ----------
@@ -182,8 +182,8 @@ def slow_change(parts: Complexes | Reals) -> float:
 def _remaining_decay(off: Complexes | Reals, slope: complex, place: Reals) -> float:
     """Return the largest likely distance of the mean of ``off`` from the end of its exponential decay.
 
-    For exp(-h x), -1 < x < 1, the quadratic over the linear Legendre coefficient is r = (5/3) i2(h) / i1(h),
-    at most h / 3, and the mean over the linear one 0.2 r + 1 / h.
+    For exp(-h x), -1 < x < 1, the ratio of quadratic to linear Legendre coefficient is r = (5/3) i2(h) /
+    i1(h), at most h / 3; that of the mean to the linear coefficient is 0.2 r + 1 / h.
     """
     curve = place**2 - np.mean(place**2)
     bend = complex(curve @ off / (curve @ curve))
@@ -222,7 +222,7 @@ _NOISE_BAND = (0.2, 0.4)
 """Band, relative to the sample rate, that contains only vibrometer noise, above modes and impacts."""
 _NOISE_SEGMENT = 4096
 LEAST_CLEAR = 0.2
-"""Minimum share of a window that is free of drop-outs."""
+"""Minimum fraction of a window that must be free of drop-outs."""
 _NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
@@ -239,7 +239,7 @@ class Line:
     sd_amplitude_m: float
     """Uncertainty: scatter over tenths of the window for orders, noise floor of the spectrum for peaks."""
     decibel: float
-    """Level of the spectral line relative to the line at the drive frequency."""
+    """Level of the line relative to the spectral line at the drive frequency."""
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,7 @@ class DwellResponse(Tabular):
     noise_source: str
     """Source of the noise estimate, or the reason why the noise is unknown."""
     rest_bias_i: float
-    """Bias of Response I if all of the non-repeating part were noise; NaN if this part is too large."""
+    """Bias of Response I if the whole non-repeating part is noise; NaN if this part is too large."""
     rest_error_i: float
     rest_displacement_m: float
     """RMS of the part of the displacement that does not repeat with the drive [m]."""
@@ -461,7 +461,7 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
 def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -> tuple[TrackedOrders, ...]:
     """Fit the orders in tenths of the window; their scatter includes all changes and chaos.
 
-    A window that is too short for ten parts is cut into fewer.
+    A window that is too short for ten parts is divided into fewer parts.
     """
     cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
     blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))

@@ -33,10 +33,10 @@ BAND_ABOVE = 0.25
 
 
 _CLEAR_MOTION = 0.8
-"""Minimum share of a dwell without drop-outs for the verdict that its motion does not repeat."""
+"""Minimum fraction of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Largest deviation of noise maxima from their median, relative to the median deviation; bursts exceed it."""
+"""Deviation of a maximum from the median, relative to the median deviation, that only a burst exceeds."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
@@ -183,7 +183,7 @@ class IrregularMotion:
 
 
 def irregular_motion(section: Section, response: DwellResponse, rate_hz: float) -> IrregularMotion | None:
-    """Return the part of a dwell in which the motion did not repeat; None if all of it repeats."""
+    """Return the part of a dwell in which the motion did not repeat; None if the whole motion repeats."""
     points = _points(section, response, rate_hz)
     begin = begin_of_last_motion(points)
     repeats = shortest_period(Points(points.value[begin:], points.noise)) is not None
@@ -226,7 +226,7 @@ _REACH = 0.1
 
 @dataclass(frozen=True)
 class TerminalLevel:
-    """Displacement within a band around a frequency."""
+    """Displacement within a band around a frequency, such as that of a bound mode."""
 
     DOCUMENT: ClassVar = "towards_hz low_hz high_hz peak_hz rms_m relative_sd decibel_re_drive_line=decibel"
 
@@ -234,7 +234,7 @@ class TerminalLevel:
     low_hz: float
     high_hz: float
     peak_hz: float
-    """Frequency of the largest displacement density in the band; possibly an end of the band."""
+    """Frequency of the largest displacement density in the band; may be an end of the band."""
     rms_m: float
     relative_sd: float
     decibel: float
@@ -242,7 +242,7 @@ class TerminalLevel:
 
 
 def terminal_levels(response: DwellResponse, towards_hz: tuple[float, ...]) -> tuple[TerminalLevel, ...]:
-    """Return the levels of bands around the given frequencies, except bands with the drive's line."""
+    """Return the levels of bands around the given frequencies, except bands that contain the drive's line."""
     motion = response.displacement
     window = round(response.window_s * motion.sample_rate_hz)
     segment = min(round(_SEGMENT_S * motion.sample_rate_hz), window // 4)
@@ -340,7 +340,7 @@ def settled_envelope(response: DwellResponse) -> Envelope:
 _HIGHEST_ORDER = 2.4
 """Upper end of a shown spectrum relative to the drive frequency."""
 COLUMN_HZ = 1.0
-"""Width of a column [Hz], in which only the largest spectral line is drawn: a figure has no more pixels."""
+"""Width of a column [Hz] in which only the largest spectral line is drawn, as a figure has no more pixels."""
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:

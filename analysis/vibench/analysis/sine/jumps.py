@@ -17,16 +17,16 @@ _SIDE = 12
 """Number of intervals on each side to which a straight line is fitted."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""Minimum size of a jump in standard errors, as thousands of steps with roughly known errors are tested."""
+"""Minimum size of a jump [standard errors], since thousands of steps with roughly known errors are tested."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
-"""Number of intervals within the jump itself; they belong to neither side."""
+"""Number of intervals within the jump itself, which belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
 """Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
 the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""
 _LARGER = 2.0
-"""Smallest ratio of a jump to the largest step nearby in the response of the linear specimen."""
+"""Minimum ratio of a jump to the largest step near it in the response of the linear specimen."""
 _PER_NEPER_DB = 20 / np.log(10)
 
 
@@ -63,9 +63,9 @@ def jumps(
     """Return the jumps of a response over time.
 
     At each interval straight lines are fitted to the logarithm of the response before and after. A jump is a
-    local maximum of their difference of at least 1.5 dB and 8 standard errors. Resonances of a linear
-    specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump maximises the
-    likelihood; its bounds come from the likelihood ratio.
+    local maximum of the difference of both lines, of at least 1.5 dB and 8 standard errors. Resonances of a
+    linear specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump maximises
+    the likelihood; its bounds come from the likelihood ratio.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _logarithm(response: Reals) -> Reals:
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Return each interval's step from the line fitted before to the line fitted after it, and its error."""
+    """Return each interval's step, from the line fitted before it to the line after it, and its error."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
@@ -138,7 +138,7 @@ def _is_resonance(logarithm: Reals, place: int, step: float) -> bool:
 
 
 def _peaks(size: Reals) -> list[int]:
-    """Return the place of the largest step in each neighbourhood."""
+    """Return the index of the largest step in each neighbourhood."""
     left = size.copy()
     found = []
     while left.max(initial=0.0) > 0.0:
@@ -185,7 +185,7 @@ JUMP_FACTOR = 2.0
 """Minimum ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as larger."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
 
 
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
-    """Return the smallest and largest difference between the levels of the jumps up and down [V].
+    """Return the bounds of the difference between the level of the jump up and that of the jump down [V].
 
     Returns None unless there are jumps in both directions.
     """
@@ -248,7 +248,7 @@ class SteppedLevelAnalysis(SteppedSineAnalysis):
 
     @property
     def hysteresis_vpp(self) -> tuple[float, float] | None:
-        """Bounds on the difference between the levels of the jumps up and down [V]."""
+        """Bounds of the difference between the level of the jump up and that of the jump down [V]."""
         return hysteresis_vpp(self.jumps)
 
 
@@ -274,7 +274,7 @@ class Hysteresis(Tabular):
 
     @property
     def widths_hz(self) -> tuple[tuple[float, float, float], ...]:
-        """Width and bounds of each pair: jump frequency of the up sweep minus that of the down sweep."""
+        """Width of each pair, with bounds: jump frequency of the up sweep minus that of the down sweep."""
         return tuple(
             (
                 up.frequency_hz - down.frequency_hz,
@@ -312,7 +312,7 @@ def _response_near(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
 
 
 def _pairs(up: tuple[Jump, ...], down: tuple[Jump, ...]) -> tuple[tuple[Jump, Jump], ...]:
-    """Pair jumps of opposite sign, as a step up in the up sweep is a step down in the down sweep."""
+    """Pair jumps of opposite sign, because a step up in the up sweep is a step down in the down sweep."""
     pairs, free = [], list(down)
     for jump in up:
         opposite = [each for each in free if each.decibel * jump.decibel < 0]

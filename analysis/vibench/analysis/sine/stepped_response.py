@@ -93,7 +93,7 @@ def stepped_response(
     label
         Label of the segments of the steps.
     setting_vpp
-        Returns the setting of the generator during a step [V].
+        Function that returns the generator voltage of a step, peak to peak [V].
     """
     stretches = channels.stretches(label)
     whole = [each for each in stretches if each.is_complete]
@@ -147,7 +147,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 def _continuation_samples(data: Reals, period_samples: float, edge: int) -> Integers:
     """Return the indices that continue a record at both ends, shape (samples + 2 edge,).
 
-    Copies of the ends continue the record; their length in drive periods is chosen to fit best.
+    Copies of both ends continue the record; the copies' length in drive periods is chosen for the best fit.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
@@ -199,7 +199,7 @@ class NotedJump:
 
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Return the jumps whose two frequencies are as close as requested."""
+    """Return the jumps between two frequencies that are as close together as requested."""
     return tuple(
         NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
         for each in notes
@@ -307,7 +307,7 @@ class TrackedResonance:
 
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
-    """Return the resonances that were found, sorted from the weakest base level."""
+    """Return the resonances that were found, sorted by base level from the weakest."""
     return tuple(sorted(_tracked_levels(notes), key=lambda each: each.base_m_per_s2))
 
 
@@ -337,7 +337,7 @@ def _tracked_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]
 
 
 def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
-    """Return a sentence on softening or hardening from the weakest to the strongest level."""
+    """Return a sentence on the resonance's softening or hardening from the weakest to the strongest level."""
     if len(levels) < 2:
         return ""
     first, last = levels[0], levels[-1]

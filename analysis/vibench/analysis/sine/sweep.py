@@ -30,12 +30,12 @@ from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
-"""Margin on each side of the drive's band, relative to the band's end; its outer half is a filter edge."""
+"""Margin on each side of the drive's band, relative to the band's end; the filter falls in its outer half."""
 _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
 _LEAST_SHARE = 0.5
-"""Minimum share of the drive channel's power within the band of the drive."""
+"""Minimum fraction of the drive channel's power that lies within the band of the drive."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 
 
 _SAMPLES_PER_CYCLE = 24
-"""Minimum samples per cycle at the highest drive frequency: sampled maxima are then at most 0.9 % low."""
+"""Minimum samples per cycle at the highest drive frequency, so that sampled maxima are at most 0.9 % low."""
 _BAND_BELOW = 0.25
 """High-pass frequency for displacement [lowest drive frequency]; half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
@@ -115,13 +115,13 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Relative difference up to which the largest Response II agrees with the linear simulation."""
+"""Largest relative difference at which the largest Response II agrees with the linear simulation."""
 _LINES = 1 << 15
 """Largest number of frequencies at which linear motion is computed in one batch."""
 _BRIDGE_PERIODS = 3.0
-"""Periods of the lower band edge in which a bridging error decays from 3 times the motion to 2 % of it."""
+"""Periods of the lower band edge in which an error from bridging decays from 3 to 0.02 times the motion."""
 _ROOM = 1.1
-"""Factor on the length of the longer intervals, because the first may start slightly below the band."""
+"""Factor on the length of the longer intervals, because the first one may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference with unit gain for white noise, which removes the smooth motion."""
@@ -129,7 +129,7 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 @dataclass(frozen=True)
 class SweptMotion(Tabular):
-    """Quantities of a recorded or simulated sweep (draw); arrays of shape (intervals,) unless stated."""
+    """Quantities of a sweep, recorded or simulated (a draw); arrays of shape (intervals,) unless stated."""
 
     OWN_UNITS: ClassVar = {
         "upper": "m s-1",
@@ -159,7 +159,7 @@ class SweptMotion(Tabular):
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
-    """Largest |x| outside drop-outs, divided by the drive amplitude; NaN if too little is left."""
+    """Largest |x| outside drop-outs, divided by the drive amplitude; NaN if drop-outs leave too little."""
     response_ii: Reals
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: Reals
@@ -174,10 +174,10 @@ class SweptMotion(Tabular):
     linear_ii: Reals
     """Response II, simulated without contact in this sweep, including ringing."""
     linear_impacts: Reals
-    """Orders 2 and 3 relative to order 1 without contact; modes may ring at twice the drive."""
+    """Orders 2 and 3 relative to order 1, without contact; modes may ring at twice the drive frequency."""
     steady_over_swept: float
-    """Largest Response II without contact for steady sines, divided by the largest in this sweep. NaN if the
-    measured Response II differs, for example while the specimen still rings."""
+    """Largest Response II without contact for steady sines, divided by that in this sweep. NaN if the
+    measured Response II differs from it, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -208,7 +208,7 @@ class SweepResponse(SweptMotion):
     OWN_UNITS: ClassVar = {**SweptMotion.OWN_UNITS, "harmonics": "m"}
 
     harmonics: TrackedOrders
-    """Displacement at orders 1/3 to 5 [m] in longer intervals at `harmonics_hz`."""
+    """Displacement at orders 1/3 to 5 [m], in longer intervals centred at `harmonics_hz`."""
     harmonics_hz: Reals
     """Drive frequency at the centre of each longer interval, shape (longer intervals,)."""
     noise_bias_i: Reals

@@ -26,7 +26,7 @@ _BLOCK = 1 << 17
 _RESPONSE = 2
 _LEAD_S = 5.0
 _SPECTROGRAM_ORDER = 3.2
-"""Upper limit of the spectrogram relative to the end of the sweep: the third harmonic."""
+"""Upper limit of the spectrogram relative to the highest sweep frequency; contains the third harmonic."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +73,11 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
 
 
 _NEAR = 12
-"""Largest distance, in intervals, between a jump and the start or end of collisions that it marks."""
+"""Largest distance [intervals] of a jump from the start or end of collisions to which it belongs."""
 
 
 _BEHIND_STEPS = 1.5
-"""Tolerated lag in steps: a stepped sweep lags by up to half a step; measuring adds up to another half."""
+"""Tolerated lag [steps]; a stepped sweep lags by up to half a step, and measuring adds up to another half."""
 _LAST = 5
 """Number of intervals that are checked at the end of a sweep."""
 
@@ -174,7 +174,7 @@ def _read_sweep(channels: Channels, sums: SweepSums, show: Callable[[Reals], Non
 
 
 def _correct(found: M, channels: Channels, first_s: float) -> M:
-    """Count time from the first sample of the sweep, and correct for the sensors' gains."""
+    """Count times from the first sample of the sweep, and correct responses for the sensors' gains."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(
             f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
