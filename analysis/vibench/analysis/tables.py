@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 10
 _PLAIN = (1e-5, 1e7)
-"""Range of absolute values of numbers that are written without a power of ten."""
+"""Range of magnitudes in which numbers are written without a power of ten."""
 
 
 def plus_minus(value: float, half_width: float) -> str:
@@ -173,16 +173,16 @@ UNITS = {
     "_ns_per_m": "N s m-1",
     "_s_per_m": "s m-1",
 }
-"""Unit of a value, keyed by the suffix of its name; the longest matching suffix counts."""
+"""Unit of a value, keyed by the suffix of its name; the longest matching suffix applies."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
-"""Names of independent variables; the first of these names in a result gives the coordinate of its arrays."""
+"""Names of independent variables; the first of these that a result has is the coordinate of its arrays."""
 
 
 class Tabular:
     """Base class of results that can be converted to JSON, and to an xarray Dataset with units."""
 
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Units of values whose names have no unit suffix; ``{0.name}`` inserts a field.
+    """Units of values whose names have no unit suffix; ``{0.name}`` inserts the field ``name``.
 
     In a part of a result, ``{unit}`` inserts the unit that the parent states for this part. Parts may define
     ``DOCUMENT`` too.
@@ -197,12 +197,12 @@ class Tabular:
     def to_xarray(self) -> "xarray.Dataset":
         """Return all numbers of the result as an `xarray.Dataset`.
 
-        Arrays over the result's frequencies or times share that dimension. Bounds (``magnitude_lower``) and
+        Arrays over the result's frequencies or times share this dimension. Bounds (``magnitude_lower``) and
         standard deviations (``sd_...``) are separate variables. Names of values in a part begin with the name
         of the part (``response_frequency_hz``). A list of parts that contain single numbers, such as
         resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered. A
         variable has the attribute ``units`` unless it is a pure number or its unit depends on the input. If
-        rows have different units, a variable contains these (``values_value_units``). Texts are attributes.
+        rows have different units, the units are a variable (``values_value_units``). Texts are attributes.
 
         Raises InvalidRequest when xarray is not installed.
         """
@@ -287,7 +287,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Return the type of a part and the lengths of its lists; None if a field does not fit into a row."""
+    """Return the type of a part and the lengths of its lists; None if a field cannot be a table cell."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:

@@ -16,7 +16,7 @@ from ..signals.window import Window, effective_averages, hop_samples, taper, win
 from ..tables import Tabular
 
 _BATCH_SAMPLES = 1 << 19
-"""Number of samples of all channels transformed at once: 4 MB, so that a batch fits into the cache."""
+"""Number of samples of all channels that are transformed at once: 4 MB, so that a batch fits the cache."""
 _PIECE_SAMPLES = 1 << 19
 """Samples per channel of each block of `pieces`."""
 
@@ -55,8 +55,8 @@ class SegmentSpectra:
     """Sum of the products of segment spectra over blocks of samples.
 
     The FFT of each segment is computed once and shared by all pairs of channels. The mean is not removed,
-    because removing it per segment would disturb the lowest lines. An offset only reaches lines 0 and 1 with
-    a Hann window, and line 0 with a boxcar.
+    because removing it per segment would disturb the lowest lines. An offset reaches only lines 0 and 1 with
+    a Hann window, and only line 0 with a boxcar.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class SpectralDensity(Tabular):
     """Spectral density [unit^2 / Hz]."""
     lower: Reals
     upper: Reals
-    """Bounds of each spectral line that contain the true value with probability ``confidence``."""
+    """Bounds of each line, which contain the true density with probability ``confidence``."""
     n_eff: float
     """Number of independent averages, corrected for overlap and gaps."""
     noise_bandwidth_hz: float

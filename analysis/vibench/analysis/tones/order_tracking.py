@@ -27,7 +27,7 @@ def order_label(order: float) -> str:
 
 
 def cycles_needed(orders: tuple[float, ...]) -> float:
-    """Return the drive cycles per interval that separate these orders."""
+    """Return the number of drive cycles per interval that is needed to separate these orders."""
     return 2 / float(min(np.diff((0.0, *sorted(orders)))))
 
 
@@ -80,9 +80,9 @@ def track_signals(
 ) -> tuple[TrackedOrders, ...]:
     """Fit all orders at once to each interval of signals, by least squares.
 
-    In separate fits, the other orders would bias each order if an interval is not a whole number of
-    *subharmonic* periods. A straight line and a linear change of order 1 are fitted too, so that sensor drift
-    or a sweep through a resonance leaves no residual.
+    With separate fits, orders would bias one another if an interval is not a whole number of *subharmonic*
+    periods. A straight line and a linear change of order 1 are fitted too, so that sensor drift or a sweep
+    through a resonance leaves no residual.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def track_signals(
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> list[Complexes]:
     """Return exp(i order phase) for each order.
 
-    Rational orders are powers of one phasor: a product takes a tenth of the time of a sine and a cosine.
+    Rational orders are computed as powers of one phasor, because products take a tenth of the time of sines.
     """
     fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
     if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):

@@ -134,7 +134,7 @@ def steady_phase(samples: int, cycles_per_sample: float, phase_rad: float) -> Re
 
 
 _SCATTER_BLOCKS = 10
-"""Number of parts of the window; their scatter gives the uncertainty, including slow changes."""
+"""Number of parts of the window, whose scatter gives the uncertainty, including slow changes."""
 _ORDERS = (1.0, 2.0, 3.0)
 
 
@@ -144,7 +144,7 @@ class DriveLevel:
 
     frequency_hz: float
     sd_frequency_hz: float
-    """Standard deviation of the frequency relative to the converter clock, from the drive channel."""
+    """Standard deviation of the frequency due to drive channel noise, relative to the converter clock."""
     phase_rad: float
     """Phase of the drive voltage, as a cosine, at the first sample."""
     amplitude_m: float
@@ -233,7 +233,7 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
 
     Both follow from the distribution of the maximum, P(max < z) = prod_j P(|x_j + n_j| < z). Here x_j is the
     largest of the samples that share the noise value n_j. Noise alone over 51 200 samples gives 4.4 standard
-    deviations. The samples are taken as the true motion, although they may contain noise.
+    deviations. The samples are treated as the true motion, although they may contain noise.
 
     Parameters
     ----------
