@@ -14,7 +14,7 @@ from ..tables import Tabular, plus_minus
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
 WIDENING = 1.4
-"""Factor on the scatter of a recording that ended when its scatter was small enough; see `Budget.widen`."""
+"""Factor on the scatter of a recording that ended because its scatter was small; see `Budget.widen`."""
 
 
 RESULT_PATTERNS: Mapping[str, str] = {
@@ -23,7 +23,7 @@ RESULT_PATTERNS: Mapping[str, str] = {
     "response_i": r"\bResponse I\b",
     "response_ii": r"\bResponse II\b",
 }
-"""Name patterns of quantities that can end a recording, keyed by result; `vibench.acquisition.plan.Until`."""
+"""Patterns for the names of quantities that can end a recording, keyed by result; see `Until` of plans."""
 
 
 class Cause(StrEnum):
@@ -113,8 +113,8 @@ class Budget(Tabular):
         """Return the widened budget of a recording that ended when its scatter was small enough.
 
         Such a recording often ends because its scatter is underestimated. The factor gives 95 % coverage for
-        any target: `benchmarks/until_coverage.py --rule`. It holds for Gaussian records of ten parts that are
-        checked up to nine times, at intervals that grow by the square root of two.
+        any target: `benchmarks/until_coverage.py --rule`. It applies to Gaussian records of ten parts that
+        are checked up to nine times, at intervals that grow by the square root of two.
         """
         parts = tuple(
             replace(each, relative=WIDENING * each.relative, source=f"{each.source}, which ended the record")
@@ -181,8 +181,8 @@ class ChannelSd:
 def stated_uncertainties(bench: Mapping[str, Any], response: str) -> ChannelSd:
     """Return the stated uncertainties of a recording's bench; ``response`` is the channel of m0.
 
-    Calibration errors are normal with their coverage factor, clock errors uniform within bounds. Misalignment
-    scales by the cosine of a uniform angle; the rms value is used (JCGM 100:2008, F.2.4.5).
+    Calibration errors are normal with their coverage factor; clock errors are uniform within bounds.
+    Misalignment scales by the cosine of a uniform angle; the rms value is used (JCGM 100:2008, F.2.4.5).
     """
     inputs = {each.get("role"): each for each in (bench.get("daq") or {}).get("channels") or ()}
     of_response, of_base = (tuple(_channel(bench, role, inputs.get(role, {}))) for role in (response, BASE))

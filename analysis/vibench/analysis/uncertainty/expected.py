@@ -48,13 +48,13 @@ from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, ChannelSd, Contr
 from .quantities import of_one_draw
 
 STEADY = 1e-4
-"""Relative scatter below which a simulated motion counts as repeating."""
+"""Relative scatter up to which a simulated motion counts as repeating."""
 _SETTLED_S = 2.5
 _EDGE_PERIODS = 80
 """Drive periods at each end of a window that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Difference of runs, in standard errors, above which they count as different motions."""
+"""Difference between runs [standard errors] above which they count as different motions."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def simulated_dwell(
     """Simulate amplifier, table and specimen with the plan's voltage, and analyse them like a recording.
 
     Some runs start more gently than the generator's ramp, others more abruptly. If all reach the same motion,
-    the measurement is expected to reach it too. None if a simulation fails, or the window is too short.
+    so should the measurement. None if a simulation fails, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -121,7 +121,7 @@ def _scatter(found: DwellResponse) -> tuple[float, float]:
 
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
-    """Return the peak voltage at the terminal: the setting, or what feedback needs for its level."""
+    """Return the peak voltage at the terminal: as set, or as feedback needs for its base level."""
     excitation = measurement.excitation
     if not isinstance(excitation, HeldDwell):
         return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
@@ -159,7 +159,7 @@ class ExpectedResult(Tabular):
     not_stated: tuple[Cause, ...]
 
     def after(self, time_s: float) -> float | None:
-        """Return the stated relative expanded uncertainty after that time; None if noise is not stated."""
+        """Return the relative expanded uncertainty after a time; None if the scatter is not stated."""
         if self.scatter is None:
             return None
         return COVERAGE * float(np.hypot(self.scatter * np.sqrt(self.time_s / time_s), self.lasting))
@@ -208,8 +208,8 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
     specimen. For a sine, they are both Responses over at most 5 s. The random error of a Response is the
     scatter of three simulated runs, analysed like recordings; it is not stated if the runs settle on
-    different motions. It falls with the square root of the time. Other kinds of plan, and rigs without a
-    channel for the motion of m0 or for the acceleration of the base, have no expected results.
+    different motions. This error falls with the square root of the time. Other kinds of plan, and rigs
+    without a channel for the motion of m0 or for the acceleration of the base, have no expected results.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
 
 
 MOST_STEPS = 6
-"""Maximum number of parts whose end is predicted; further parts are assumed to last as long on average."""
+"""Maximum number of parts whose end is predicted; other parts are assumed to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
@@ -274,7 +274,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield three durations [s] of some parts: needed for all targets, up to the first check, and planned."""
+    """Yield durations [s] of some parts: needed for all targets, up to the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -445,7 +445,7 @@ def _expected_lines(
 
 
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
-    """Return whether p of the linear specimen, assumed Gaussian over many cycles, reaches a stop."""
+    """Return whether p of the linear specimen reaches a stop, if p is Gaussian over many cycles."""
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
     p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
     rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
@@ -500,7 +500,7 @@ class TimeShare:
     needed_s: float | None
     """Predicted recording time until the targets are reached [s]; None without targets or a prediction."""
     allotted_s: float
-    """Longest recording time once the available time is distributed [s]."""
+    """Longest recording time after the available time has been distributed [s]."""
 
     @property
     def sentence(self) -> str:
@@ -512,7 +512,7 @@ class TimeShare:
 def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, tuple[TimeShare, ...]]:
     """Return the campaign with recording times that fill ``available_s``, and the time of each measurement.
 
-    A measurement needs the time after which `expected_uncertainty` reaches the targets in `until`. All these
+    A measurement needs the time after which `expected_uncertainty` reaches the targets in `until`. All needed
     times are multiplied by one factor. Sweeps, and measurements without a prediction, keep their times.
 
     Raises ConfigurationError when no measurement has targets with a prediction, or the time is too short for
@@ -559,7 +559,7 @@ def _cost(measurement: Measurement) -> float:
 
 
 def _with_duration(measurement: Measurement, time_s: float) -> Measurement:
-    """Return the measurement with another recording time, in whole realisations."""
+    """Return the measurement with another recording time; noise has only whole realisations."""
     excitation: Excitation = measurement.excitation
     share = time_s / recorded_s(measurement)
     longer = {

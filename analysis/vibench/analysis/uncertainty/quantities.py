@@ -20,14 +20,14 @@ from ..sine.sweep_analysis import SweepAnalysis
 from .budget import Budget, Cause, ChannelSd, Contribution, from_scatter, stated_uncertainties
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
-"""Usual and smallest number of parts of a window; their maxima give the scatter of the largest value."""
+"""Usual and minimum number of parts of a window, whose maxima give the scatter of the largest value."""
 _ALIKE = 1e-12
-"""Relative difference of maxima that counts as rounding error."""
+"""Largest relative difference of maxima that counts as rounding error."""
 _SHAPE_VARIANCE = 0.5633
-"""Variance of the shape k estimated from n maxima, times n (Hosking, Wallis and Wood 1985, for k = 0)."""
+"""n times the variance of the shape k estimated from n maxima (Hosking, Wallis and Wood 1985, for k = 0)."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Stands for a random error that only draws of the twin give: of a maximum or a 0.1 s interval of a sweep."""
+"""Stands for a random error of a maximum, or of a 0.1 s interval of a sweep, that only draws can give."""
 _ENDS = 2
 """Number of intervals at each end of a sweep where a largest value depends on where the intervals begin."""
 _PEAKED = 1.05
@@ -84,7 +84,7 @@ def _of_resonance(
 
 
 def _chance_share(found: NoiseResponse) -> float:
-    """Return the share of the lines' variance that the scatter of periods does not explain; 0 if unknown."""
+    """Return the fraction of the lines' variance beyond the scatter of periods; 0 if it is unknown."""
     if found.periodic is None or found.periodic.distortion_variance is None:
         return 0.0
     more = float(np.median(found.periodic.distortion_variance))
@@ -173,9 +173,9 @@ def of_one_draw(found: DwellResponse) -> Contribution:
 def sd_of_largest(maxima: Reals) -> float:
     """Return the standard deviation of the largest of maxima with a generalised extreme value distribution.
 
-    With their shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
-    largest of n values is n^-k times the scale of one: smaller for a bounded motion, else equal (k = 0). The
-    estimate of k is lowered by its standard error, because a k that is too large gives too small a bound.
+    With the shape k from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the largest of n values
+    has n^-k times the scale of one value: smaller for a bounded motion, else equal (k = 0). The estimate of k
+    is lowered by its standard error, because a k that is too large gives too small a bound.
     """
     if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
         return 0.0
@@ -255,7 +255,7 @@ def _largest(
 
 
 def _scatter(overlay: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
-    """Return the scatter of one value over draws with the measured kind of motion; None below 5 draws."""
+    """Return the scatter of one value over draws with the measured kind of motion; None if under 5."""
     curve = None if overlay is None else overlay.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
