@@ -12,9 +12,9 @@ from vibench.acquisition.recording import SegmentLabel
 from vibench.acquisition.rig import Rig
 
 _NO_TRIES = 12
-"""Maximum number of attempts per point; the motion settles and is measured in each."""
+"""Maximum number of attempts per point; in each attempt, the motion settles and is measured."""
 _BEFORE = 60
-"""Number of periods before the evaluated perturbations: a lead-in, and a trial to find their size."""
+"""Number of periods before the evaluated perturbations: a trial to find their size, and a lead-in."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -61,7 +61,7 @@ class BranchContinuation(AbstractFeedback):
     """Size of the drive changes that measure the stability of each point: relative rms change of the
     fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to skip the measurement."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
-    """Number of evaluated periods with small drive changes per point; a few more serve to find their size."""
+    """Number of evaluated periods with small drive changes per point; further periods find their size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -100,6 +100,6 @@ class BranchContinuation(AbstractFeedback):
         require_held(fast_loop(rig), self)
 
     def steps(self) -> Iterator[Step]:
-        """Yield a step at each end of the frequency range, at the largest amplitude setting."""
+        """Yield a step at each end of the frequency range, at the largest amplitude of the plan."""
         for number, frequency_hz in enumerate((self.low_hz, self.high_hz)):
             yield Step(LoopTone(frequency_hz), 0.0, self.record_s, self.segment(number, frequency_hz))

@@ -24,19 +24,19 @@ _GLIDE_S = 0.1
 _HIGHEST = 9
 _MOST_LOOKS = 20
 _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
-"""Largest standard errors at the end of a measurement. For the base's fundamental and harmonics, they are
-relative to the tolerance; for m0, to m0 itself."""
+"""Largest standard errors at the end of a measurement. Those of the base's fundamental and harmonics are
+relative to the tolerance, that of m0 is relative to m0's amplitude."""
 _ROUGHLY = 0.15
-"""Largest standard error of the base motion far from the level, relative to its distance from the level."""
+"""Largest standard error of a base motion that is far from the level, relative to its distance from it."""
 _DRIFT = 3.0
 """Largest difference between the two halves of the settled blocks, in standard errors."""
 _REMEMBERED = 0.8
-"""Weight of the scatter of earlier measurements; a few blocks of one measurement may agree by chance."""
+"""Weight of earlier measurements' scatter, because a few blocks of one measurement may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopLook:
-    """Response of base and m0 to a setting: harmonics as means over blocks, starting with the first."""
+    """Response of base and m0 to a setting: mean harmonics over blocks, starting with the first harmonic."""
 
     base_m: Coefficients
     m0_m: Coefficients
@@ -51,13 +51,13 @@ class LoopLook:
 
     @property
     def ratio_u(self) -> float:
-        """Standard error of real and imaginary part of this ratio."""
+        """Standard error of the real and of the imaginary part of this ratio."""
         shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
         return float(abs(self.ratio) * np.hypot(*shares))
 
 
 class BranchPlayer:
-    """Player of controller settings, which measures the response of base and m0 to each."""
+    """Player of controller settings, which measures the response of base and m0 to each setting."""
 
     def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
         self.plan = plan

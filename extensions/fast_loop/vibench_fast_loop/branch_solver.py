@@ -10,7 +10,7 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""Smallest change of the unknowns that updates the derivative."""
+"""Smallest change of the unknowns from which the derivative is updated."""
 _DOUBTED = 0.05
 """Assumed standard error of the derivative, which sets the derivative's weight against measurement noise."""
 _REFERENCE_STEP = 0.15
@@ -22,8 +22,8 @@ _RATIO = 2
 _NEW = 0.3
 """Fraction of a step by which a point must advance to count as a new point."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
-"""Smallest distance between two points that define a direction, in steps (the tolerance moves points by
-less) and in standard errors."""
+"""Smallest distance between two points that define a direction: in steps (points move by less than this
+within the tolerance), and in standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class MeasuredPoint:
     ratio: complex
     """Complex ratio of the fundamentals of m0 and base."""
     noise: Vector
-    """Standard errors of the residual, and of real and imaginary part of this ratio."""
+    """Standard errors of the residual, and of the real and the imaginary part of this ratio."""
 
     @property
     def place(self) -> Vector:
@@ -67,8 +67,8 @@ class PredictedPoint:
 class BranchSolver:
     """Newton's method with a derivative that is updated by measurements (Broyden, Math. Comp. 19 (1965) 577).
 
-    The equations require the given amplitude of the base's fundamental, and zero for each harmonic. The
-    unknowns (frequency and coefficients) outnumber the equations by one. The arc length uses frequency
+    The equations require the given amplitude of the base's fundamental, and zero amplitude of each harmonic.
+    The unknowns (frequency and coefficients) outnumber the equations by one. The arc length uses frequency
     and ratio m0 / base: at a fold with low damping, the coefficients hardly change while the phase of m0
     turns by 180 degrees.
 
@@ -188,7 +188,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
 
 
 def _reference(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
-    """Return the newest point that is far enough from the last one to define a direction, else the first."""
+    """Return the newest point that is far enough from the last to define a direction, else the first one."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

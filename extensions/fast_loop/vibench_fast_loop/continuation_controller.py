@@ -48,22 +48,22 @@ _MOST_TRIES = 8
 _FIRST_TRIES = 30
 """Number of attempts for the first point, where the model without stops may be inaccurate."""
 _NEAR = 0.3
-"""Relative error of the level up to which the unknowns of the first motion are varied one by one."""
+"""Largest relative error of the level at which the unknowns of the first motion are varied one by one."""
 _SHORTEST_STEP = 1 / 64
 """Shortest step, as a fraction of the step in the plan."""
 _GROWTH, _EASY = 1.5, 3
 """Factor by which steps grow after an easy point, and largest number of attempts at an easy point."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
-"""Variations of the unknowns. Frequency and first coefficient: in steps; harmonics: relative to the level."""
+"""Variations of the unknowns: frequency and first coefficient in steps, harmonics relative to the level."""
 _BELOW = 5.0
 """Distance of the first coefficient's initial value below the model's value, in steps."""
 _ABOVE = 8.0
-"""For an approach from above: distance of the initial value above the model's (about threefold), in steps."""
+"""Distance of the initial value above the model's (about threefold) in an approach from above, in steps."""
 _LOWERED, _CALM = 0.3, 0.03
 """Largest decrease of the first coefficient per try [steps], allowed only while the base harmonics are at
-most this fraction of the level. Both are small, because a motion with impacts is easily lost."""
+most this fraction of the level. Both limits are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
-"""Bounds on the slope (change of base level per step of first coefficient) on the way to the level."""
+"""Bounds on the slope, the change of the base level per step of the first coefficient, at the start."""
 _LEAST_CHANGE = 0.01
 """Smallest change of the first coefficient from which this slope is computed [steps]."""
 _CLOSER, _CLOSE = 0.3, 0.7
@@ -158,8 +158,8 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
 def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, columns: int) -> Controller[None]:
     """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
-    The derivatives with respect to frequency and first coefficient change most. Those with respect to the
-    harmonics are estimated from joint changes, and near a fold can make the equations unsolvable.
+    The derivatives with respect to frequency and first coefficient change most. Derivatives with respect to
+    the harmonics are estimated from joint changes; near a fold, they can make the equations unsolvable.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -226,15 +226,15 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 
 
 _EACH = 5
-"""Drive periods per change. Deviations hardly grow in this time, but the upper modes can follow."""
+"""Number of drive periods per change: deviations hardly grow in this time, but the upper modes can follow."""
 _LEAD, _TRIAL = 3, 8
 """Number of changes before the evaluated ones, and number in the trial that finds their size."""
 _CHANGED = (0, 2)
 """Indices of the perturbed coefficients (first and third harmonic); the specimen drives the table at both."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
-"""Size of the drive's changes in the trial, and their largest size, relative to the first coefficient."""
+"""Size of the drive's changes in the trial, and their maximum size, relative to the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion counts as changed if it differs by more than this fraction and this many standard errors."""
+"""A motion counts as changed if it changes by more than this fraction and this many standard errors."""
 _NEVER = 1e-9
 
 
@@ -261,7 +261,7 @@ def perturbed_stability(
 
 
 def _changes(count: int, seed: int) -> Coefficients:
-    """Return changes of magnitude 1, with random signs of both parts, shape (count, coefficients)."""
+    """Return complex changes of magnitude 1, with random signs of both parts, shape (count, coefficients)."""
     corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
@@ -289,7 +289,7 @@ def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Sampl
 def _fit(
     phases: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
-    """Return the fitted multiplier; NaN if samples between phases are missing (a held run)."""
+    """Return the fitted multiplier; NaN if samples between phases are missing, because the run was held."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(phases)):
         return OpenLoopMultiplier(nan, nan)
     base, m0 = _join(phases, channels)

@@ -35,7 +35,7 @@ from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Largest multiplier allowed along a branch; at this value, deviations fall to a third in 100 periods."""
+"""Largest Floquet multiplier allowed along a branch; with it, deviations fall to a third in 100 periods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     """Refuse a branch that, according to the model, the loop would not hold.
 
     Raises LimitExceeded with the largest multiplier and the range that would be held, or with the reason why
-    they are unknown. Nothing has been played by then.
+    these are unknown. Nothing is played before this check.
     """
     level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
     unknown = "it is not known whether the fast loop holds the branch: "
@@ -161,13 +161,13 @@ def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
 Points = NDArray[np.int64]
 Begin = Literal["rest", "above"]
 _POINTS = 25
-"""Number of motions checked along a branch, stable ones included: a delayed law may destabilise these."""
+"""Number of motions checked along a branch, including stable ones, which a delayed law may destabilise."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods to try until they contain a whole number of samples, and the tolerance for "whole"."""
+"""Numbers of periods among which one with a whole number of samples is sought; tolerance for "whole"."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Number of points per period for the slope of the spring force, without stops and with stops."""
+"""Number of points per period at which the spring force's slope is computed, without and with stops."""
 _PART_S = 1e-6
-"""Longest part of a step in which the slope of the stops' force is constant [s]; 1 % of a contact's time."""
+"""Longest part of a step in which the slope of the stops' force is held constant [s]; 1 % of a contact."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels, relative to the required level, through which a motion with impacts is reached."""
 
@@ -195,7 +195,7 @@ def branch_hold(
     way: Literal["up", "down"] = "up",
     allowed: float = 1.0,
 ) -> BranchHold | None:
-    """Return how stable a law makes the model's branch at one base level, of amplitude ``level_m`` [m].
+    """Return how well a law holds the model's branch at one base level, of amplitude ``level_m`` [m].
 
     ``plant`` and ``law`` are those that the host assumes; the specimen has no rigid stops. The branch
     starts at ``start_hz`` and stays in ``range_hz``. ``begin`` is the approach to the level: from rest, or
@@ -250,7 +250,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Return the last motion before the first that is not held; None if the first motion is not held."""
+    """Return the last motion before one is not held; None if the first motion is not held."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])

@@ -35,7 +35,7 @@ from vibench.sim import Branch, Specimen
 from .fast_loop import impact_branch
 
 _LEAST = 3
-"""Minimum number of points in which a turn of the frequency along the branch can be found."""
+"""Minimum number of points for finding a turn of the frequency along the branch."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class HeldBranch(Tabular):
 
     @property
     def folds(self) -> tuple[int, ...]:
-        """Indices of points at which the frequency turned; the branch runs backwards between two of them."""
+        """Indices of points at which the frequency turned; between two turns, the branch runs backwards."""
         if self.frequency_hz.size < _LEAST:
             return ()
         ways = np.sign(np.diff(self.frequency_hz))

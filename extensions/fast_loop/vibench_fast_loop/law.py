@@ -1,7 +1,7 @@
 """Linear law of a controller: a Kalman filter of the sampled plant, and feedback of its estimate.
 
-For a controller that cannot run this law there is a law of two gains. Multipliers of plant and law together
-show whether a motion is stable.
+A law of two gains serves controllers that cannot run this law. Multipliers of plant and law together show
+whether a motion is stable.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def design_law(plant: SampledPlant) -> LinearLaw:
 
 
 def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
-    """Return the law of two gains with the lowest cost (see `design_law`), for controllers limited to it.
+    """Return the two-gain law with the lowest cost (see `design_law`), for controllers that allow no other.
 
     ``u = -(kp s + kd d)`` for one sample s and its low-pass filtered rate ``d += a ((s - before) / step -
     d)``, where ``a = step / (tau + step)``. Gains and tau minimise the expected cost (W. S. Levine and M.
@@ -87,7 +87,7 @@ def pd_law(plant: SampledPlant, sample: int) -> LinearLaw:
 
 
 class _WeightedPlant(NamedTuple):
-    """A plant in units of its typical motions, with matrices of cost and noise."""
+    """A plant in units of its typical motions, with the matrices of cost and noise."""
 
     step: Table
     volt: Vector
@@ -184,7 +184,7 @@ def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> c
 
 
 def _tables_of_step(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
-    """Return the matrices of the sections of a step; the state is plant, law memory, and voltage."""
+    """Return the matrices of the sections of a step; the state consists of plant, law memory and voltage."""
     own, memory = plant.size, len(law.step)
     answer = np.hstack([law.direct @ plant.sensing, law.output])
     (first, of_first), *others = plant.stretches(parts)

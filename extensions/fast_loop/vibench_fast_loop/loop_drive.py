@@ -11,7 +11,7 @@ from vibench.acquisition.rig import ControllerConfig
 from .protocol import ControllerDriver, LoopBlock, LoopController, LoopProgram, LoopState, ProgramTone
 
 TALK = 0.25
-"""Longest interval between requests, as a fraction of the watchdog's time."""
+"""Longest interval between requests, as a fraction of the watchdog's waiting time."""
 QUICK_S = 0.1
 """Duration of a ramp to silence outside the ramp phases of a run [s]."""
 _ROUNDING_S = 1e-9
@@ -60,7 +60,7 @@ class LoopDrive:
         """Do nothing, because no signal is prepared in advance."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase with regular requests; yield the time for reading samples before each request [s]."""
+        """Play a phase with regular requests; before each request, yield the time for reading samples [s]."""
         self._blocks = []
         if phase.state is RunState.RAMPING_DOWN:
             self._silence(phase.duration_s)

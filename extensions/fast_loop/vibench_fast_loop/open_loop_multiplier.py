@@ -9,7 +9,7 @@ purpose.
 
 If a multiplier is near 1, small deviations are slow compared with the drive, and complex envelopes describe
 them: z of m0 at the drive frequency, b1 and b3 of the base at one and three times this frequency. Fast parts
-(upper modes, third harmonic of m0) follow them, and are expanded in derivatives of the input:
+(upper modes, third harmonic of m0) follow the envelopes, and are expanded in derivatives of the input:
 
 dz/dt = A z + B0 b1 + B1 db1/dt + B2 d2b1/dt2 + C0 b3 + C1 db3/dt,
 
@@ -19,7 +19,7 @@ independently: the specimen also drives the table at three times the frequency, 
 
 Sensor noise in z and b biases least squares towards stability. Therefore the changes are played twice, the
 second time with opposite sign, and each half is the instrumental variable of the other (T. Soderstrom,
-Automatica 43 (2007) 939). Their noises are independent; even effects such as the branch's curvature cancel.
+Automatica 43 (2007) 939). Both have independent noise; even effects such as the branch's curvature cancel.
 
 Not detected: growth with alternating sign (a multiplier near -1), and the second harmonic of the base in
 motions without the symmetry of two equal stops.
@@ -38,7 +38,7 @@ _HALF = 4
 """Half length of the window of an envelope [periods]."""
 _EACH = 4
 _INPUTS = {1: 2, 3: 1}
-"""Harmonics of the base used as inputs of the fit; for each, the highest derivative that is used."""
+"""Highest derivative used as an input of the fit, keyed by harmonic of the base."""
 _BLOCK = 8
 """Number of periods in a block; residuals of different blocks count as independent."""
 _MODEL = 0.01
@@ -58,9 +58,9 @@ class PerturbedMotion:
     period: float
     """Period of the drive [samples]."""
     first: int
-    """Index of the first sample with changes; before it, the last changes of the second half are played."""
+    """Index of the first sample with evaluated changes; the lead-in before it plays the last changes."""
     periods: int
-    """Number of periods with changes; the same number follows with opposite sign."""
+    """Number of periods with changes; the same changes with opposite sign follow."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
 
 
 def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
-    """Return the largest multiplier, with an error from residuals of blocks of periods (delta method)."""
+    """Return the largest multiplier, with an error from the residuals of blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
     mirror = np.linalg.pinv(vectors)[most]

@@ -86,7 +86,7 @@ class LoopBlock(FrozenModel):
     steady: bool
     """Whether the program stayed the same during the block."""
     output: tuple[Pair, ...]
-    """Output voltage of program and law together, starting with the mean [V]."""
+    """Coefficients of the output voltage of program and law together, starting with the mean [V]."""
     base: tuple[Pair, ...]
     m0: tuple[Pair, ...]
 
@@ -115,7 +115,7 @@ class LoopFacts(FrozenModel):
     watchdog_s: PositiveFloat
     """Time without a request after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """Only input for a proportional-derivative law; None if the controller accepts any linear law."""
+    """The only input, if the controller accepts only proportional-derivative laws; None if any linear law."""
 
 
 class LoopRequest(FrozenModel):

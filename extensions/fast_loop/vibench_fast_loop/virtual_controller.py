@@ -1,7 +1,7 @@
 """Simulated real-time controller: it plays a Fourier series and a law, and answers JSON lines.
 
 It implements version 1 of `vibench_fast_loop.protocol`. Its watchdog counts samples, and ramps the output
-down if no host has sent a request for too long. Samples are means over a control step, and voltages are
+down if the host sends no request for too long. Samples are means over a control step, and voltages are
 delayed.
 """
 
@@ -38,7 +38,7 @@ FloatArray = NDArray[np.float64]
 RAMP_S = 0.05
 """Duration of a ramp that the controller starts by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
-"""Time at the output limit after which the law counts as failed and the output ramps down [s]."""
+"""Time at the output limit after which the law counts as failed and the output is ramped down [s]."""
 MOST_BLOCKS = 2000
 """Maximum number of blocks kept for a host that does not request them."""
 
@@ -77,7 +77,7 @@ class VirtualController:
 
     @contextmanager
     def hold_state(self) -> Iterator[Structure]:
-        """Yield the state with which samples are processed; the host cannot change the state meanwhile.
+        """Yield the state with which samples are processed; while it is yielded, the host cannot change it.
 
         The state is a `Controller` of native/structures.hpp.
         """
@@ -85,7 +85,7 @@ class VirtualController:
             yield self._now
 
     def attend(self, time_s: float) -> None:
-        """Store a finished block, start a ramp or fall silent, after the samples up to a rig time [s]."""
+        """Process the samples up to a rig time [s]: store a finished block, start a ramp or fall silent."""
         with self._turn:
             if self._now["done"]:
                 self._keep_block(time_s)

@@ -18,7 +18,7 @@ TONE_HZ = 160.0
 TALK_S = 0.1
 """Interval between reports, shorter than any watchdog."""
 LAW = 0.05
-"""Output of the law relative to that of the program."""
+"""Output voltage of the law relative to that of the program."""
 
 
 def controller_of(bench: Bench) -> LoopController:
