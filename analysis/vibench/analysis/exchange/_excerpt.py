@@ -25,7 +25,7 @@ def ignore_progress(_values: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Excerpt:
-    """Excerpt: channels and sample range of a recording; :func:`excerpt` creates it."""
+    """Some channels of a recording over a range of samples; :func:`excerpt` creates it."""
 
     recording: Recording
     channels: tuple[ChannelHeader, ...]

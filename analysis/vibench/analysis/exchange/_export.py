@@ -260,7 +260,7 @@ WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
 @dataclass(frozen=True)
 class Exporter:
-    """Functions that export to one format, an entry of `EXPORTERS`."""
+    """Functions that export to one format; each exporter is an entry of `EXPORTERS`."""
 
     write: WriteSamples | None = None
     """Function that writes the samples; facts and results go to separate files.

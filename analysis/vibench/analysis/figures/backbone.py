@@ -26,7 +26,7 @@ _HEIGHT_IN = 4.2
 _MARGIN = 0.15
 """Margin around the points, relative to their range, so that no point lies on the frame."""
 _MOST_MARKS = 5
-"""Maximum number of tick intervals on the backbone's frequency axis; labels such as 266.385 are wide."""
+"""Maximum number of tick intervals on the backbone's frequency axis, as labels such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
@@ -81,7 +81,7 @@ def _interrupt(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> lis
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Return amplitudes in a readable unit, the factor from metres to this unit, and its name."""
+    """Return amplitudes in a readable unit, the factor from metres to this unit, and the unit's name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = style.with_prefix(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
@@ -139,7 +139,7 @@ def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> Non
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
 ) -> Reals | None:
-    """Return m0's simulated amplitude at each level; None unless every level has one."""
+    """Return m0's simulated amplitude at each level; None if a level has no simulated amplitude."""
     if overlay is None or overlay.response.left_out or analysis.response.left_out:
         return None
     if not levels[0].is_fundamental:

@@ -202,7 +202,7 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:
-    """Return a table of a map's motions with their responses and their shares of the points."""
+    """Return a table of a map's motions, with the responses and the fraction of points of each motion."""
     return table(
         "map_motions",
         motion=[str(each.motion) for each in motions],

@@ -10,7 +10,7 @@ from . import style
 
 _HEIGHT_IN = 4.6
 _MOST_NAMES = 16
-"""Largest number of points whose names are written at the axis; otherwise node numbers are written."""
+"""Largest number of points that are named at the axis; more points are marked by their node numbers."""
 
 
 def scan_figure(scan: Scan) -> style.DrawnFigure:

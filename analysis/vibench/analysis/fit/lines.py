@@ -207,7 +207,7 @@ def lines_of(
 
 
 def fit_lines(lines: Lines) -> LineFit:
-    """Fit from the described specimen; if that fails, also from stiffer and softer specimens."""
+    """Start the fit from the described specimen; if that fails, also from stiffer and softer specimens."""
     usual = Freedom()
     best = _fit_from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
@@ -223,7 +223,7 @@ def fit_lines(lines: Lines) -> LineFit:
 
 
 def fit_lines_further(lines: Lines, allowed: Freedom, usual: LineFit) -> LineFit:
-    """Fit a model with additional parameters, from the previous result and from the description."""
+    """Fit a model with additional parameters, starting from the previous result and from the description."""
     opened = replace(lines, free=(*lines.free, *allowed.parameters))
     begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
     ways = [(start, further) for start in begun for further in allowed.starts]

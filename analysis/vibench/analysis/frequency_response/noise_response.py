@@ -43,7 +43,7 @@ _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 _SURELY = 3.0
-"""Smallest median difference of two estimators that counts as bias, in standard deviations of the median."""
+"""Smallest median difference between two estimators that counts as bias [sd of the median]."""
 _ALIKE_LINES = 4
 """Ratio of the variance of a median over windowed lines to that of a mean over independent lines."""
 

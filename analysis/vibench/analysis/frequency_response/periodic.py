@@ -138,13 +138,13 @@ def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:
 
 
 _OVER_CHANCE = 8.0
-"""Minimum ratio of the scatter that a drift explains to the amount expected by chance."""
+"""Minimum ratio of the scatter explained by a drift to the amount expected by chance."""
 _MOST = 0.5
-"""Minimum share of the scatter beyond noise that a drift must explain."""
+"""A drift must explain at least this fraction of the scatter beyond noise."""
 
 
 _SMALL = 0.03
-"""Largest relative deviation of a line used to find a drift; deviations near narrow modes are larger."""
+"""Lines up to this relative deviation are used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
 """A deviation above `_SMALL` is used to find a drift up to this multiple of the median deviation."""
 
@@ -321,9 +321,9 @@ def _without_drift(
 
 
 _TOGETHER = 0.8
-"""Minimum share of the scatter that must be explained by changes common to all spectral lines."""
+"""Changes common to all spectral lines must explain at least this fraction of the scatter."""
 _BEYOND_CHANCE = 1.25
-"""Minimum ratio of the explained share to the largest share expected for independent spectral lines."""
+"""Minimum ratio of the explained fraction to the largest fraction expected for independent lines."""
 
 
 def _without_common(off: Complexes, by_noise: Reals) -> tuple[Complexes, float]:
@@ -482,7 +482,7 @@ class PeriodicSums:
         self._realisations.append(_Realisation(repetition, spectra.mean(axis=1), covariance))
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Yield, for each realisation, the spectra of all others; nothing for a single realisation."""
+        """Yield, for each realisation, the spectra of all other realisations; nothing for a single one."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,

@@ -52,11 +52,11 @@ def resonances(
     """Find and fit the resonances of a transmission in a band, sorted by frequency.
 
     Each significant peak is fitted with H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ...,
-    weighted by the standard deviations. This is one mode on a polynomial of degree 1 to 3, the background
-    from neighbouring modes; R, b0 and b1 are complex. The pole is found by variable projection (Golub &
-    Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise explains are left out. Then all modes
-    are fitted together. The joint fit is used if it explains the whole band, because a polynomial describes
-    neighbouring modes only approximately.
+    weighted by the standard deviations. This is one mode on a polynomial of degree 1 to 3, which describes
+    neighbouring modes; R, b0 and b1 are complex. The pole is found by variable projection (Golub & Pereyra
+    1973, SIAM J. Numer. Anal. 10, 413-432). Peaks that noise explains are left out. Then all modes are fitted
+    together. The joint fit is used if it explains the whole band, because a polynomial describes neighbouring
+    modes only approximately.
 
     Raises InvalidRequest when fewer than eight lines lie in the band.
     """

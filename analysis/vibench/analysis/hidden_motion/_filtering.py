@@ -18,7 +18,7 @@ _DIFFUSION_OF_GAP = 7e-6
 _DIFFUSION_OF_SPEED = 2e-5
 """Random velocity of each mass relative to gap times highest natural frequency, per root millisecond."""
 _DRIFT_M_PER_S2 = 1e-3
-"""Random walk of the accelerometer's slow error per root second."""
+"""Random walk of the accelerometer's slow error [m/s2] per root second."""
 _ACCELERATION_EXCESS = 1.5
 """Variance of an acceleration interpolated linearly between samples, relative to that of a sample."""
 _IMPULSE_SHARE = 0.003
@@ -26,7 +26,7 @@ _IMPULSE_SHARE = 0.003
 _SMOOTHING_S = 8e-3
 """Averaging time of squared innovations to detect the loss of a track [s]."""
 LOSS_LIMIT = 8.0
-"""Mean squared normalised innovation above which a track is lost; a good track has about 1."""
+"""Mean squared normalised innovation above which a track counts as lost; a good track has about 1."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
 """Value of `FilterPredictions.kinds` for a step without contact."""

@@ -47,7 +47,7 @@ BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
 """Smallest mean time between false alarms [s]."""
 OUT_BY_CHANCE = 0.01
-"""Largest share of blocks outside the usual level while the specimen is unchanged."""
+"""Largest fraction of blocks outside the usual level while the specimen is unchanged."""
 _OUT_WHEN_CHANGED = 0.5
 _OUT_ADDS = math.log(_OUT_WHEN_CHANGED / OUT_BY_CHANCE)
 _IN_ADDS = math.log((1.0 - _OUT_WHEN_CHANGED) / (1.0 - OUT_BY_CHANCE))

@@ -82,7 +82,7 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
 
 
 def scale_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Return the scale of relative deviations: the parameter, or 1 s/m for the loss, which may be zero."""
+    """Return the scale of relative deviations: the parameter's value, or 1 s/m for the loss (may be zero)."""
     return 1.0 if what is Hidden.LOSS else value_of(tracked, what)
 
 

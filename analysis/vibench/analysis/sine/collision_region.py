@@ -52,7 +52,7 @@ class Edge:
     time_s: float
     lower_hz: float
     upper_hz: float
-    """Bounds: the nearest interval that surely has no collisions, and the nearest that surely has impacts."""
+    """Bounds: the nearest interval certain to have no collisions, and the nearest certain to have impacts."""
 
 
 @dataclass(frozen=True)
