@@ -27,7 +27,7 @@ _KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
 """Largest standard errors at the end of a measurement. Those of the base's fundamental and harmonics are
 relative to the tolerance, that of m0 is relative to m0's amplitude."""
 _ROUGHLY = 0.15
-"""Largest standard error of a base motion that is far from the level, relative to its distance from it."""
+"""Largest standard error of the base motion far from the level, relative to the distance from the level."""
 _DRIFT = 3.0
 """Largest difference between the two halves of the settled blocks, in standard errors."""
 _REMEMBERED = 0.8

@@ -37,7 +37,7 @@ class ChainRequest(SpecimenChoice):
     others: tuple[SpecimenTable, ...] = ()
     """Further specimens in the unit of the chain, after the first."""
     lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
-    """Number of cells; several numbers for a study over the length."""
+    """Number of cells; several numbers to study chains of different lengths."""
     drive: ChainDrive = ChainDrive.STEADY
     """Drive of the base: none, a steady sine, a sweep, or a recorded motion."""
     amplitude_m: PositiveFloat = 20e-6
@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """If an error or time is requested, refuse unsteady drives, and options that it determines."""
+        """If an error or time is requested, refuse unsteady drives, and options that follow from it."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:

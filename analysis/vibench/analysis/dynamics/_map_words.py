@@ -59,7 +59,7 @@ def motion_classes(results: MapResults) -> Reals:
 
 
 def motion_words(results: MapResults, motion: MapMotion) -> str:
-    """Return a motion's name and the fraction of points with it, with an interval if it is an estimate."""
+    """Return a motion's name and the fraction of points with this motion; an estimate has an interval."""
     kind = motion.motion.removesuffix(" so far") if motion.period is None else f"period {motion.period}"
     kind = kind if motion.has_impacts else "no impacts"
     text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"

@@ -215,7 +215,7 @@ def _without_held(
 ) -> tuple[tuple[_ChannelImport, ...], int, list[str]]:
     """Mark held values within the plan's parts; return the channels, the number of samples, and remarks.
 
-    If a value is held up to the end, the record ends at its start. Other held values count as lost samples.
+    If values are held up to the end, the record ends where they begin. Other held values count as lost.
     """
     parts = [range(each.start, min(each.stop, samples)) for each in place_parts(mapping, rate_hz, samples)]
     excitation, remarks, end, kept = mapping.measurement.excitation, [], samples, []

@@ -170,7 +170,7 @@ class ImportMapping(FrozenModel):
     sample_rate_hz: PositiveFloat | None = None
     """Sample rate; needed if the file does not state it exactly (HDF5, universal files)."""
     time: Literal["file", "even"] = "file"
-    """``"even"`` ignores times in the file and samples all channels evenly at ``sample_rate_hz``."""
+    """``"even"`` ignores times in the file: all channels are sampled evenly at ``sample_rate_hz``."""
     time_unit: Literal["s", "ms", "us"] | None = None
     """Unit of the times in the file, if it is missing or wrong there."""
     origin: Origin | None = None

@@ -69,7 +69,7 @@ _JITTER, _OUTLIERS = 0.04, 0.03
 _COARSE_SPREAD = 1.25
 """Largest range of deviations of coarse times from a line [last digits]; lost samples exceed this range."""
 _RISING = 0.9
-"""Minimum share of non-negative intervals in a channel of times."""
+"""Minimum fraction of non-negative intervals in a channel of times."""
 _BIN = 512
 """Number of time stamps in a group; only the smallest and the largest deviation of each group are kept."""
 _LAST = 64

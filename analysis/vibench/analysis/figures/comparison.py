@@ -115,7 +115,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
-    """Return the caption: the note of each curve, and the difference of the pair."""
+    """Return the caption: the note of each curve, and the difference between the pair's curves."""
     sentences = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     sentences.append("Shaded: two standard deviations.")
     if pair is not None:

@@ -51,7 +51,7 @@ SHOWN = {
     Parameter.C2: ("c2", 1.0, "N s/m"),
     Parameter.GAP: ("gap of the nearer side", 1e6, "µm"),
 }
-"""Name, factor from SI and unit of each parameter in texts."""
+"""Name, factor from SI units, and unit of each parameter in texts."""
 
 
 @dataclass(frozen=True)

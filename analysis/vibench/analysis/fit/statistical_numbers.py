@@ -270,7 +270,7 @@ def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:
 
 
 _AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
-"""Search range of each parameter, as a factor; gaps: geometric mean, and "apart" is sqrt(upper / lower)."""
+"""Factor of each parameter's search range; gaps: geometric mean, and sqrt(upper / lower) ("apart")."""
 _WIDEST = 0.5
 """Largest width of bounds relative to the search range; wider bounds leave a parameter undetermined."""
 _LIKELY = 2.0

@@ -132,7 +132,7 @@ class UpdatedSpecimen(Tabular):
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit, without values if a simulation with them disagrees with the noise."""
+        """Return the fit, without its values if a simulation with them disagrees with measured noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]

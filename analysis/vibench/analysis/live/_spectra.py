@@ -171,7 +171,7 @@ _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
 _HANN_WIDTH = 1.44
 """Product of a spectral line's half-power width and the window length, for a Hann window."""
 _SEGMENTS_IN_SIGHT = 250
-"""Ratio of the shown time span to the default segment length, within the limits of that length."""
+"""Ratio of the shown time span to the default segment length, if that length is within its limits."""
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0

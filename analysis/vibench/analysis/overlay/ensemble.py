@@ -370,7 +370,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If the ends of the motion in all runs lie within this interval [s], the cause is not chance."""
+"""If the motion ends within this interval [s] in all runs, the cause is common to them, not chance."""
 
 
 @dataclass(frozen=True)

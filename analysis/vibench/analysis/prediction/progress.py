@@ -316,7 +316,7 @@ class SimulationRequest(SpecimenChoice):
     window_s: PositiveFloat = 5.0
     """Observed time at the end of each run."""
     budget_s: NonNegativeFloat = BUDGET_S
-    """Maximum processor time per point to find motions from other initial states, if they differ; 0: none."""
+    """Maximum processor time per point to try other initial states if the motion depends on them; 0: none."""
     error: TargetError | None = None
     """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None

@@ -222,7 +222,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest Floquet multipliers at a level without a tracked resonance, if any."""
+    """State the model's largest Floquet multipliers at a level without resonance, or that none exist."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2

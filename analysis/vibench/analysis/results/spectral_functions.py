@@ -104,7 +104,7 @@ def _is_scanned_noise(path: Path) -> bool:
 
 
 def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
-    """Return a function at the lines of the scan's first point, because clock drift shifts later lines."""
+    """Return a function at the lines of the scan's first point; clock drift shifts lines of later points."""
     values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
     return replace(function, frequency_hz=lines_hz, values=values)
 

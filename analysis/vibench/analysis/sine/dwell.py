@@ -33,7 +33,7 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Largest ratio of a residual that is noise to noise in silence; a silence is shorter than a ring-down."""
+"""Largest residual that counts as noise, relative to noise in silence, which is shorter than a ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 

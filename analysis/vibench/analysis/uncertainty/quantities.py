@@ -255,7 +255,7 @@ def _largest(
 
 
 def _scatter(overlay: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
-    """Return the scatter of one value over draws with the measured kind of motion; None if under 5."""
+    """Return a value's scatter over draws with the measured kind of motion; None with under 5 draws."""
     curve = None if overlay is None else overlay.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
