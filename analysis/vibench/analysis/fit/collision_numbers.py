@@ -24,7 +24,7 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Ratios of Response I to II (1 for a sine): no collisions below the first, collisions above the second."""
+"""Ratios of Response I to II (1 for a sine), below which there are no collisions, above which there are."""
 _LENGTH_S = 3.0
 """Length of the tracked part of a recording [s], long enough for four restarts of the search."""
 _MOST_RECORDINGS = 3
