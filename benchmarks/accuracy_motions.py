@@ -224,7 +224,7 @@ class MotionBenchmark:
         """Sentence that recommends a level."""
         match self.motion.regime:
             case Regime.FREE:
-                return "Without contact, the solution has a closed form, so all levels are equal."
+                return "Without contact, the solution has a closed form, so all levels agree."
             case Regime.PERIODIC | Regime.TRANSIENT:
                 return self._periodic_advice()
             case Regime.CHAOTIC:

@@ -43,9 +43,9 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "",
         "`standard` is the default accuracy level of a simulation. Use `quick` for a first look, and",
         "`reference` to check a result. In a periodic motion, the error of the state is at most",
-        f"{', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}. An error of 1 means 100 µm in a",
-        "displacement or 0.1 m/s in a velocity. In chaos, no accuracy level predicts a single motion; only",
-        "averages are meaningful.",
+        f"{', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}. Its units are 100 µm for",
+        "displacements and 0.1 m/s for velocities. In chaos, no accuracy level predicts a single motion;",
+        "only averages are meaningful.",
     )
     yield from _promises(benchmark)
     first, software = benchmark.motions[0], json.loads(benchmark.software)

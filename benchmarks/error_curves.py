@@ -241,12 +241,12 @@ def section(curves, models, chaos):
         "- Newton's iteration finds stable periodic motions; a smaller requested error takes no longer.",
         "- In chaos, the result is a mean over runs from different initial conditions (*starts*). In 19 of",
         "  20 cases, other starts change this mean by at most the stated error, which no accuracy level",
-        "  reduces. It does not include rare motions that no start has reached: n starts miss a motion of up",
-        "  to 3/n of all starts in 1 of 20 cases. A single run may differ from the mean by far more.",
+        "  reduces. The error excludes motions that no start has reached: in 1 of 20 cases, n starts miss a",
+        "  motion that 3/n of all starts reach. A single run may differ from the mean by far more.",
         "",
         (
             "| contact law, drive | requested error | stated error | time "
-            "| stated error of 30 s at `standard` | time of 30 s at `standard` |"
+            "| stated error of a 30 s run at `standard` | time of this run |"
         ),
         "|---|---|---|---|---|---|",
     )

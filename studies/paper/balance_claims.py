@@ -17,7 +17,7 @@ _MOST, _MAJORITY = 0.8, 0.5
 _SMOOTH_PROMINENCE = 1.1
 """Smallest prominence of a peak in a curve without chaos."""
 _GRID_HZ, _ROUGH_HZ = 5.0, 10.0
-_BENT = "The force of n = 5 acts at every p. It raises a resonance at which p approaches the gap."
+_BENT = "The force of n = 5 acts at every p and raises resonances at which p approaches the gap."
 
 
 @costly_claim(

@@ -21,10 +21,10 @@ _TITLE = "Claims of the paper, checked by simulation"
 _METHOD = """\
 Each claim of Gong et al. (2025) with a number or direction is checked by simulating their specimen.
 The paper states few tolerances, so the required bounds are our choice, some made after seeing first
-results. The bounds allow for chaos, whose responses differ by some per cent between runs.
+results. They allow for chaos, in which responses differ by some per cent between runs.
 "Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
-If the duration of chaos is random, a claim is measured from several starts (initial states a millionth of the
-gap apart), and the range of the results is in parentheses. If a claim fails, options are tried in order until
+If the duration of chaos is random, a claim is checked from several starts (initial states a millionth of the
+gap apart), and parentheses show the range of the results. If a claim fails, options are tried in order until
 the claim holds. A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest
 Lyapunov exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
 DIR/report.html describes each measurement."""
@@ -100,7 +100,7 @@ def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str
 
 
 def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator[str]:
-    yield from (f"# {_TITLE}", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
+    yield from (f"# {_TITLE}", "", f"Made by `{COMMAND}`; do not edit by hand.", _METHOD, "")
     yield from (found.options, found.made_with, "", found.sentence.replace(", ", ",\n"))
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
