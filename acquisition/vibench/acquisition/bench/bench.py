@@ -109,7 +109,7 @@ class BenchLock:
         try:
             os.ftruncate(descriptor, 0)
             write_at(descriptor, f"{os.getpid()} of {getuser()}".encode(), 0)
-        except (OSError, KeyError, ImportError):  # another user's file, full disk, user without a name
+        except (OSError, KeyError, ImportError):  # file of another user, full disk, unnamed user
             return
 
     def close(self) -> None:
@@ -361,12 +361,12 @@ def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None,
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
-        note_open_bench(simulated + next(_instruments(rig)))  # the generator; two rigs may share a name
+        note_open_bench(simulated + next(_instruments(rig)))  # the generator, as rigs may share a name
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)
         controller = _controller(connected, closing)
-        # On leaving, silence the outputs first, then close all instruments.
+        # At the end, silence the outputs first, then close all instruments.
         closing.push(silencing.pop_all())
     if output is not None:
         closing.callback(output.stop)
@@ -406,7 +406,7 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         if error is None:
             raise
         error.add_note(f"While leaving the bench: {failure}")
-        # Each failure has the previous failure as its context.
+        # The context of each failure is the failure before it.
         earlier = failure.__context__
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")

@@ -158,7 +158,7 @@ class Attempts:
             self.bench = self._reopen_bench(self.reopen, error)
             self._note(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
-            self.bench.idle(LOOK_EVERY_S)  # an immediate repetition seldom works
+            self.bench.idle(LOOK_EVERY_S)  # an immediate retry seldom succeeds
         self._note(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _reopen_bench(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
@@ -167,7 +167,7 @@ class Attempts:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                # Simulated time may pass faster than real time: use the longer of the two waits.
+                # Simulated time may pass faster than real time: use the longer of both waiting times.
                 looked_s = max(monotonic() - began, idled_s)
                 if looked_s >= self.policy.reopen_for_s or self.switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")

@@ -5,7 +5,7 @@ import shlex
 import shutil
 import smtplib
 import ssl
-import subprocess  # the command is the user's own, given on the command line
+import subprocess  # the user gives this command on the command line
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

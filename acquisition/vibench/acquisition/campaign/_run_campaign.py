@@ -324,7 +324,7 @@ class ReconnectingBench:
         if before is not None:
             self._last_check = before.last_check
             self._confirm = partial(confirm_knobs_of, before.confirmations, "the first opening of the bench")
-            with suppress(AcquisitionError):  # only a lost instrument cannot be silenced
+            with suppress(AcquisitionError):  # fails only if an instrument is lost
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
         self._bench = open_bench(self._rig, self._confirm, power=self._power)

@@ -75,7 +75,7 @@ def bench_report(
     during = reader.during_sine(drive)
     after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
-        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # in case the relay is stuck
+        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # in case its relay is stuck
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle_finding(bench.output))
@@ -119,7 +119,7 @@ class _BlockReader:
                 blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
                 return np.concatenate(blocks, axis=1)
             except BaseException:
-                guard.silence()  # the call below also lowers the amplitude, in case the relay is stuck
+                guard.silence()  # the call below also lowers the amplitude, in case the output relay is stuck
                 raise
             finally:
                 try:

@@ -147,7 +147,7 @@ class SettledPass:
     def run(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
         """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
         points: list[SettledPoint] = []
-        searched, branch = 0, 1  # each jump increases the number of the branch by 1
+        searched, branch = 0, 1  # each jump increases the branch number by 1
         for frequency_hz in frequencies_hz:
             point = yield from self.record_at(
                 frequency_hz, SegmentLabel.STEP, branch=branch, came_from=came_from

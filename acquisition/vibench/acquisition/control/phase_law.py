@@ -140,7 +140,7 @@ class PhaseLaw:
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # Before the first measurement, only the level has changed. Assume that the phase error has not.
+        # With a single measurement, only the level has changed so far. Assume an unchanged phase error.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -228,10 +228,10 @@ class PhaseSearch:
             used = away[:_NEAREST]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
-        # For a mode, the tangent of the phase error is a straight line over frequency; the error is not.
+        # For a mode, the tangent of the phase error (not the error) is a straight line over frequency.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
-            # All measurements have one frequency, or all errors are too large: the zero is not determined.
+            # All measurements have one frequency, or all errors are too large: the zero is undetermined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
         # The tangent magnifies phase errors by 1 / cos^2, so each point has the weight cos^4.
         weight = np.cos(np.radians(error_deg)) ** 4

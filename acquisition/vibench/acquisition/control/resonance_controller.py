@@ -107,7 +107,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
     """Lock on to the resonance at every level and record there; each level starts where the last ended."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # The tracked order may be 1 % of the motion, which as a whole would seem settled too early.
+        # The tracked order may be 1 % of the motion; the whole motion would seem settled too early.
         loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
@@ -189,7 +189,7 @@ def _search(
 ) -> Controller[TrackedPlace]:
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Super- and subharmonics settle slowly; measured too early, they would give a wrong phase slope.
+        # Super- and subharmonics settle slowly; early measurements would give a wrong phase slope.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     controller = SettlingController(loop, rule, level)
@@ -236,8 +236,8 @@ def _search(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks, so the width of the first level, measured without contacts, is kept. The width
-    # of a super- or subharmonic also depends on the distance to the first contact and is no lower bound.
+    # Contacts bend the flanks of the peak, so keep the width at the first level, measured without contacts.
+    # The width of a super- or subharmonic also depends on the distance to the first contact: no lower bound.
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)

@@ -163,7 +163,7 @@ class SettlingController:
     def settled_state(self, waited_s: float) -> SettledState:
         """Return the state of the motion, from the periods since the last change of the drive."""
         loop, periods = self.loop, self.loop.periods
-        # A motion that is judged by one order settles slowly, so only its newest periods are used.
+        # A motion judged by a single order settles slowly, so use only its newest periods.
         newest = periods.last(
             max(self.rule.periods, periods.count // 2) if loop.settling_order is None else self.rule.periods
         )

@@ -311,7 +311,7 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # Noise also shifts the means of the window's thirds, so ``remaining`` is compared with ``allowed``.
+    # Noise also shifts the means of the window's thirds, so the limit of ``remaining`` allows for noise too.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
@@ -324,7 +324,7 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
     """Return the judgement from block statistics: stationary if the blocks show neither trend nor step."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    # Use order 1, or the only order if a single one is judged.
+    # Use order 1, or the judged order if there is only one.
     fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)

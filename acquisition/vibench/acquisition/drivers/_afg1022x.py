@@ -77,7 +77,7 @@ class AFG1022X(ScpiInstrument):
         InstrumentError for another instrument. The output is then off, if the generator could be reached.
         """
         generator = cls(config)
-        leave = generator.disconnect  # only disconnect: no further commands to another kind of instrument
+        leave = generator.disconnect  # another kind of instrument must receive no more commands
         try:
             generator._identify()
             leave = generator.close
@@ -136,7 +136,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape too: the sine's frequency may be too high for the memory.
+            # Set the frequency before the shape and after it: the sine's may be too high for the memory.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
@@ -155,7 +155,7 @@ class AFG1022X(ScpiInstrument):
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude during the drive."""
-        _ = self.playing  # if settings are unknown, nothing is sent
+        _ = self.playing  # raises an error, and sends nothing, if settings are unknown
         panel_vpp = amplitude_vpp * self._panel_factor
         self.model.check_amplitude(self._config, panel_vpp)
         with self._changing():
@@ -181,7 +181,7 @@ class AFG1022X(ScpiInstrument):
     def start(self) -> None:
         """Turn the output on, and read the state of the output back."""
         with self._changing():
-            _ = self.playing  # if settings are unknown, the output stays off
+            _ = self.playing  # raises an error if settings are unknown, so the output stays off
             self.output = "ON"
 
     def stop(self) -> None:
@@ -242,7 +242,7 @@ class AFG1022X(ScpiInstrument):
             durations_s.append(time.perf_counter() - began_s)
         return statistics.median(durations_s)
 
-    # Steps that differ between generator models
+    # Operations that differ between generator models
 
     def _end_modes(self) -> None:
         self.end_if_known("SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
@@ -332,7 +332,7 @@ class AFG1022X(ScpiInstrument):
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
         reply = self.query(f"{header}?")
-        self.complaints()  # drop the error of an unknown query; the empty reply is enough
+        self.complaints()  # discard the error of an unknown query, which the empty reply shows
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)

@@ -116,7 +116,7 @@ _TERMINALS = {
 }
 _COUPLINGS = {"AC": Coupling.AC, "DC": Coupling.DC}
 _SAME = 1e-6
-# A larger deviation from a straight line is more than rounding: volts are not multiples of one step.
+# A larger deviation from a straight line is not rounding: volts are then not multiples of one step.
 _LINEAR = 1e-9
 # One count of an int32 marks lost samples in recordings; a 32-bit converter may use this count for a voltage.
 _MOST_COUNTS = 2**29
@@ -210,9 +210,9 @@ def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
 
 # A read is divided into pieces of this length, so that no single call waits long or needs the whole buffer.
 LONGEST_READ_S = 2.0
-# Time added to the duration of a read [s]; samples that come later are an error.
+# Time added to the duration of a read [s]; if samples come later, the read fails.
 _READ_MARGIN_S = 10.0
-# Sigma-delta modules use the next higher rate of a list; it must be below this multiple of the request.
+# Sigma-delta modules use the next higher rate of a list: below this multiple of the requested rate.
 _MOST_COERCED = 2.0
 
 
@@ -419,7 +419,7 @@ class DaqmxDigitizer:
         scales_v = tuple(channel.full_scale_v for channel in self._channels)
         seen = overload_ranges(volts, self.roles, scales_v, first_sample)
         unseen = overloaded_roles - {overload.channel for overload in seen}
-        # The clip is too short to be visible in the samples; only the block that contains it is known.
+        # The clipping is too short to be visible in the samples; only the block that contains it is known.
         last_sample = first_sample + volts.shape[1] - 1
         return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))
 

@@ -19,7 +19,7 @@ from ._daqmx_errors import daqmx_call
 from ._overload import require_playable
 
 _WRITE_TIMEOUT_S = 10.0
-# Number of zeros at the end: the output holds the last value, and some devices need more than one sample.
+# Number of zeros at the end: the output holds its last value, and some devices need more than one zero.
 _ZERO_SAMPLES = 64
 # Rounding error of the rate that is read back; a larger deviation means a different rate.
 _SAME_RATE = 1e-6
@@ -113,7 +113,7 @@ class DaqmxOutput:
         task, self._task, self._written = self._task, None, 0
         try:
             with ExitStack() as last:
-                last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
+                last.callback(self._to_zero)  # even if stopping fails: devices may hold their last value
                 last.callback(self._release)
                 # An output that has run out of samples reports this error again; it has stopped, as required.
                 last.enter_context(suppress(DataLost))
@@ -131,7 +131,7 @@ class DaqmxOutput:
     def close(self) -> None:
         """Set the output to zero volts and release it. May be called at any time."""
         self._is_open = False
-        if self._task is not None:  # otherwise `stop` has succeeded or raised an error
+        if self._task is not None:  # without a task, `stop` has already succeeded or raised an error
             self.stop()
 
     def _reserve(self) -> Task:

@@ -115,7 +115,7 @@ class GeneratorModel:
                 f"{fewest} to {most} points. Nothing was sent; resample it"
             )
         peak = float(np.max(np.abs(values)))
-        # Unlike "peak > 1", this form also refuses a NaN.
+        # Unlike "peak > 1", this condition also refuses a NaN.
         if not peak <= 1.0 + 1e-9:
             raise LimitExceeded(
                 f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
@@ -156,7 +156,7 @@ AFG1022_MODEL = GeneratorModel(
     usb_ids=((0x0699, 0x0353),),
 )
 KEYSIGHT_33500B_MODEL = GeneratorModel(
-    # Keysight 33500B data sheet, the 20 MHz models; without a filter its memory plays up to 62.5 MSa/s.
+    # Keysight 33500B data sheet, 20 MHz models; without a filter, waveforms play at up to 62.5 MSa/s.
     name="Keysight 33500B",
     driver="Keysight33500B",
     open_range_vpp=(2e-3, 20.0),

@@ -22,7 +22,7 @@ def overload_ranges(
     found: list[Overload] = []
     peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
     for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
-        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # this form skips NaN, which `read_block` refuses
+        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # also skips NaN, which `read_block` refuses
             continue
         past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
         ranges = np.split(past, np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES) + 1)

@@ -24,7 +24,7 @@ _LONGEST_QUEUE = 64
 # A faulty instrument may never stop sending. The longest SCPI text has 255 letters; 8192 points have 16 kB.
 _LONGEST_TEXT = 300
 _LONGEST_REPLY = 1_000_000
-# Long enough for an old reply that is under way, short enough for an emergency stop [ms].
+# Wait for an old reply on its way [ms]: long enough to receive it, short enough for an emergency stop.
 _STALE_REPLY_MS = 100.0
 _LATE = pyvisa.constants.StatusCode.error_timeout
 _QUEUE_ENTRY = re.compile(r'([+-]?[0-9]{1,9})\s*,\s*"?([^"]*)"?')
@@ -186,7 +186,7 @@ class ScpiInstrument:
             self._reply_due = True
             self._link.write(message)
             reply = self._link.read_bytes(longest + 1, break_on_termchar=True)
-            # On a stream, a newline byte among the codes also ends a read.
+            # On a stream, a newline byte among the waveform codes also ends a read.
             while self._link.read_termination and len(reply) <= min(sum(_block(reply)), longest):
                 reply += self._link.read_bytes(longest + 1 - len(reply), break_on_termchar=True)
             if len(reply) > longest:
@@ -207,7 +207,7 @@ class ScpiInstrument:
                 with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
-                        is_stream = bool(self._link.read_termination)  # codes may contain newline bytes
+                        is_stream = bool(self._link.read_termination)  # codes may contain newlines
                         self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=not is_stream)
                     except pyvisa.VisaIOError as error:
                         if error.error_code != _LATE:

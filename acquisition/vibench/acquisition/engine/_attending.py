@@ -37,7 +37,7 @@ class _Program:
 
         In state R (runnable), only its processor time counts: Linux reports a wait only after its end.
         """
-        lived_s = self._lived_s  # read before the clock, because a byte may arrive in between
+        lived_s = self._lived_s  # read this before the clock: a byte may arrive between the two
         now_s, worked_s = monotonic(), self._processor_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)
@@ -68,7 +68,7 @@ class _Program:
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
             self._lived_s = monotonic()
-        os._exit(0)  # ends the process even while the other thread waits
+        os._exit(0)  # ends the process although the other thread waits
 
 
 def main() -> None:

@@ -340,7 +340,7 @@ class Attendant:
 
     def close(self) -> None:
         """Stop attending the engine. May be called at any time."""
-        self._beat_s = inf  # `live` sends nothing after this
+        self._beat_s = inf  # with this value, `live` sends nothing more
         self._end()
 
     def _end(self) -> None:

@@ -326,7 +326,7 @@ class PublishedState:
 def _free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(folder).free
-    except OSError:  # the recorder reports a missing folder; an error in this display must not end a run
+    except OSError:  # the recorder reports a missing folder; this display must not end a run
         return 0
 
 

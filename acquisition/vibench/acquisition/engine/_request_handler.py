@@ -277,7 +277,7 @@ class RequestHandler:
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if since_s > STALL_S:  # viewers' requests waited while this process was stalled
+        if since_s > STALL_S:  # this process was stalled, so viewers' requests had to wait
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -348,7 +348,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # a start in the meantime creates a new switch
+        while switch is not self._engine.switch:  # if a run starts in the meantime, it has a new switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

@@ -56,7 +56,7 @@ def flat_periods(
     return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
 
 
-# Limits, preview and run need the same waveforms one after another, and all levels of a plan share them.
+# Limits, preview and run, one after another, need the same waveforms, as do all levels of a plan.
 @lru_cache(maxsize=1)
 def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: int) -> tuple[Samples, ...]:
     excited = np.array(lines, dtype=np.int64)

@@ -259,7 +259,7 @@ def configure(
         raise ConfigurationError(
             f"{target.absolute().parent} is not a folder; create it, or choose another folder"
         )
-    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # the path in it is relative to the template
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # this path is relative to the template
     questions = questions_for(text) if questions is None else questions
     for question in questions:
         if len(choices := question.choices(seen)) == 1:

@@ -90,7 +90,7 @@ LONGEST_NAME = 64
 class SweepAxis(StrEnum):
     """Axes of a sweep, by the names used in ``order``."""
 
-    # These are in the usual order, from the outermost (slowest) to the innermost.
+    # The axes are in the usual order of nesting, from the outermost (slowest) to the innermost.
 
     REPETITION = "repetition"
     EXCITATION = "excitation"

@@ -302,7 +302,7 @@ class Journal:
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))
         continues = row >= 0 and overload.first_sample <= last.last_sample + 1
-        # One row is kept free for each channel without an overload, so that each channel has a row to extend.
+        # Keep one row free for each channel without overload, so that its first overload has a row to extend.
         untouched = len(self._roles) - len(self._last_overload)
         must_grow = row >= 0 and self._overloads.free_rows <= untouched
         if continues or must_grow:

@@ -247,7 +247,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
-        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand beyond this
+        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to more than this limit
             raise RecordingError(f"{dataset.name} ({dataset.nbytes:.2g} bytes) is larger than any result")
         yield np.asarray(dataset[()])
         return
@@ -393,8 +393,8 @@ def _sha256(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
 
 
-# Campaign journals list the seals of recordings, which reveals a different recording under the same name.
-# Every seal check also compares with the journals, so that all commands detect this.
+# Campaign journals list the seals of recordings, so they reveal a different recording under the same name.
+# Every check of a seal reads the journals too, so that all commands detect such a recording.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 

@@ -299,7 +299,7 @@ class RecordingWriter:
         """Reserve more disk space if the recording has no planned end, or is much longer than planned."""
         rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
         ahead = round(RESERVE_AHEAD_S * rate_hz)
-        # Half the margin, so that a recording of the planned length needs no further reservation.
+        # With half the margin, a recording of the planned length needs no further reservation.
         lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
         if end + lead <= self._reserved or self._reserved == self._places.capacity:
             return

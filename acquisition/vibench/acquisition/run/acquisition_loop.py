@@ -43,7 +43,7 @@ class AcquisitionLoop:
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
-        # The end is computed again for every block, because a slow consumer of the blocks delays it.
+        # Compute the goal again for every block, because a slow consumer of the blocks moves it.
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self.samples))
 
@@ -79,7 +79,7 @@ class AcquisitionLoop:
         while sampled < goal:
             yield self._next(min(piece, goal - self.samples))
             sampled = self._converted
-        # Ignore up to half a sample: this is the rounding of the goal and must not accumulate.
+        # Ignore up to half a sample: rounding the goal causes this difference, which must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
 
     @property

@@ -254,7 +254,7 @@ class GeneratorDrive:
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Note this before the command: if the command fails half-way, the output must be regarded as on.
+        # Set this before the command: if the command fails half-way, the output must be regarded as on.
         self._is_on = True
         self._generator.start()
 
@@ -291,6 +291,6 @@ class GeneratorDrive:
     def _quiet_vpp(self) -> float:
         quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
         if isinstance(self._play, Waveform):
-            # Generators scale a waveform to their full range, so their own setting is lower by its peak.
+            # Generators scale a waveform to full range: their setting is this amplitude times its peak.
             return quiet_vpp / float(np.max(np.abs(self._play.values)))
         return quiet_vpp

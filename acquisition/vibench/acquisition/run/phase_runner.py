@@ -214,7 +214,7 @@ class PhaseRunner:
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
             yield from self._catch_up()  # the segment must start at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # the time that the next command takes is in no segment
+            self.loop.enter(None)  # the duration of the next command belongs to no segment
         waits = self.drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
@@ -261,7 +261,7 @@ class PhaseRunner:
             return phase
         planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
         self._lost_cycles += (planned_hz - self._glided_hz) * late_s
-        # The limit follows from the planned step, so that corrections do not accumulate.
+        # The limit follows from the planned frequency step, so that corrections do not accumulate.
         most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
         wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
         more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
@@ -359,7 +359,7 @@ class PhaseRunner:
         while not self.silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
                 self.silence.note_signal()
-                with suppress(AcquisitionError):  # the measured drive shows whether this succeeded
+                with suppress(AcquisitionError):  # the measured drive shows whether switching off succeeded
                     self.drive.silence()
                 self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
                 self.loop.cut()

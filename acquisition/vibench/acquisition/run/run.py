@@ -186,8 +186,8 @@ class Run(ClosedOnLeaving):
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted, before anything plays
-        self._silence: SilenceWatch  # made after the check that the drive is recorded
-        self._guard: DriveGuard  # made when the plan is admitted
+        self._silence: SilenceWatch  # created after the check that the drive is recorded
+        self._guard: DriveGuard  # created when the plan is admitted
         self._controller: Controller[None] | None = None
         self._until: UntilWatch | None = None
         self._known = ""

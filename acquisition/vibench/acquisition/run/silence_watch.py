@@ -319,7 +319,7 @@ class DriveGuard(ClosedOnLeaving):
             self._switch.ask(self._standstill)
         try:
             self._drive.cut()
-            self._drive.silence()  # also lowers the amplitude, as nothing is measured
+            self._drive.silence()  # also lowers the amplitude, because silence cannot be measured
         except AcquisitionError as error:  # the next check tries again
             LOG.debug("the drive guard could not silence the drive", exc_info=True)
             if not self._has_failed:

@@ -73,7 +73,7 @@ class KeptStops:
         for level, path in self._paths.items():
             try:
                 found = path.stat()
-            except OSError:  # no stop of this level, or no folder
+            except OSError:  # no stop of this level was requested, or the folder is missing
                 continue
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
@@ -159,7 +159,7 @@ class Watchdog:
             try:
                 if not self._closing.wait(INTERVAL_S):
                     self._look()
-            except MemoryError:  # logging it would need more memory
+            except MemoryError:  # logging the error would need more memory
                 MEMORY_RESERVE.release()
             except Exception:
                 getLogger(__name__).exception("%s", self._thread.name)
@@ -228,7 +228,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     """
     found = []
     for announcement in _announcements(model):
-        # The name of the computer may change while a program runs. Process number and start time identify it.
+        # The computer's name may change while a program runs. Its process number and start time do not.
         is_here = announcement.place is Place.HERE and (
             announcement.computer in ("", platform.node()) or announcement.process_start != ""
         )
