@@ -115,7 +115,7 @@ def begin_of_last_motion(points: Points) -> int:
     changes = np.flatnonzero(repeats[1:] != repeats[:-1])
     if changes.size != 1:
         return 0
-    # The motion changes somewhere inside the block that does not repeat.
+    # The motion changes at an unknown place inside the block that does not repeat.
     last = int(changes[0]) + 1
     return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
 
@@ -244,7 +244,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
     # A motion that repeats at the end is settled, however long its transient was. An irregular end or a long
-    # period may itself be a transient, such as a decay into noise, which rotates about a point.
+    # period may itself be a transient, such as points that rotate about a fixed point and decay into noise.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
         return _no_verdict(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")

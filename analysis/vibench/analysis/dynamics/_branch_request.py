@@ -111,7 +111,7 @@ class BranchRequest(SpecimenChoice):
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
-        Harmonic(*self.path.drive(self.stop))  # raises for an impossible drive
+        Harmonic(*self.path.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     def _refuse_other_resonances(self) -> None:

@@ -67,7 +67,7 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
-        Harmonic(self.start_hz, self.amplitude_m)  # raises for an impossible drive
+        Harmonic(self.start_hz, self.amplitude_m)  # raises an error if the drive is impossible
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(

@@ -60,7 +60,7 @@ class SpectrumRequest(SpecimenChoice):
         points = len(self.values)
         if points > MOST_POINTS:
             raise ValueError(f"{points} points were requested; at most {MOST_POINTS}: take a larger step")
-        Harmonic(*self.drive(self.stop))  # raises for an impossible drive
+        Harmonic(*self.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     @property

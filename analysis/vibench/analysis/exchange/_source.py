@@ -98,7 +98,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
     """Yield the channels, each with the times that the file contains for it."""
     read = {each: time_axis(each, source.blocks(each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
-    for time, axis in axes.items():  # such as t_v beside t
+    for time, axis in axes.items():  # a label may contain a channel's name, such as t_v beside t
         if any(is_time_of(time.label, each.label) for each in source.channels):
             axes[time] = replace(axis, is_named=True)
     for number, each in enumerate(source.channels):

@@ -306,7 +306,7 @@ def _begin(block: Reals) -> "_Scan | None":
         rounding = float(np.quantile(rising, 0.01)) if is_repeated else digit
         return _Scan(mean, rounding, is_inferred=True)
     are_many_lost = bool(np.count_nonzero(~is_near) > many)
-    # Intervals of 1.04 last digits, rounded to one, look like one lost sample in 25. Lost samples move all
+    # Intervals of 1.04 last digits, rounded to whole digits, look like one lost sample in 25. Losses move all
     # later times away from a line; rounding moves each time by half a digit at most.
     off = np.abs(intervals[~is_near] - typical)
     is_digit = off.size >= _LEAST_ROUNDED and 0.9 * float(np.min(off)) < digit
@@ -351,7 +351,7 @@ def _jitter(times: Reals, distance: Reals, interval: float, unit: float) -> floa
     off = off - np.mean(off, axis=1, keepdims=True)
     off = off - np.outer(off @ place / np.sum(place**2), place)
     low, high = np.quantile(off, (_OUTLIERS, 1 - _OUTLIERS), axis=1)
-    # Times with the larger unit of the next row may begin within a row.
+    # The unit of the next row may be larger, and its times may already begin within a row.
     return float(np.max(high - low - _COARSE_SPREAD * np.maximum(units, np.append(units[1:], 0.0))))
 
 

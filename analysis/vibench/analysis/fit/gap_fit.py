@@ -86,7 +86,7 @@ def onsets(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None = Non
     """
     reach = float(norm.ppf(0.5 + 0.5 * DEFAULT_CONFIDENCE))
     motion, rate = sweep.response, sweep.response.sweep_rate_hz_per_s
-    # Between two collision regions the masses may still collide, smoothly.
+    # Use only the first region: after it, collisions too smooth to detect may continue.
     for edge in (each.start for each in sweep.collisions.regions[:1] if not each.reaches_start):
         last = int(np.argmin(np.abs(motion.time_s - edge.time_s))) - 1
         before = slice(max(0, last - round(_APPROACH_S / motion.interval_s)), max(0, last))

@@ -425,7 +425,7 @@ def modal_fit(
     chi_square = float(np.sum(squares)) / freedom
     alone = np.diag(np.linalg.inv(curvature))
     hidden = lines.modes(_poles_between(poles))
-    # Three modes with very different damping may also fit two overlapping peaks, so allow for a third.
+    # Three modes with very different damping may also fit two overlapping peaks, so allow for a third mode.
     columns = np.hstack((follows, lines.independent(hidden)))
     curvature = np.asarray(columns.T @ columns)
     if _condition(curvature) > _WORST_CONDITION:

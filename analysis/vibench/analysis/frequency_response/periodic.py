@@ -363,7 +363,7 @@ def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
     steps = np.diff(value) / np.diff(frequency_hz)
     across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
     product = steps[1:] * steps[:-1]
-    # At smooth extrema and in modes narrower than three lines, this slope would be too large.
+    # At smooth extrema and in modes narrower than three lines, the modal slope would be too large.
     is_mode = np.abs(product) < np.abs(across) ** 2
     slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
     return np.asarray(slope)

@@ -54,7 +54,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         steps = np.nan_to_num(np.abs(np.gradient(value)) ** 2)
     known = np.isfinite(variance)
     shapes = np.where(known, [np.ones_like(gain), gain, steps], 0.0)
-    # Stretches overlap by half; sizes are interpolated between their centres.
+    # Stretches overlap by half; between their centres, the factors of the shapes are interpolated.
     last = value.size - lines
     firsts = np.append(np.arange(0, last, max(lines // 2, 1)), last)
     around = firsts[:, None] + np.arange(lines)

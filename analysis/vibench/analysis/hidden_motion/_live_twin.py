@@ -422,7 +422,7 @@ class LiveTwin:
         if not is_out and squares.size < self._block // 4:
             return
         self._level = np.inf if is_out else float(squares.mean())
-        # Before any parameter is known, a wrong description may cause a misfit, not a changed specimen.
+        # Before any parameter is known, the misfit may come from a wrong description, not from a change.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             sentences.append(

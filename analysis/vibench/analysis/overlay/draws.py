@@ -405,7 +405,7 @@ def all_draws(
 
     def estimate_draw(number: int) -> Draw[None]:
         channels = source.channels(number)
-        # Compute one estimate at a time: it is at most half of the work, but takes twice a run's memory.
+        # Compute one estimate at a time: estimating is at most half of the work, but takes double memory.
         with estimating:
             draw = estimate(channels)
             if number == 0:
@@ -419,12 +419,10 @@ def all_draws(
         most = usual if source.most == 1 else _MORE * usual
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
-            alike = float(np.median(np.concatenate([each.count for each in curves])))
-            # More draws than the default were requested for narrower bands, so all are made.
-            if alike < FEWEST_DRAWS:
-                if _chance_of_enough(alike, len(found), most) < _HOPELESS:
-                    break
-            elif len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves)):
+            if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
+                # More draws than the default were requested for narrower bands, so compute all of them.
+                len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
+            ):
                 break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
             found += pool.map(estimate_draw, range(len(found), stop))

@@ -106,7 +106,7 @@ def fit_shaker(
             f"per degree of freedom, at most {LARGEST_CHI2:g}): the amplifier, the table or the specimen "
             "differs from its description, or masses collide; check the bench file, or choose weaker noise"
         )
-    # An undetermined parameter, such as a small inductance, hardly acts within this prior.
+    # Within this prior, an undetermined parameter (such as a small inductance) hardly changes the motion.
     precision = best.jac.T @ best.jac / max(chi2, 1.0) + np.eye(len(_TYPICAL)) / _PRIOR_SD**2
     covariance = np.linalg.inv(precision)
     return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)

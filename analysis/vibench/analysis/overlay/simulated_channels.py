@@ -103,7 +103,7 @@ class SimulatedChannels(RecordedChannels):
         """Ratio of the response sensor's gain to the base sensor's, without their delays."""
         if self.has_sensors:
             return super().response_gain(frequency_hz)
-        # The base motion includes the effect of its sensor, and the response has no sensor.
+        # The recorded base motion includes its sensor's effect, and the simulated response has no sensor.
         return np.ones(frequency_hz.size, dtype=np.complex128)
 
     def read(self, start: int, stop: int) -> Reals:

@@ -401,7 +401,7 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        # A copy may continue a step outside the window; the joint would disturb the interpolation there.
+        # Outside the window the signal may be a copy; interpolation would be wrong where the copy joins.
         response_i=float(np.max(sizes_with_maxima(motion)[is_clear])) / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,

@@ -147,7 +147,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
         why = f"a burst raises |x| {100 * rise:.2g} % above its usual maximum; find the cause and dwell again"
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why, period=None)
-    # Bridged drop-outs can make a repeating motion look irregular, not the reverse.
+    # Bridged drop-outs can make a repeating motion look irregular, but not the reverse.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
             f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make the "

@@ -264,7 +264,7 @@ def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift
     rise = level - top
     bias = float(rise[0] + np.trapezoid(left, level))
     square = float(rise[0] ** 2 + np.trapezoid(2 * rise * left, level))
-    # The integrals are accurate to 1e-3 of the noise; the bias is not negative, nor above the rms.
+    # The integrals are accurate only to 1e-3 of the noise, so ensure that 0 <= bias <= rms.
     bias = max(bias, 0.0)
     return NoiseLift(bias, float(np.sqrt(max(square, bias**2))))
 
