@@ -130,7 +130,7 @@ def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMe
     """Return the next step lengths as `ode45` does; ``failures`` is the number of consecutive failures."""
     if method.relative == math.inf:
         return np.full_like(step_s, method.longest_s)
-    # A step without error grows by the largest factor; after a non-finite error the next step is a tenth.
+    # Without error, the step grows by the largest factor; after a non-finite error it is a tenth.
     part = 1.25 * (error / method.relative) ** 0.2
     shorter = np.where(failures > 0, 0.5, np.fmax(0.1, 1.0 / np.maximum(part, 0.2)))
     longer = np.where(failures > 0, step_s, np.minimum(method.longest_s, step_s / np.maximum(part, 0.2)))

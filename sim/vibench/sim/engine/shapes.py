@@ -104,7 +104,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 def collision_shapes() -> tuple[Table, Table]:
     """Return collisions and their scalars, tabulated over the press; each solution starts from the last."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
-    # Without press, a collision lasts 2.943 and its depth is nearly a half sine.
+    # At zero press, the scaled duration of a collision is 2.943 and its depth nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
     for softer in np.linspace(0.0, SOFTEST, SHAPES):
         depths, duration, _ = _solve_collision(depths, duration, float(softer))

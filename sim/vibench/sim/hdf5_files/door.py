@@ -110,7 +110,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups are nested more than {DEEPEST} levels deep")
-        links += len(item)  # before the loop: many links may lead to one object
+        links += len(item)  # counted before the loop, because many links may lead to one object
         if links > MOST_OBJECTS:
             raise UnsafeHdf5(f"it contains more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):

@@ -73,5 +73,5 @@ def _interrupts(disk: _Disk) -> Iterator[None]:
         yield
     finally:
         for number, handler in handlers.items():
-            if signal.getsignal(number) is on_signal:  # another handler may have been set
+            if signal.getsignal(number) is on_signal:  # keep a handler that was set meanwhile
                 signal.signal(number, handler)

@@ -57,7 +57,7 @@ class MapPoints(Points):
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Refuse random starts with given starts here, not in `Map`: files of earlier versions have both.
+        # Refuse random starts together with given starts here, not in `Map`: older files may have both.
         of_start = [each.field for each in plan.varying if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(

@@ -82,7 +82,7 @@ class ExpectedTime:
         time_s, factor = self.time_s, self.factor
         learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
         text = f"{time_s:.1g} s within a factor of {factor:.2g}"
-        if factor > 10.0:  # with this uncertainty, a central value would mislead
+        if factor > 10.0:  # a central value would mislead if it is so uncertain
             text = f"between {time_s / factor:.1g} and {time_s * factor:.1g} s"
         return f"Estimated time on one core: {text}, from {learnt} on this machine."
 

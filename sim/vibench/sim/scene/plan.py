@@ -330,7 +330,7 @@ def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     return "/".join(
         (
             *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
-            # State the budget with the kind of run, because in chaos, runs from other starts use all of it.
+            # The kind of run includes the budget, because in chaos, runs from other starts use all of it.
             f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
         )
     )

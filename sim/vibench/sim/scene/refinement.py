@@ -313,7 +313,7 @@ class _Refinement:
             spent_s = max(sum(run.cost_s for run in runs) - cost_s, 1e-9)
             taken_s = time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # Unless far too low, the nominal cost sets the length, because it is the same on every machine.
+            # The nominal cost, equal on every machine, sets the length unless it is far too low.
             self._part_s *= min(4.0, at_once * PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 

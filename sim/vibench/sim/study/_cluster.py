@@ -147,7 +147,7 @@ class ClusterExecutor:
 
 def _connect(address: str, patience_s: float) -> Client:
     try:
-        # Checked first, because a client with an invalid address cannot be closed.
+        # Check the address first, because a client with an invalid address cannot be closed.
         get_address_host_port(address)
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:

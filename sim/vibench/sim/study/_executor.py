@@ -90,7 +90,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[SolvedScene
             found = [_solve_and_time(group[0], solver)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
-            # Closed forms are not recorded: planning them takes about as long as evaluating them.
+            # Times of closed forms are not recorded: planning them takes about as long as evaluating them.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
             yield SolvedScene(each.prediction, each.taken_s if is_prepared else math.nan)
