@@ -297,7 +297,7 @@ def vibench(
 
 def main() -> None:
     """Run the command line; on an error that the user can fix, print one sentence and exit with 1 or 3."""
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # gRPC reads this at import; no log for ended calls
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; hides gRPC's log of ended calls
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
     try:
         app()
@@ -307,7 +307,7 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # caused by a path, because all files contain valid text
+    except UnicodeEncodeError as error:  # caused by a path: everything else is valid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)

@@ -349,7 +349,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
     ) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
-        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph uses the text as a format
+        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph uses it as a format string
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 

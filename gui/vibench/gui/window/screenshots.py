@@ -74,7 +74,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
-        # Do this as in `open_window`, so that the pictures look like the real window.
+        # Freeze objects as `open_window` does, so that the pictures look like the real window.
         gc.freeze()
         window.resize(*SIZE)
         window.show()

@@ -187,7 +187,7 @@ READ: Attributes = {
     "CHANNELS_TO_READ": Attribute(_channel_names),
     "NUM_CHANS": Attribute(lambda task: len(task.channels)),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
-    "0x31E8": Attribute(default_samples),  # number of samples that "all" means; unnamed in the protocol
+    "0x31E8": Attribute(default_samples),  # samples that "all" requests; unnamed in the protocol
     "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }

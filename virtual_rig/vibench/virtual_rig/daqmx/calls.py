@@ -254,7 +254,7 @@ class _Subscription:
         If the buffer never loses samples, first wait until the announced samples have been read.
         """
         with self._rig.changed:
-            due_s = _BY_OTHERS  # a listener to a repeated buffer must not advance rig time
+            due_s = _BY_OTHERS  # waiting for a repeated buffer must not advance rig time
             if isinstance(stream, Acquisition):
                 due_s = stream.time_of(count)
                 if not self._rig.pace.loses_samples:

@@ -224,7 +224,7 @@ def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDA
     values = convert(task, reading)
     if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
         values = values.T
-    elif reading.samples < room and channels > 1:  # rows are spaced as in the caller's array
+    elif reading.samples < room and channels > 1:  # pad the rows to the spacing of the caller's array
         values = np.pad(values, ((0, 0), (0, room - reading.samples)))
     return {
         "status": reading.status,

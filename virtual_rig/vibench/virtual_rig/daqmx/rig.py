@@ -150,7 +150,7 @@ def _wait(rig: "Rig", is_there: Callable[[], bool], deadline_s: float) -> bool:
     return rig.changed.wait_for(is_there, left_s)
 
 
-# The two rules for the passing of rig time have the same methods, which are called with ``rig.changed`` held.
+# The two rules for the passing of rig time have the same methods, called while ``rig.changed`` is held.
 
 
 class OnDemandPace:

@@ -141,7 +141,7 @@ def _fraction(cycles: Samples) -> Samples:
 
 
 # Periodic shapes between -1 and 1, with their exact means from phases ``start`` (0 <= start < 1) over
-# ``span`` >= 0 cycles. A mean over no cycles is the value at that phase.
+# ``span`` >= 0 cycles. Over a span of 0, the mean is the value at ``start``.
 
 
 @dataclass(frozen=True)

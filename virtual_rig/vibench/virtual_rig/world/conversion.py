@@ -304,7 +304,7 @@ class Conversion:
     def take(self, signals: FloatArray, first_step: int) -> None:
         """Convert new signals of the world, shape (signals, steps), from ``first_step`` on."""
         done = first_step + signals.shape[1] - self._start_step
-        # The last sample whose steps are complete; the tolerance handles a step that ends on a sample.
+        # Number of samples whose steps are complete; the tolerance includes one that ends with the last step.
         complete = int(np.floor(done / self._steps_per_sample + _ROUNDING))
         count = complete - self._converted
         parts = [channel.take(signals, self._converted, count) for channel in self._inputs]

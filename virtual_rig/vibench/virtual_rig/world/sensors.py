@@ -152,7 +152,7 @@ def _fit_zeros(poles: tuple[complex, ...], denominator: FloatArray, step_s: floa
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
-    weight = (1 / frequency_hz)[:, np.newaxis]  # phase errors count as delays, equally at all frequencies
+    weight = (1 / frequency_hz)[:, np.newaxis]  # equal delays have equal weight at all frequencies
     matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
     aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
     weights, *_ = np.linalg.lstsq(matrix, aim)
@@ -234,7 +234,7 @@ class MotionSensor:
         dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
         disturbed = dropouts + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
-        # ``instead`` starts at ``first_step``.
+        # The first entry of ``instead`` is for ``first_step``.
         for disturbance in disturbed:
             begin = max(disturbance.first_step - first_step, 0)
             stop = max(disturbance.stop_step - first_step, 0)
