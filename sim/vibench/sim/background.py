@@ -141,11 +141,11 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; each ``tell(part)`` calls ``on_part``."""
+        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` receives each told part."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:
-        """Queue a job, which starts when a worker is free; a closed pool drops it."""
+        """Queue a job to be started when a worker is free; a closed pool drops the job."""
         self._waiting.append(job)
         if self._is_closed:
             job.drop()

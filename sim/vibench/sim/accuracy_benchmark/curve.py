@@ -37,7 +37,7 @@ class CurvePoint:
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method estimates its own error; if not, ``error`` is its distance to the refined result."""
+    """Whether the method estimates its own error; if not, ``error`` is relative to the refined result."""
     is_chosen: bool = False
     """Whether `refine_scene` returns this result for the scene's requested error and time."""
 
@@ -50,8 +50,8 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     """Yield error and computing time of all suitable methods for a scene with a target.
 
     The first points are the successive results of `refine_scene`, until the target is met. They take at most
-    half of the time limit; methods that exceed the rest of it are left out. Raises ValueError when the scene
-    has no target, or cannot be simulated.
+    half of the time limit; methods that exceed the remaining time are left out. Raises ValueError when the
+    scene has no target, or cannot be simulated.
     """
     end_s = time.monotonic()
     next(refine_scene(scene))  # not timed: the first solution includes work done once per process

@@ -3,7 +3,7 @@
 `shoot_branches` searches for motions from rest, from the linear motion between the stops and from random
 states, and follows each by shooting. It also follows branches that fork off where a period doubles or a
 symmetry breaks. `balance_branches` does the same for harmonic balances, including the paper's. Branches are
-computed one by one, on demand. A motion on no known branch starts a new one, which may be isolated.
+computed one by one, on demand. A motion on no known branch starts a new branch, which may be isolated.
 
 >>> from itertools import islice
 >>> from vibench.sim import FrequencyPath, gong2025

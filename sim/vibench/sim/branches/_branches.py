@@ -37,7 +37,7 @@ length. It follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
 """Additional distance between scaled states that `lies_on` allows for rounding errors."""
 LATE, LEAST_LATE_S = 0.25, 0.1
-"""Time allowed to end a branch after the time limit: share of the limit, and smallest time [s]."""
+"""Extra time to end a branch after the time limit: fraction of the limit, and smallest value [s]."""
 LENGTHS = 10.0
 """Length of the whole parameter range in the scaled units of branch following."""
 
@@ -68,7 +68,7 @@ class FoundBranch:
 
     @property
     def is_isolated(self) -> bool:
-        """Whether the branch is a closed curve, which sweeps along other branches cannot reach."""
+        """Whether the branch is a closed curve, out of reach of sweeps along other branches."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -95,7 +95,7 @@ M = TypeVar("M")
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """Periodic motion from which a new branch is followed, if no known branch contains the motion."""
+    """Periodic motion from which a new branch is followed, unless a known branch contains it."""
 
     motion: M
     origin: BranchOrigin
@@ -114,7 +114,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Until a time limit, yield branches through motions on no known branch, and branches that fork off."""
+    """Yield branches through new motions, and branches that fork off these, until a time limit."""
     known: list[FoundBranch] = []
     last_s = until_s + max(LEAST_LATE_S, LATE * (until_s - time.monotonic()))
     for value in np.linspace(*bounds, search.places):
@@ -264,7 +264,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
     frequency_hz
         Drive frequencies [Hz], an array of any shape.
     multiplier
-        Magnitude of the largest Floquet multiplier over one period of the motion, same shape.
+        Magnitude of the largest Floquet multiplier over one period of the motion; same shape as frequency_hz.
     periods
         Period of the motion in drive periods.
     """

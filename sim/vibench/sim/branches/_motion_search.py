@@ -23,12 +23,12 @@ SETTLED = 1e-3
 SAME_MOTION = 1e-5
 """Relative distance of states at the same drive phase, below which two motions count as the same."""
 SIMPLER = 1e-6
-"""Relative distance of states below which a motion repeats after half the period, or is symmetric."""
+"""Relative distance of states below which a motion counts as having half the period, or as symmetric."""
 NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
 """Largest abs(p) of random initial states, relative to the gap on the same side."""
 RANDOM_REACH = 3.0
-"""Largest x and z of random initial states, relative to the larger of gap and amplitude without stops."""
+"""Largest x and z of random initial states, relative to the gap or, if larger, the stop-free amplitude."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class MotionSearch:
     places: int = 8
     """Number of evenly spaced parameter values at which to search, including both ends of the range."""
     starts: int = 12
-    """Number of random initial states at each value, besides rest and the linear motion without contact."""
+    """Number of random initial states at each value, in addition to rest and the contact-free motion."""
     settling_periods: int = 300
     most_periods: int = 4
     """Longest period of a motion that the search finds, in drive periods."""

@@ -27,9 +27,9 @@ from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces
 STATES_PER_CELL = 6
 """Number of state variables of a cell: x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Largest number of windows of a run; `check_work` usually refuses much shorter runs first."""
+"""Largest number of windows of a run; `check_work` usually refuses even much shorter runs."""
 SLICE_CELL_WINDOWS = 1 << 12
-"""Windows times cells between two checks of a time limit: some milliseconds of computing."""
+"""Product of windows and cells between two checks of a time limit; takes some milliseconds."""
 
 
 class ChainRun:
@@ -136,7 +136,7 @@ class ChainRun:
 
     @property
     def impact_cells(self) -> NDArray[np.int64]:
-        """Index of the cell of each contact, in the order of `impact_times_s`, shape (count,)."""
+        """Index of the cell in contact, in the order of `impact_times_s`, shape (count,)."""
         return self._places[: self.impacts].astype(np.int64)
 
     def samples(self, outcome: Outcome) -> Floats:
@@ -160,7 +160,7 @@ class ChainImpacts:
     times_s: Floats
     """Times at which contacts begin, ascending, shape (count,) [s]."""
     cells: NDArray[np.int64]
-    """Number of the cell of each contact, counted from 0 at the base, shape (count,)."""
+    """Index of the cell in which each contact occurs, from 0 at the base, shape (count,)."""
     per_cell: NDArray[np.int64]
     """Number of contacts in each cell, shape (cells,)."""
 

@@ -142,7 +142,7 @@ def chain_lyapunov_exponent(
 
 
 def _rescale(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
-    """Return the second motion, moved along the line to the first until it is at the small distance."""
+    """Return the second motion, moved along the line to the first motion until they are close again."""
     apart = second - first
     # At rest the size is zero: use at least that of a displacement of all masses by the drive amplitude.
     base = np.zeros_like(first)

@@ -45,7 +45,7 @@ class ChainResponse:
     impacts_before: NDArray[np.int64]
     """Number of contacts that began before the evaluated window, for every cell, shape (cells,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz of every cell at the end of the run, from which a run can continue, (cells, 6)."""
+    """x, y, z, vx, vy, vz of every cell at the end, to continue the run, shape (cells, 6)."""
     outcome: Outcome
 
     @property
@@ -162,7 +162,7 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 
     M q'' + C q' + K q = f - F is multiplied by exp(-i omega t) and integrated by parts over whole periods.
     The result is (K + i omega C - omega^2 M) Q = f - F - M (dq' + i omega dq) - C dq, where dq is the change
-    of q, and Q, f and F now are the integrals.
+    of q, and Q, f and F denote the integrals.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from ..specimen.state import Table, Vector
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2
-"""Largest product of window length and fastest rate of chain and drive [rad]. The tenth integral of a force
+"""Largest product of window length and fastest rate in chain and drive [rad]. The tenth integral of a force
 is then 1.4e-12 of the first."""
 COLLISION_TURN = 0.4
 """`WINDOW_TURN` for windows that contain whole collisions; the tenth integral is then 7e-10 of the first."""
@@ -30,8 +30,8 @@ REACH = MARKOV_TERMS
 """Number of cells on each side of a unit impulse that the truncated Taylor response reaches."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
-"""Largest allowed effect of a contact force on the velocity of another cell in the same window, relative to
-the tolerance; smaller effects are neglected."""
+"""Largest neglected effect of a contact force on the velocity of another cell in the same window, relative to
+the tolerance."""
 MOST_HALVINGS = 20
 KEPT = 2
 """Number of window lengths that are tried before the shortest one."""
@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """Distance in cells within which only one cell may be in contact, for each window, shape (windows,)."""
+    """For each window length, the distance in cells within which only one may be in contact, (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
@@ -131,7 +131,7 @@ def _stretches(motion: Table) -> tuple[Table, Table, Table]:
 
 
 def cross_answers(between: Table, window: float) -> Vector:
-    """Return bounds on dp/dt of other cells / dp/dt of the struck cell, within a window after an impulse.
+    """Return bounds on dp/dt of other cells, relative to the struck cell, in a window after an impulse.
 
     Shape (REACH + 1,): entry d is the bound for cells at distance d; entry 0 is not used.
     """

@@ -23,11 +23,11 @@ FEWEST_PAIRS, STUDENT = 8, 2.365
 TOLERANCE_PART = 0.1
 """Largest part of the requested error that may come from the integration."""
 LONGEST_S, FIRST_S, FIRST_SHARE = 60.0, 0.1, 0.75
-"""Default limit of the computing time of a chain [s]. Its first period may take FIRST_S, or this share of the
-time limit if that is longer, because callers compute a second period."""
+"""Default limit of a chain's computing time [s]. The first period may take FIRST_S or, if longer, FIRST_SHARE
+of the time limit; callers compute a second period."""
 HOPELESS, STEADILY = 10.0, 0.5
-"""Expected time over the default limit above which an error is out of reach, and error over that of half as
-many windows above which the error falls only with the square root of the time."""
+"""Expected time / default limit above which an error is out of reach; ratio of the errors with all and with
+half the windows above which the error falls only with the square root of the time."""
 
 
 class TargetedResponse(NamedTuple):
@@ -37,7 +37,7 @@ class TargetedResponse(NamedTuple):
     errors: Floats
     """Relative errors (95 %) of the transmissibility of every cell, shape (cells,)."""
     followed_s: float
-    """Total simulated time of all response windows [s]."""
+    """Total simulated time of the chain, including discarded windows [s]."""
 
 
 def chain_response_to(
@@ -45,7 +45,7 @@ def chain_response_to(
 ) -> TargetedResponse:
     """Extend the run until the second half of its windows gives the requested error; return the response.
 
-    Without a time limit, the run ends early if the error would take more than ten minutes.
+    Without a time limit, the run ends early if it would need more than ten minutes.
 
     Raises ValueError when the computation of one drive period takes longer than ``time_s``.
 
@@ -116,7 +116,7 @@ def _errors(windows: Sequence[ChainResponse]) -> Floats:
 def error_of_lines(lines: Complex) -> Floats:
     """Return the relative error of the mean amplitude of spectral lines of shape (windows, cells).
 
-    It is the larger of Student's interval from pairs of windows and the difference of the halves' means.
+    It is the larger of Student's interval from pairs of windows and the difference between both halves.
     """
     count = len(lines) // 2
     if count < FEWEST_PAIRS:

@@ -58,7 +58,7 @@ SLOWEST, FASTEST = 0.06, 5.0
 HARDEST_PRESS = 0.24
 """Largest acceleration due to other springs in the collision fit, in units of approach speed / u."""
 FIRST_DERIVATIVE, LATER = 0.03, 0.1
-"""Largest time derivative of that acceleration, in units of speed / u^2; ratio of successive derivatives."""
+"""Largest derivative of this acceleration [speed / u^2], and largest ratio of successive derivatives."""
 PAPER_TURN = 0.053
 """Fastest modal rate times u [rad], for the paper's specimen at a medium approach speed."""
 SLOWEST_TURN = 0.15
@@ -86,7 +86,7 @@ def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
 
 @lru_cache(maxsize=8)
 def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return a fit to random collisions within the variables' ranges, or None as `collision_fit` does."""
+    """Return a fit to random collisions within the variables' ranges, or None; see `collision_fit`."""
     middle, half = _box(specimen)
     if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
         return None
@@ -150,7 +150,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effects on p of the repeated time integrals of the force, relative to the second one."""
+    """Return the effects of the force's repeated time integrals on p, relative to the second integral's."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -169,7 +169,7 @@ def _free(accelerations: Table) -> Table:
 def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
     """Return duration and moments about the middle of n collisions, shape (n, 6).
 
-    Depths and duration are corrected by their tabulated response to a misfit, as in native/collision.hpp.
+    Depths and duration are corrected with tabulated derivatives, as in native/collision.hpp.
     """
     shapes, durations = collision_shapes()
     press = np.clip(accelerations[:, 0] - MIDDLE * accelerations[:, 1], SOFTEST, HARDEST)
@@ -216,7 +216,7 @@ MOST_DAMPED = 0.05
 """Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
 REACHED_END = Outcome.REACHED_END.value
 LEAST_PART = 1e-9
-"""Smallest contribution of a mode to p, relative to the largest; a batch derives all modes from p."""
+"""Smallest contribution of a mode to p, relative to the largest one; a batch derives all modes from p."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Families of processors for which the native engine is compiled, and those that this processor supports.
+"""Processor families for which the native engine is compiled, and those that this processor supports.
 
 The build hook also imports this file, so this file may import only the standard library.
 """

@@ -25,11 +25,11 @@ from .scene import fill_power, fill_specimen, scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Limit of the number of time steps out of contact: two days of the paper's motion, computed in seconds."""
+"""Largest number of time steps out of contact: enough for two days of the paper's motion."""
 MOST_IMPACTS = 1 << 26
 """Largest number of impacts in one run. Their times take up to 0.5 GB, used only as impacts occur."""
 SPARE_IMPACTS = 100
-"""Number of impacts allowed beyond the allowed mean rate, so that even a short run may have a few."""
+"""Number of impacts allowed in addition to the mean rate, so that even a short run may have a few."""
 DIRECTIONS = 6
 """Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9
@@ -71,7 +71,7 @@ Part = TypeVar("Part")
 
 
 def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
-    """Yield the parts that are computed before ``end_s``, as a value of `time.monotonic` [s]."""
+    """Yield the parts that are computed before ``end_s``, a value of `time.monotonic` [s]."""
     computing = iter(parts)
     while True:
         try:
@@ -143,7 +143,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces those that rounding puts past the end."""
+        """Return all samples, shape (samples, 6); ``last`` replaces samples past the end due to rounding."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -303,7 +303,7 @@ class GrowthReadings:
     """Growth of tangent vectors in equal time intervals; the vectors are kept orthonormal in a metric."""
 
     def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
-        """Allocate memory for ``room`` intervals of ``interval_s`` [s], each divided into equal ``parts``."""
+        """Allocate memory for ``room`` intervals of ``interval_s`` [s], each of ``parts`` equal parts."""
         self._growth = np.zeros((room, changes))
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
@@ -447,7 +447,7 @@ class CubicRun(_Run):
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance over whole intervals until all are done or the run fails.
 
-        Return states at the ends of the completed intervals, shape (passed, 6), and their impact counts.
+        Return the states at the ends of completed intervals, shape (passed, 6), and each interval's impacts.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)

@@ -99,7 +99,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of the exponent [1/s]; for multipliers, half the difference of two cycles; 0 for
+    """Standard error of the exponent [1/s]; half the difference of two cycles for multipliers; 0 for
     modes."""
     verdict: ExponentVerdict
     source: Source
@@ -108,7 +108,7 @@ class LyapunovEstimate:
     since_s: float
     """Time from which growth is averaged, or at which the final motion begins [s]."""
     blocks: BlockedMean | None
-    """Mean growth rate and error from blocks of intervals [1/s]; None unless the source is the average."""
+    """Mean growth rate and error from blocks of intervals [1/s]; None unless the exponent is this mean."""
     interval_s: float
     """Length of the interval in which each growth rate is measured [s]."""
     local_time_s: Floats
@@ -236,7 +236,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return exponent and error of a periodic motion [1/s]: mean and half the difference of two cycles."""
+    """Return a periodic motion's exponent and error [1/s]: mean of two cycles, and half their difference."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []

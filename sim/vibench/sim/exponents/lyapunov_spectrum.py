@@ -77,7 +77,7 @@ class LyapunovSpectrum:
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence limits of the dimension, within 0 to 6, by Student's t for the fewest blocks."""
+        """Return confidence limits of the dimension, cut to 0 to 6; Student's t is for the fewest blocks."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
@@ -193,7 +193,7 @@ def _mean(rates: Floats) -> BlockedMean:
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
-    """Return the standard error of the dimension, to first order in the errors of the local exponents.
+    """Return the dimension's standard error, to first order in the errors of the exponents.
 
     D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0, hence dD = -dS / l + S dl / l^2.
     """

@@ -102,21 +102,21 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
 
 @cache
 def _largest_by_chance(levels: int) -> Floats:
-    """Return the limit of the correlation test of each block length, which includes all longer lengths."""
+    """Return the correlation test's limit for each block length; a test includes all longer lengths."""
     from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
 
     return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
 
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
-"""Longest time between orthogonalisations: in radians of the fastest mode, and in its decay times. After this
-time the tangent vectors are still independent to several digits."""
+"""Longest time between orthogonalisations: in radians and in decay times of the fastest mode. After this time
+the tangent vectors are still independent to several digits."""
 CHECKS = 32
 """Largest number of times that a run is tested for an early end."""
 ALMOST = 1e-9
 """Relative tolerance within which a duration counts as a whole number of intervals."""
 Enough = Callable[[Floats], bool]
-"""Function that returns whether a run may end early, given the growth in each interval so far, (n, m)."""
+"""Function that returns whether a run may end early, from the growth in each interval, shape (n, m)."""
 CYCLES = 2.0
 """Default length of an interval in cycles of the slowest mode."""
 
@@ -237,7 +237,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change of state per cycle. Below the first limit a motion repeats; above the second, not."""
+"""Relative change of state per cycle. Below the first limit a motion repeats; above the second it changes."""
 LONGEST_CYCLE = 16
 """Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0

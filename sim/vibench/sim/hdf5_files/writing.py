@@ -42,7 +42,7 @@ class _Disk(FileIO):
 def open_hdf5_to_write(
     path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
 ) -> Iterator[h5py.File]:
-    """Create (``x``) or change (``r+``) a file; raise OSError at the end if any write failed."""
+    """Open a file to create (``x``) or change (``r+``) it; raise OSError at the end if any write failed."""
     with _Disk(path, "x+" if mode == "x" else mode) as disk:
         try:
             with _interrupts(disk), h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:

@@ -38,10 +38,10 @@ BUNDLE_S = 0.3
 
 
 def map_solver(plan: Map) -> Solver:
-    """Return the solver of a map: in SIMD batches or one by one.
+    """Return the solver of a map, which computes points in SIMD batches or one by one.
 
     Batches need points that do not continue one another, a single specimen, and wide processor registers.
-    Points with non-Hertz stops, the accuracy *reference* or a target are solved one by one.
+    Points with stops other than Hertz, with accuracy *reference* or with a target are solved one by one.
     """
     if plan.target is not None:
         return solve_scene
@@ -172,7 +172,7 @@ POINT_S = 2e-4
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Estimated computing time of a map; two bounds for an adaptive map: first lattice, and all points."""
+    """Estimated computing time of a map; for an adaptive map two bounds: first lattice, and all points."""
 
     points: int
     coarse_points: int
@@ -180,7 +180,7 @@ class MapEstimate:
     work_s: float
     """Computing time of all points on one core [s], from recent run times on this machine."""
     longest_work_s: float
-    """Computing time of all points on one core [s] if no motion repeats: all runs have full length."""
+    """Computing time of all points on one core [s] if no motion repeats and all runs have full length."""
     coarse_work_s: float
     """Computing time of the first lattice on one core [s]."""
     workers: int
@@ -211,7 +211,7 @@ class MapEstimate:
         return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
-        """Return the elapsed time [s], which is limited by the workers or by the main process."""
+        """Return the elapsed time [s]; either the workers or the main process determine it."""
         return max(work_s / self.workers + work_s / points, points * POINT_S)
 
     @property
@@ -240,8 +240,8 @@ class MapEstimate:
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
     """Return the estimated time of a map on ``workers`` threads, from recent run times on this machine.
 
-    No point is computed, except in pilot runs of about a second if points have a target. The numbers of
-    refined points and of repeating motions are not known in advance, so the estimate consists of bounds.
+    No point is computed, except in pilot runs of about a second if points have a target. How many points are
+    refined and how many motions repeat is unknown in advance, so the estimate consists of bounds.
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)

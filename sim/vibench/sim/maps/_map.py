@@ -89,7 +89,7 @@ def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
 
 
 def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """Return a label for kind and period of each motion; the motion without impacts has a separate label."""
+    """Return a label for kind and period of each motion; impact-free motion has a separate label."""
     motion, period = (arrays[name].astype(np.int64) for name in ("motion", "period"))
     return np.where(without_impacts(arrays), _PERIODIC * LONGER, motion * LONGER + period)
 
@@ -270,8 +270,8 @@ class Map(GridPlan):
     observe: Annotated[tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...], Field(min_length=1)] = (
         Observable.RESPONSE,
     )
-    """Observables. "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each point, which
-    takes tens of times as long."""
+    """Observables. "lyapunov" is the largest Lyapunov exponent, averaged over up to 25 s at each point; it
+    takes tens of times as long as the other observables."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy level of each point."""
     error: TargetError | None = None
@@ -285,8 +285,8 @@ class Map(GridPlan):
     refinement: Refinement = Refinement.ADAPTIVE
     """Selection of the computed points of a map over two quantities."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
-    """Grid steps between the points computed first, 2 to 64; then halved down to 1. By default 16, or fewer
-    so that each axis has eight intervals. Points between equal neighbours are filled in."""
+    """Grid steps between the points computed first, 2 to 64; later halved down to 1. By default 16, or fewer
+    to give each axis eight intervals. Points between equal neighbours are filled in."""
 
     @property
     def target(self) -> Target | None:

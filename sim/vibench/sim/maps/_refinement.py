@@ -41,9 +41,9 @@ class Filling:
     cells: Indices
     """Flat indices of the filled-in cells, shape (n,)."""
     donors: Indices
-    """Computed cells whose motion is copied, shape (n,)."""
+    """Computed cell whose motion each filled-in cell copies, shape (n,)."""
     corners: Indices
-    """Computed or filled-in cells of coarser levels between which to interpolate, shape (n, 4)."""
+    """Corners for interpolation: computed or filled-in cells of coarser levels, shape (n, 4)."""
     weights: Floats
     """Interpolation weights of the corners, whose sum is 1, shape (n, 4)."""
 

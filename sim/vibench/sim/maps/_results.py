@@ -47,7 +47,7 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong audited cells for each computed motion; fractional with several initial states."""
+    """Number of wrong audited cells for each computed motion; not an integer with several initial states."""
     lost: tuple[float, ...]
     """Number of wrong audited cells for each filled-in motion."""
 
@@ -161,7 +161,7 @@ class MapResults(GridResults[Map]):
         return self._describe_motions(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Return the motions of a cell, the most common first; `place` is its indices (second, first)."""
+        """Return the motions of a cell, the most common first; `place`: its indices (second, first)."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]
@@ -245,7 +245,7 @@ def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def open_map(path: Path | str) -> MapResults:
-    """Return the results in the file of a map, complete or still being computed.
+    """Return the results in the file of a map that is complete or still being computed.
 
     Raises StudyError if the file does not contain a map, or has another format version.
     """

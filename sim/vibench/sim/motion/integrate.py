@@ -25,7 +25,7 @@ from ..specimen.stops import member
 HERMITE = 384.0
 """Denominator in the error of cubic Hermite interpolation: h^4 / 384 times the fourth derivative."""
 SHARE = 1e-3
-"""Part of the tolerance that the interpolation of a sweep may use."""
+"""Largest error of the interpolation of a sweep, relative to the tolerance."""
 SHORTEST_TURN = 0.005
 """Shortest interval [rad at the highest frequency]; its interpolation error is 2e-12 of the amplitude."""
 

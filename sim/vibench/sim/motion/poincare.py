@@ -42,8 +42,8 @@ def flow_derivative(
 ) -> tuple[Floats, Floats]:
     """Return the final state of a run from time zero of the drive, and d(final state) / d(initial state).
 
-    The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop the
-    derivative does not exist; very large numbers are then returned.
+    The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop, where
+    no derivative exists, very large numbers are returned.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Response:
     line_start_state: Floats
     """x, y, z, vx, vy, vz at the start of the drive periods counted by ``line_periods``, shape (6,)."""
     final_state: Floats
-    """x, y, z, vx, vy, vz at the end of the run, where the next point of a sweep may start, shape (6,)."""
+    """x, y, z, vx, vy, vz at the end of the run; the next point of a sweep may start here, shape (6,)."""
     outcome: Outcome
 
     @property

@@ -22,7 +22,7 @@ def open_to_write(path: Path) -> int:
 def open_for_all(path: Path) -> int:
     """Open a lock file for all users, or create it if missing; return its descriptor.
 
-    Raises OSError if the path is not a regular file with one name (for example a link or a pipe).
+    Raises OSError unless the path is a regular file with one name; a link or a pipe is refused.
     """
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:

@@ -34,7 +34,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write all bytes at an offset, calling again if the system writes only part of them."""
+    """Write all bytes at an offset; write the rest again if the system writes only part of them."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)
@@ -63,7 +63,7 @@ class OpenFile:
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Write ``data`` at ``offset``; the data are certainly on the disk only after `sync`."""
+        """Write ``data`` at ``offset``; only after `sync` are the data certain to be on the disk."""
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
@@ -96,7 +96,7 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a path for a new file that finally replaces ``path``; after an error the old file stays."""
+    """Yield a path for a new file, which replaces ``path`` at the end; after an error the old file stays."""
     target = path.resolve()  # replace the target of a link, not the link
     if target.exists():
         target.open("r+b").close()  # raises OSError if the file is write-protected
@@ -127,7 +127,7 @@ UNKNOWN = ""
 
 
 class Place(Enum):
-    """Place where a process was started; the process number identifies it only if this is `HERE`."""
+    """Place where a process was started; its number identifies it only if the place is `HERE`."""
 
     HERE = auto()
     CONTAINER = auto()
