@@ -97,7 +97,7 @@ def balance(
     """Return a motion with the drive's period that is near the initial guess.
 
     The number of harmonics is doubled until neglected harmonics change p by less than the tolerance. Check
-    ``outcome`` of the result first: with NO_SOLUTION the result is only the best attempt.
+    the ``outcome`` first: with NO_SOLUTION the result is only the best attempt.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Balances with a fixed number of harmonics along a drive path; points end with parameter / scale."""
+    """Balances with a fixed number of harmonics along a drive path; last coordinate: parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath
@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refine(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics (the new ones are zero); None if beyond the limit."""
+        """Return the family with twice the harmonics (new ones are zero); None if at the limit already."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:
@@ -263,7 +263,7 @@ def balance_branch_within(
 
 
 SPECTRUM_SHARE = 8
-"""Ratio of samples per period to harmonics, when harmonics are taken from the spectrum of an orbit."""
+"""Number of samples per period and harmonic when harmonics are computed from an exact orbit."""
 
 
 def orbit_guess(orbit: PeriodicOrbit) -> Guess:

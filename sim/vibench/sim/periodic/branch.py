@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance from the unit circle within which a multiplier counts as on it, as is usual without damping."""
+"""Distance within which a multiplier counts as on the unit circle, as is usual without damping."""
 
 
 class Parameter(StrEnum):
@@ -123,7 +123,7 @@ POINTWISE = (
 # for half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
 
 COMPLEX_PART = 1e-6
-"""Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs of product 1."""
+"""Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs with product 1."""
 
 
 class OrbitShape(StrEnum):
@@ -148,11 +148,11 @@ class OrbitSigns:
     """Number of contacts that begin in a period of the motion."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Closure error of the simpler motion (mirrored or half the period), (6,); empty if not defined."""
+    """Closure error over half the period, as for a simpler motion, shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
     """Bifurcation where this branch meets one whose motions are mirrored or have half the period."""
     grazing_distance: float = math.inf
-    """Distance from grazing: (p to the stop) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
+    """Distance from grazing: (stop - p) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
 
     @property
     def over_period(self) -> Complex:
@@ -194,13 +194,13 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Largest distance [gaps] from a simpler motion at the branch points before and after that motion."""
+"""Largest distance [gaps] of a simpler motion from the branch points before and after it."""
 IS_SIMPLER = 1e-7
 """Distance [gaps] from a simpler motion below which both motions differ only by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch has passed its end: a mirrored motion, or one of half the period."""
+    """Return whether a branch has passed its end, a motion that is mirrored or has half the period."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -227,7 +227,7 @@ class _FollowedBranch:
     def go_on(
         self, start: Vector, toward: float, bounds: tuple[float, float]
     ) -> tuple[ArcEnd | None, ArcPoint]:
-        """Follow at one resolution; return the reason for the end (None: refine) and the last point found."""
+        """Follow at one resolution; return the reason for the end (None: refine) and the last point."""
         family = self.family
         points = trace(family, start, toward, bounds, self.steps)
         before = next(points)
@@ -286,7 +286,7 @@ class _FollowedBranch:
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
-        """End a branch at a mirrored motion or one of half the period, where the branch starts to repeat."""
+        """End a branch where it starts to repeat: at a motion that is mirrored or has half the period."""
 
         def measure(point: ArcPoint) -> float:
             return float(self.family.report(point.point).signs.apart @ signs.apart)

@@ -71,7 +71,7 @@ class ArcPoint:
     arc: float = 0.0
     """Arc length from the first point of the curve."""
     is_fold: bool = False
-    """Whether the parameter reverses at this point (a fold); such a point is inserted between two steps."""
+    """Whether the parameter reverses here (a fold); such a point is inserted between two steps."""
     end: ArcEnd | None = None
     """Reason why the curve ends at this point; None for all points before the last."""
 
@@ -87,7 +87,7 @@ LONGEST_LEAP = 5.0
 """Largest distance between the points before and after a kink, relative to the tried step length."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
-"""Value at which a test function (a component of the tangent, a multiplier's distance) counts as zero."""
+"""Value below which a test function (a tangent component, a multiplier's distance) counts as zero."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
 """More than MOST_CRAWLED successive steps, all below CRAWLING times the shortest step, indicate a kink."""
 NEAR_START = 0.2
@@ -250,7 +250,7 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the ratio of the next step length to the last, from iterations and the tangent's rotation."""
+    """Return the ratio of the next step length to this one, from iterations and the tangent's rotation."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))
@@ -299,7 +299,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Return a point of the curve between two of its points, if possible at a given fraction of the chord."""
+    """Return a point of the curve between two points, if possible at a given fraction of their chord."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:

@@ -74,7 +74,7 @@ def transition(
 
 
 class _Departures:
-    """Transition matrices of small perturbations between drive phases in which no contact begins or ends."""
+    """Transition matrices of small perturbations over phase ranges in which no contact begins or ends."""
 
     def __init__(self, structure: LinearStructure, spring: RestoringForce, motion: Motion) -> None:
         self._structure, self._spring, self._motion = structure, spring, motion

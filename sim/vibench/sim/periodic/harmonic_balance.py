@@ -75,7 +75,7 @@ def structure_of(specimen: Specimen) -> LinearStructure:
 
 
 class CondensedStructure(NamedTuple):
-    """Structure condensed to p at m harmonics of one frequency; "slope" fields are d/domega."""
+    """Structure condensed to p at m harmonics of one frequency; "slope" fields are derivatives d/domega."""
 
     compliance: Complex
     """Compliance at the spring, b.Z_k^-1 b, for each harmonic, shape (m,) [m/N]."""
@@ -136,7 +136,7 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Samples per period of the highest harmonic; only components above 15 times its frequency alias."""
+"""Samples per period of the highest harmonic; components up to 15 times its frequency do not alias."""
 FEWEST_SAMPLES = 1024
 
 
@@ -225,7 +225,7 @@ def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, o
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12
 ROUNDING = 1e-12
-"""Residual at which Newton's iteration has converged, relative to the spring's length scale."""
+"""Residual below which Newton's iteration has converged, relative to the spring's length scale."""
 
 
 class HarmonicSet(StrEnum):

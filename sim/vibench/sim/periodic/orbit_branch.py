@@ -46,7 +46,7 @@ class ExactFamily:
         return state_scales(self.mapping.specimen, self.reference)
 
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
-        """Return the closure error after a period, its Jacobian, and a ratio of scales.
+        """Return the closure error after a period, its Jacobian, and the ratio of two sets of scales.
 
         Velocities are scaled by the drive frequency in the map, by the reference frequency in the family.
         """

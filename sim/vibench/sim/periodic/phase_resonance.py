@@ -26,14 +26,14 @@ from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
-"""Step lengths along the branch, in units in which a decade of level is `LENGTH_PER_DECADE` long."""
+"""Step lengths along the branch; a decade of level has the length `LENGTH_PER_DECADE`."""
 LENGTH_PER_DECADE = 2.0
 FREQUENCY_SHARE = 0.1
 """Relative change of the frequency that counts as one unit of arc length."""
 FARTHEST = 20.0
 """Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state [gaps] that Newton's iteration may try; larger ones take minutes on a hard spring."""
+"""Largest state [gaps] that Newton's iteration may try; on a hard spring, larger ones take minutes."""
 DIFFERENCE = 1e-6
 """Step of the finite differences for derivatives of the phase, relative to the scale of each unknown."""
 SCAN_POINTS = 400
@@ -100,7 +100,7 @@ def phase_resonance_branch(
     phase_rad: float = QUARTER_BEHIND,
     steps: ArcSteps = STEPS,
 ) -> Branch:
-    """Follow the phase resonance of a mode along the level of the base, from a level without contact.
+    """Follow the phase resonance of a mode along the drive level, from a level without contact.
 
     Return the branch along the amplitude (it may turn back), with frequency and multipliers of each motion.
     Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its

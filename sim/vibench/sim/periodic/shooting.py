@@ -38,7 +38,7 @@ from .harmonic_balance import phasors_of, size_of
 # five to seven digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Step of the finite differences for derivatives by a drive parameter, relative to its value."""
+"""Finite-difference step for derivatives with respect to a drive parameter, relative to its value."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Offsets (in steps) and weights of the fourth-order central difference quotient."""
 
@@ -67,7 +67,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Period map for mirrored motions or those of half the period; None if these are impossible."""
+        """Period map for motions that are mirrored or have half the period; None if these are impossible."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -116,7 +116,7 @@ class PeriodMap:
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
     def _may_start(self, state: Vector) -> bool:
-        """Return whether a run can start from a state; Newton's iteration may try one beyond a rigid stop."""
+        """Return whether a run can start from a state; Newton's method may try states beyond a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
                 lower, upper = self.specimen.gaps_m
@@ -211,7 +211,7 @@ def periodic_orbit(
     shape, periods
         Symmetry (see `OrbitShape`), and period in drive periods, which is odd for a mirrored motion.
     start
-        x, y, z, vx, vy, vz at time zero, shape (6,). None for the state 400 periods after rest.
+        x, y, z, vx, vy, vz at time zero, shape (6,). None for the state 400 periods after a start from rest.
     """
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         raise ValueError(
@@ -309,7 +309,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the distance from grazing: (p to the stop) / gap, or (dp/dt) / (gap * 2 pi f)."""
+    """Return the distance from grazing: (stop - p) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
     if isinstance(specimen.contact, NoContact | PowerLaw):
         return math.inf
     lower, upper = specimen.gaps_m

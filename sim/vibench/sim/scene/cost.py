@@ -28,9 +28,9 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Memory of the moving average, in runs: a run that is this many runs old keeps a third of its weight."""
+"""Memory of the moving average: after this many further runs, a run keeps a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Limit on a run's logarithmic deviation from the mean of its kind, because its motion may be unusual."""
+"""Limit on a run's logarithmic deviation from the mean of its kind, in case its motion is unusual."""
 FEWEST = 3
 """Smallest number of runs of a kind from which the scatter of their computing times is estimated."""
 UNKNOWN_FACTOR = 10.0
@@ -63,7 +63,7 @@ class _Kind:
 
 
 MOST_FACTOR = 10.0
-"""Uncertainty factor above which only a range of computing times is stated."""
+"""Uncertainty factor above which only a range is stated for the computing time."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _names(kind: str) -> list[str]:
 
 
 def _read(path: Path) -> dict[str, _Kind]:
-    """Return the computing time statistics in a file, by kind of run; empty if there is no valid file."""
+    """Return the computing time statistics from a file, by kind of run; empty without a valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         known = {
@@ -225,8 +225,8 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
     """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some of them.
 
-    Pilot runs are needed because the time depends on whether the motion depends sensitively on its start,
-    which is not known beforehand. An invalid scene counts as zero time.
+    Pilot runs are needed because the time depends on the motion's sensitivity to its start, which is not
+    known beforehand. An invalid scene counts as zero time.
     """
     ends_s, costs = time.monotonic() + PILOT_S, list[float]()
     for number in np.random.default_rng(count).permutation(count)[:PILOTS]:

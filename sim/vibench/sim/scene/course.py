@@ -1,8 +1,8 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
 Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
-`watch` classifies it, and returns it if it must be followed further. `observe` observes the end. Between
-these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
+`watch` classifies the motion, and returns it if it must be integrated further. `observe` observes its end.
+Between these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
 """
 
 import math
@@ -120,7 +120,7 @@ def classify(
 
     The stretches before the window are as long as its blocks. A motion that repeats counts as periodic
     only if Newton's iteration finds a stable periodic motion nearby, because chaos also comes close to
-    unstable periodic motions and stays long where a periodic motion has just vanished in a fold.
+    unstable periodic motions, and lingers where a periodic motion has just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -196,11 +196,11 @@ class Lead:
 
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Shortest interval between two checks for repetition, in s and in drive periods; at most one window."""
+"""Shortest interval between two checks for repetition [s; drive periods]; at most one window."""
 WINDOWS = 2
 """Number of windows in which a non-repeating motion is observed; the last one gives the responses."""
 DRIFT_SHARE = 0.25
-"""Share of the budget for integrating a slow drift; estimating its error takes three times as long."""
+"""Share of the budget for integrating a slow drift; the error estimate takes three times as long."""
 
 
 class SettlingCourse:

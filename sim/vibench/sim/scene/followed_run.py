@@ -34,13 +34,13 @@ FLIGHT, STEPS = 5e-5, 3.5e-4
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 """Computing cost of an impact: on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Factors on the computing cost of contacts with a tangent vector, which needs time steps in collisions."""
+"""Cost factors of contacts with a tangent vector (Hertz, others); it needs time steps in collisions."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Tolerance below which contacts take more computing time, and the factor."""
+"""Tolerance below which contacts take more computing time, and the factor by which they do."""
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
-"""A step with a tangent vector counts as this many steps toward the limit of the number of steps."""
+"""A step with a tangent vector counts as this many steps toward the largest number of steps."""
 
 
 def nominal_cost_s(
@@ -259,7 +259,7 @@ class FollowedRun:
 
 
 TRIES = 8
-"""Largest number of drive periods to wait for one that ends without contact, where a batch can begin."""
+"""Largest number of drive periods to wait until one ends without contact, so that a batch can begin."""
 
 
 def follow_together(
@@ -320,8 +320,8 @@ class ObservedWindow:
     blocks: tuple[Block, ...]
     """Blocks of the window; their lengths differ by at most one drive period."""
     line_periods: int
-    """Number of drive periods at the end of the window over which the lines are taken: as many whole periods
-    of the motion as fit."""
+    """Number of drive periods at the end of the window over which spectral lines are computed: as many whole
+    periods of the motion as fit."""
     line_x_m: complex
     """Phasor of x at the drive frequency, x = Re(line_x_m * exp(i (omega t + phase))) [m]."""
     line_p_m: complex
@@ -377,9 +377,9 @@ def observe_window(
 ) -> ObservedWindow:
     """Observe a motion in a window that begins now and contains at least one drive period.
 
-    If the motion repeats after ``cycle`` drive periods and the window is long enough, lines are taken over a
-    multiple of ``cycle``, which avoids leakage. If ``is_chaos`` returns True for the first parts, the tangent
-    vector is propagated only at both ends of the window.
+    If the motion repeats after ``cycle`` drive periods and the window is long enough, lines are computed over
+    a multiple of ``cycle``, which avoids leakage. If ``is_chaos`` returns True for the first parts, the
+    tangent vector is propagated only at both ends of the window.
     """
     begins, start_s, frequency = run.copy(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -401,7 +401,7 @@ def observe_window(
 
 
 def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
-    """Return a window of ``parts`` of whole drive periods; ``head``, before them, only adds peak values."""
+    """Return a window of ``parts`` of whole drive periods; the preceding ``head`` only adds peak values."""
     frequency = begins.drive.frequency_hz
     periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
@@ -435,9 +435,9 @@ def states_of(stretches: Sequence[Stretch]) -> Floats:
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Lowest sample rate of a spectrum [1/s]: ten times the rate of contacts, which hardly move m0."""
+"""Lowest sample rate of a spectrum [1/s]: ten times the rate of contacts, as their pulses hardly move m0."""
 HIGHEST = 0.25
-"""Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases below that."""
+"""Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases in this range."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,10 @@ from .stated_error import ROUNDING
 ALIKE = 1e-2
 """Largest relative difference between responses of one motion, due to runs that are still settling."""
 OTHER_DIFFERS = 1.0
-"""Assumed relative difference in response of a motion that no start has reached, such as chaos."""
+"""Assumed relative deviation of the response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
 PADDING = 8.0
-"""Counting the smallest and largest response twice doubles the squared error for this number of starts."""
+"""Number of starts at which counting the smallest and largest response twice doubles the squared error."""
 TINY = 1e-300
 MOST_FREEDOM = 200
 """Degrees of freedom above which Student's t hardly changes."""
@@ -88,9 +88,9 @@ def next_size(
     starts: Sequence[Start], error: float | None, lead: float, most: float = 2.0
 ) -> tuple[int, int]:
     """Return the next numbers of starts and of windows per start, which need the least simulated time.
-    Windows save the time before the first window, ``lead`` (in window lengths). More starts reduce the part
-    of the variance that differs between starts, and the weight of the smallest and largest start. The
-    variance falls at most by a factor of ``most``, because it is not known well.
+    More windows save the time ``lead`` before a start's first window (in window lengths). More starts reduce
+    the part of the variance that differs between starts, and the weight of the smallest and largest start.
+    The variance is reduced at most by a factor of ``most`` at once, because it is not known well.
     """
     count, windows = len(starts), windows_of(starts)
     if count < FEWEST_STARTS:
@@ -109,7 +109,7 @@ def next_size(
 
 
 def _share_within(starts: Sequence[Start]) -> float:
-    """Return the share of a start's variance that is scatter between its windows; 1 if not yet known.
+    """Return the share of a start's variance due to scatter between its windows; 1 if not yet known.
 
     Motions that repeat differ only between starts.
     """

@@ -126,8 +126,8 @@ CLOSED_FORM_S = 5e-4
 """Planned computing time for a closed form [s]. Measured run times correct the planned times for each machine
 (`vibench.sim.scene.cost`)."""
 FLIGHT_S, PERIOD_S, IMPACT_S, PRESSED_S = 5e-5, 1e-7, 1e-6, 1.2e-2
-"""Planned computing time per second and per drive period of motion without contact, per impact, and per
-second of contact [s]."""
+"""Planned computing time [s] per second and per drive period without contact, per impact, and per second of
+contact."""
 STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
 """Planned computing time [s] per second and per drive period of motion, for a force that acts at every p."""
 TANGENT = 1.5
@@ -135,15 +135,15 @@ TANGENT = 1.5
 SETTLING_S = 10.0
 """Planned simulated time of a run with an automatic duration [s]."""
 TOUCHING = 0.6
-"""Ratio of the steady p without stops to the gap above which most motions depend sensitively on the start:
-84 of 93 random scenes above this ratio, 3 of 49 below it (`benchmarks/planned_costs.py`)."""
+"""Ratio of the steady p without stops to the gap, above which most motions depend sensitively on the start:
+84 of 93 random scenes above this ratio, but 3 of 49 below it (`benchmarks/planned_costs.py`)."""
 SLOW = 0.9
-"""Ratio of drive frequency to lowest natural frequency below which a motion counts as slow."""
+"""Ratio of drive frequency to lowest natural frequency, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if p without stops equals the gap; grows with the cube root of p / gap."""
+"""Impacts per drive period if the stop-free p equals the gap; it grows as the cube root of p / gap."""
 HALF_PRESSED = 150.0
-"""Ratio of p without stops to the gap at which m1 touches a stop for half of the time."""
+"""Ratio of the stop-free p to the gap at which m1 touches a stop during half of the time."""
 MICROMETRES = 1e6
 
 
@@ -153,7 +153,7 @@ class ScenePlan:
 
     method: Method
     sentences: tuple[str, ...]
-    """Sentences that state what is computed, what is not, and why."""
+    """Reasons as sentences: what is computed, what is not, and why."""
     planned_s: float
     """Estimated computing time on a nominal reference machine [s]."""
     longest_planned_s: float

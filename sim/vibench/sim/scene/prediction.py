@@ -31,8 +31,8 @@ class MotionKind(StrEnum):
     UNDECIDED = "undecided"
     """The simulated time is too short to classify the motion."""
     CHAOTIC_SO_FAR = "chaotic so far"
-    """Chaotic during the simulated time, but possibly not for ever: chaos ended in runs from other starts, or
-    all runs were too short. `Ensemble.escape` contains its lifetime."""
+    """Chaotic during the simulated time, but perhaps not for ever: chaos ended in runs from other starts, or
+    all runs were too short to tell. `Ensemble.escape` contains its lifetime."""
 
 
 class StartMemory(StrEnum):
@@ -51,8 +51,8 @@ class StartMemory(StrEnum):
 class FoundMotion:
     """One of the motions reached from nearly equal starts.
 
-    Two motions count as the same if kind and period are equal and responses agree to 0.1 %, for chaos within
-    its scatter. A motion and its mirror image have the same responses and count as one.
+    Two motions count as the same if kind and period are equal and responses agree to 0.1 % or, in chaos,
+    within the scatter. A motion and its mirror image have the same responses and count as one.
     """
 
     motion: MotionKind
@@ -60,7 +60,7 @@ class FoundMotion:
     """Period of a periodic motion, in drive periods."""
     response_i: float | None
     """Largest abs(x) divided by the drive amplitude: from one start if the motion repeats, otherwise the mean
-    over the starts that reached it. The next three responses are computed in the same way."""
+    over all starts that reached the motion. The next three responses are computed in the same way."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None
@@ -70,7 +70,7 @@ class FoundMotion:
     """Number of starts (initial states) that led to this motion."""
     share: Share
     """Share of all starts; the 95 % intervals of all motions hold jointly. They allow for longer runs, in
-    which starts that are undecided, chaotic, or on one of several chaotic motions may end elsewhere."""
+    which undecided or chaotic starts, also with several chaotic motions, may end elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +115,11 @@ class TargetReport:
     """Computing time for the requested error [s]: estimate, lower and upper limit. None if unknown, or if
     more time does not reduce the error."""
     is_reachable: bool = True
-    """Whether more time may reach the requested error; False if that takes more than ten days."""
+    """Whether the requested error can be reached with more time; False if that takes over ten days."""
 
     @property
     def unseen_share(self) -> float:
-        """Upper 95 % confidence limit of the share of starts with a motion that no start has reached.
+        """Upper 95 % confidence limit of the share of starts that lead to a motion not yet found.
 
         The stated error does not include such motions if all starts are chaotic.
         """
@@ -127,7 +127,7 @@ class TargetReport:
 
     @property
     def text(self) -> str:
-        """Return requested and reached error and time as a phrase, and the limits of several starts."""
+        """Return a phrase with the requested and reached error and time, and the limits of several starts."""
         missed = f"{self.starts} starts may miss motions of up to {_percent(self.unseen_share)} of starts"
         return f"{self._reached}; {missed}" if self.starts > 1 else self._reached
 

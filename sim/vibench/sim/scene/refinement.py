@@ -1,8 +1,8 @@
 """Solve a scene to a requested error or within a requested time. SI units.
 
-Ever better results with error estimates are computed until the target is met. Methods, by rising cost: a
-closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated window,
-checked by a stricter run; with sensitive dependence on the start, their mean over several starts.
+Results with ever smaller error estimates are computed until the target is met. Methods, in order of rising
+cost: a closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated
+window, checked by a stricter run; with sensitive dependence on the start, their mean over several starts.
 """
 
 import math
@@ -50,15 +50,15 @@ from .solve import Question, solve_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
-"""Default limit of the computing time, and computing time above which an error is out of reach [s]."""
+"""Default limit of the computing time, and time above which a requested error is out of reach [s]."""
 HOPELESS_S = 2.0
-"""Computing time without a requested time, if the requested error takes longer than the default limit [s]."""
+"""Computing time if no time is requested and the requested error takes longer than the default limit [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""Time after which a first result is due [s], and nominal cost it may use even after the time limit [s]."""
+"""Time until a first result is due [s], and nominal cost it may still use after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 BATCH_PARTS, MOST_TOGETHER = 8, 64
-"""Ratio of a part's nominal cost in a batch to that of one motion, and largest number of motions."""
+"""Nominal cost of a part in a batch, relative to a single motion, and largest number of motions."""
 LANES = 8
 """Number of motions that a batch integrates at the same time."""
 FIT_S = 0.03
@@ -70,12 +70,12 @@ CLOSE = 3e-3
 KNOWN = 0.03
 """Relative distance from a known periodic motion, below which a run may be approaching that motion."""
 MOST_PUSH = 1000.0
-"""Changes of the start are proportional to the gap, or to this many drive amplitudes if that is less."""
+"""Changes of the start scale with the gap, or with this many drive amplitudes if that is less."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
-"""Number of checks of a run that begins from another start, before its window."""
+"""Number of checks, before its window, of a run from another start."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""
@@ -86,7 +86,7 @@ the remaining time that the iteration may use."""
 
 
 class _Clock:
-    """Clock with the computing time limit; reports how far the requested error and time are reached."""
+    """Clock with the computing time limit; it adds requested and reached error and time to a prediction."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -155,11 +155,10 @@ class _Path:
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
-    """Yield results of a scene with a target, each better than the one before.
-
-    Without a requested time, they end after a minute, or after two seconds if the requested error certainly
-    takes longer than a minute. Raises ValueError when the scene has no target, the specimen cannot be
-    simulated, or the requested time is too short for one drive period.
+    """Yield results of a scene with a target, each better than the one before. Without a requested time, it
+    ends after a minute, or after two seconds if the requested error certainly takes longer than a minute.
+    Raises ValueError when the scene has no target, the specimen cannot be simulated, or the requested time is
+    too short for one drive period.
 
     """
     if scene.target is None:
@@ -206,7 +205,7 @@ class _Refinement:
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.copy(), self._twin.copy()
-        """Copies of the run and of the stricter run beside it, made at the last check of both."""
+        """Copies of the run and of its stricter companion run, made at the last check of both."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
         """All periodic motions found in this scene so far."""
@@ -368,7 +367,7 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion / ``size``; inf if the motion is None."""
+        """Return the distance of a state from a periodic motion, over ``size``; inf if the motion is None."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size
@@ -379,7 +378,7 @@ class _Refinement:
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Return a stable periodic motion near a run, with this period (in drive periods) or a divisor."""
+        """Return a stable periodic motion near a run, whose period divides ``period`` (in drive periods)."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.time_s, GRACE_S):
             return None
@@ -442,7 +441,7 @@ class _Refinement:
 
     @property
     def _remaining_change(self) -> float:
-        """Estimated relative distance of a run from its final motion, from the change in one decay time."""
+        """Relative distance of a run from its final motion, estimated from the change in one decay time."""
         points = self._path.recent / self._scales
         lag = min(math.ceil(self._pace.forgetting_periods), len(points) // 2)
         before = points[max(0, len(points) - 1 - lag - MOST_PERIODS) : len(points) - lag]

@@ -28,17 +28,17 @@ NEARLY = 0.01
 TINY = 1e-300
 """Size assumed for a motion at rest, to avoid division by zero."""
 DISTINCT = 20.0
-"""Smallest change of state, in tolerances, over less than a period. If a change is smaller, the
-motion may still be settling to a shorter period."""
+"""Smallest change of state within a period [tolerances]. If a change is smaller, the motion may still be
+settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
 """Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
 NEUTRAL = 0.1
-"""Largest growth per decay time (slowest mode) that counts as zero; damping alone gives -1."""
+"""Largest growth per decay time of the slowest mode that counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
-"""Number of consecutive parts of a motion. In a drift, the change of state grows from part to part, or it
-shrinks from part to part. This happens by chance in 2 of 720 cases."""
+"""Number of consecutive parts of a motion that are compared. In a drift, the change of state steadily grows,
+or steadily shrinks, from part to part. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time [decay times] without growth or decay of a perturbation, after which a motion is quasi-periodic."""
+"""Time [decay times] without growth or decay of a perturbation that proves a motion quasi-periodic."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Number of decay times (slowest mode) after which a non-repeating motion counts as on its attractor."""
+"""Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
 """Ratio of the longest run to the longest decay time used; longer decay times are cut to that time."""
 MOST_STATES = 2_000_000
@@ -210,8 +210,8 @@ EXACTLY = 1e-9
 """Relative distance from the periodic motion below which the rest of a run is skipped; below the error of
 every accuracy level."""
 STEPPING = 100.0
-"""Ratio of the noise of time integration to its tolerance; the steps differ from period to period. Measured:
-at most 70 (p^7 at 130 Hz and 20 um)."""
+"""Ratio of the noise of time integration, whose steps differ from period to period, to its tolerance.
+Measured: at most 70 (p^7 at 130 Hz and 20 um)."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ class Pace:
     forgetting_s: float
     """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """The same without the limit [s]; an undamped mode gets the limit, because it has no decay time."""
+    """Decay time without this limit [s]; an undamped mode, having no decay time, gets the limit."""
     sharpness: Sharpness
     nearly: Sharpness
     """Tolerances of the least accurate level, for motions that are nearly settled."""
@@ -239,7 +239,7 @@ class Pace:
 
     @property
     def section_s(self) -> float:
-        """Simulated time whose states suffice to detect a motion of any period up to `MOST_PERIODS` [s]."""
+        """Simulated time that suffices to detect a motion of any period up to `MOST_PERIODS` [s]."""
         return (longest_section(self.forgetting_periods) + 1) / self.frequency_hz
 
     @property
@@ -258,7 +258,7 @@ class Pace:
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Return the period of a nearly settled motion, in drive periods; 1 if there is none.
 
-        Spectral lines are taken over this period. Nearly settled means the same at every accuracy level.
+        Spectral lines are computed over this period. "Nearly settled" does not depend on the accuracy.
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period

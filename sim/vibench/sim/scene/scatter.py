@@ -66,7 +66,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 
 
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
-    """Return the 95 % limit of the relative difference of the responses of two windows, shape (4,).
+    """Return the 95 % limit of the relative difference between the responses in two windows, shape (4,).
 
     ``blocks`` are the blocks before a window, followed by those of the window. None for too few blocks.
     """
@@ -88,9 +88,9 @@ def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None
 def _lines_apart(parts: Complex) -> float:
     """Return the 95 % limit of the relative difference between the amplitudes of a line in two windows.
 
-    ``parts`` are the line's complex amplitudes in consecutive blocks; the line is their mean. Blocks may be
-    correlated, so the larger of two errors is used, from all blocks or from means of pairs (Flyvbjerg and
-    Petersen, J. Chem. Phys. 91 (1989) 461). A deviation d normal to the mean a changes |a| by d²/(2|a|).
+    ``parts`` are the line's complex amplitudes in consecutive blocks; the line is their mean. Because blocks
+    may be correlated, the larger of two errors is used: from all blocks, or from means of pairs (Flyvbjerg
+    and Petersen, J. Chem. Phys. 91 (1989) 461). A deviation d normal to the mean a changes |a| by d²/(2|a|).
     """
     line = complex(parts.mean())
     found = []

@@ -16,8 +16,8 @@ PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 BUDGET_S = 1.0
 """Default budget of computing time for runs from other starts and for continued chaos [s]."""
 CLEAR, FEWEST, MOST = 8, 16, 64
-"""Numbers of starts, including the requested one. `CLEAR` if all reach one motion, or chaos certainly lasts.
-`MOST` if they reach several motions and the budget allows it. `FEWEST` in all other cases."""
+"""Numbers of starts, including the requested one. `CLEAR` if all starts reach one motion, or chaos certainly
+lasts. `MOST` if they reach several motions and the budget allows it. `FEWEST` in all other cases."""
 
 
 class Observable(StrEnum):
@@ -140,11 +140,11 @@ class Scene(Strict):
     duration: FixedDuration | AutomaticDuration = FixedDuration()
     start: Rest | Given = Rest()
     budget_s: float = BUDGET_S
-    """Processor time [s] to find whether chaos lasts and, with sensitive dependence on the start, which
-    motions other starts reach; zero for neither. It is a nominal time, on the machine of docs/accuracy.md, so
-    that results are the same on every machine."""
+    """Processor time [s] for finding whether chaos lasts and, with sensitive dependence on the start, which
+    motions other starts reach; zero to find neither. It is a nominal time, on the machine of
+    docs/accuracy.md, so that results are the same on every machine."""
     target: Target | None = None
-    """Requested error and computing time; accuracy, duration and budget must then not be given."""
+    """Requested error and computing time; with these, accuracy, duration and budget must not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:

@@ -1,8 +1,8 @@
 """Motions of a scene from several nearly equal starts (initial states). SI units.
 
-After transient chaos, chance determines which motion is reached, and when. Starts that differ by a millionth
-of the gap then give random samples. They are integrated in rounds until all motions have settled, chaos is
-known to last, or the budget is used up.
+After transient chaos, it is a matter of chance which motion is reached, and when. Starts that differ by a
+millionth of the gap then give random samples. They are integrated in rounds until all motions have settled,
+chaos is known to last, or the budget is used up.
 """
 
 import math
@@ -95,7 +95,7 @@ def is_sensitive_to_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
 
 
 def _touches(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
-    """Return for each state, shape (n, 6), whether m1 may touch a stop; batches extrapolate those states."""
+    """Return whether m1 may touch a stop in each state, shape (n, 6); batches extrapolate such states."""
     lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
     p = states[:, Y] - states[:, Z]
     return np.asarray((p >= upper_m) | (p <= -lower_m))
@@ -108,7 +108,7 @@ class Draw:
     clear: int = CLEAR
     """Number of starts, including the requested one, if all starts reach one motion or chaos lasts."""
     fewest: int = FEWEST
-    """Number of starts if neither of the other two cases applies."""
+    """Number of starts in all other cases."""
     most: int = MOST
     """Number of starts if different starts reach different motions."""
     seed: int = SEED
@@ -164,8 +164,8 @@ class SeveralStarts:
         """Rate at which chaos ends; None if no motion was irregular for long enough.
 
         A motion that is still irregular after the expected transient counts as chaotic from then until it
-        settles. If it has neither settled nor been proved chaotic, the time that detecting repetition takes
-        is subtracted, because its chaos may already have ended.
+        settles. If it has neither settled nor been proved chaotic, its chaos may already have ended;
+        therefore the time that detecting repetition takes is subtracted.
         """
         known = [
             (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
@@ -221,7 +221,7 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """Whether chaos lasts: no run has settled, and a long enough mean lifetime is proved."""
+        """Whether chaos lasts: no run has settled, and the mean lifetime is proved to be long enough."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
@@ -275,7 +275,7 @@ class SeveralStarts:
 SAME = 1e-3
 """Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Two chaotic motions differ if their difference exceeds this multiple of their 95 % scatter limit."""
+"""Chaotic motions count as different if their responses differ by more than this many scatter limits."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
@@ -339,7 +339,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Kinds of motion that may still turn into another motion if the run is continued."""
 FEWEST_DRAWS = 3
-"""Smallest number of starts on one motion from which the scatter of Response I is estimated."""
+"""Smallest number of starts that reach a motion from which its scatter of Response I is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion; None if unknown."""
@@ -421,7 +421,7 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the 95 % limit of the relative difference of responses between a run and a group's mean."""
+    """Return the 95 % limit of the relative difference between a run's responses and the group's mean."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
@@ -438,7 +438,7 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 ALONE = 0.5
-"""Part of the budget for integrating chaos further; runs from other starts use the rest."""
+"""Share of the budget for integrating chaos further; runs from other starts use the rest."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:

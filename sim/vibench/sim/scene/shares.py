@@ -27,12 +27,12 @@ def student_quantile(freedom: int, probability: float) -> float:
 
 
 def normal_quantile(tail: float) -> float:
-    """Return the standard normal value exceeded with the probability ``tail`` (at most 0.5)."""
+    """Return the value that a standard normal variable exceeds with probability ``tail`` (at most 0.5)."""
     return math.sqrt(2.0) * _root(math.erfc, 2.0 * tail, 30.0)
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson distribution whose count is below ``fewer_than`` with ``probability``."""
+    """Return the mean of a Poisson distribution with ``probability`` of a count below ``fewer_than``."""
 
     def cumulative(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -55,7 +55,7 @@ UNSURE = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """Share (of starts, for example) with the limits of its confidence interval."""
+    """Estimated share, such as a share of starts, with the limits of its confidence interval."""
 
     share: float
     low: float
@@ -99,7 +99,7 @@ class Count:
     """Number of trials with the outcome whose share is estimated."""
 
     trials: float
-    """Number of trials; fractional if trials that depend on each other count less."""
+    """Number of trials; not an integer if dependent trials count as less than one."""
     is_final: bool
     """Whether all trials have ended; otherwise unfinished trials may still have any outcome."""
 
@@ -107,9 +107,9 @@ class Count:
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     """Return the shares of several outcomes with simultaneous 95 % confidence intervals.
 
-    Two outcomes have the ordinary interval. For more outcomes each interval is widened so that all hold
-    jointly (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome of
-    the trials that have not ended.
+    With two outcomes the intervals are ordinary ones. With more outcomes each interval is widened so that all
+    hold jointly (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome
+    of the trials that have not ended.
     """
     trials = sum(each.trials for each in counts)
     pending = sum(each.trials for each in counts if not each.is_final)

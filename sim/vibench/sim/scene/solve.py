@@ -52,7 +52,7 @@ EXPONENT_PRECISION = 0.2, 0.01
 
 
 class Question(StrEnum):
-    """Extent of the results requested for a scene."""
+    """Set of results requested for a scene."""
 
     ANSWER = "answer"
     """Responses with errors and, with sensitive dependence on the start, motions from other starts."""
@@ -78,10 +78,10 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     """Solve a scene as planned, with error estimates.
 
     Each of the four responses has a relative error; ``error_estimate`` is the largest. An error is twice the
-    measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, that
-    run continues from the end until the transient has decayed; otherwise it begins at the start. If the two
-    runs separate, any repeated run is a new random sample. The error is then the difference that two samples
-    do not exceed in 95 % of cases.
+    measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, the
+    stricter run continues from the end until the transient has decayed; otherwise it begins at the start. If
+    the two runs separate, any repeated run is a new random sample. The error is then the difference that two
+    samples do not exceed in 95 % of cases.
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """
@@ -130,8 +130,8 @@ class SolvedScene:
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
     """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
-    The result of a scene does not depend on the other scenes. In chaos it is a different random sample from
-    that of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
+    The result of a scene does not depend on the other scenes. In chaos it is another random sample than the
+    result of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
     """
     found: list[SolvedScene] = []
     together: list[Scene] = []
@@ -431,7 +431,7 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 
 
 def _final_kind(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
-    """Return the kind of the motion; with an automatic duration, only proved lasting chaos is "chaotic"."""
+    """Return the motion's kind; with an automatic duration, only chaos proved to last is "chaotic"."""
     escape = None if ensemble is None else ensemble.escape
     match scene.duration:
         case FixedDuration() if escape is None or escape.escapes == 0:

@@ -26,12 +26,12 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the stricter run. It must be far below the error of collisions in closed form; that error is
+"""Tolerance of the stricter run. It must be far below the error of closed-form collisions, which is itself
 below a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
-"""Number of decay times (slowest mode) after which a repeating motion is compared with the stricter run."""
+"""Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Number of parts of a window that are compared with the whole; their leakage is this many times larger."""
+"""Number of parts of a window that are compared with it; a part's leakage is this many times larger."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
