@@ -46,11 +46,11 @@ SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 SLOWEST_RATIO = 0.9
 """Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 FIRST_LOOK = 16
-"""Number of drive periods before two runs are first compared; this number then doubles each time."""
+"""Number of drive periods before the first comparison of two runs; it doubles for each further one."""
 PARTED = 0.05
 """Difference [gaps], or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
-"""Number of decay times (slowest mode) after which a chaotic motion counts as stationary."""
+"""Decay times of the slowest mode after which a chaotic motion counts as stationary."""
 MEMBERS = 5
 """Number of additional starts if the window cannot show how much two random samples differ."""
 
@@ -120,8 +120,8 @@ def stated_errors(
 def _by_window(seen: SceneRun) -> Floats:
     """Estimate the relative errors due to the position of the window in time, shape (4,).
 
-    They are the largest differences from shorter windows at other positions. Early windows are included,
-    because a slowly settling motion may settle further.
+    They are the largest differences from the responses in shorter windows at other positions. Early windows
+    are included, because a slowly settling motion may settle further.
     """
     answer = seen.window.responses_m
     lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
@@ -135,7 +135,7 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return the relative rounding errors of responses; a line's absolute error equals that of the peak."""
+    """Return the relative rounding errors of responses; a line has the same absolute error as the peak."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
@@ -146,7 +146,7 @@ class _StrictRun:
     run: FollowedRun
     """Stricter run at the time when it separated from the original run, or at the window's end."""
     responses_m: Floats | None
-    """Responses in the window [m], shape (4,); None if the two runs separate before it."""
+    """Responses in the window [m], shape (4,); None if the two runs separate before the window."""
     is_together: bool
     """Whether the stricter run stayed together with the original run."""
 
@@ -156,7 +156,7 @@ def _more_starts(
 ) -> list[Floats]:
     """Return the responses of a few more starts in the same window, shape (4,) each; NaN if a run fails.
 
-    The stricter run is one of these, because all other runs share the step errors until they separate.
+    The stricter run is one of these starts, because all other runs share step errors until they separate.
     """
     pushed = pushes(begin.specimen, begin.drive, MEMBERS, SEED)
     runs = [begin.with_push(push) for push in pushed[1:]]
@@ -200,7 +200,7 @@ def settled_errors(
 
 
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
-    """Return the largest relative error of the responses that one drive period adds; NaN if a run fails."""
+    """Return the largest relative error that one drive period adds to the responses; NaN if a run fails."""
     cycle_s = 1.0 / run.drive.frequency_hz
     on = run.copy(accuracy.tolerance)
     seen, missed = [], []

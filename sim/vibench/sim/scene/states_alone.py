@@ -31,7 +31,7 @@ SLICE_S = 0.5
 PARTS = 4
 """Number of parts of a stretch in which growth is measured, to see if a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Time for which states are stored [decay times of the slowest mode]; settling takes ten at *standard*."""
+"""Time for which states are stored [decay times of the slowest mode]; at *standard*, settling takes ten."""
 
 
 class StatesAlone:
@@ -86,7 +86,7 @@ class StatesAlone:
 
     @property
     def wandered_until_s(self) -> float:
-        """Last time at which two successive periods differed [s]; the current time without repetition."""
+        """Last time at which two successive periods differed [s]; the current time if none repeats."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
@@ -110,7 +110,7 @@ class StatesAlone:
 
     @property
     def batch_periods(self) -> int:
-        """Drive periods that a batch may integrate next; 0 within a period, or at the end."""
+        """Number of drive periods that a batch may integrate next; 0 within a period or at the end."""
         run = self.run
         if self.is_over or run.periods is None or not run.cost_s < self.cost_s:
             return 0
@@ -146,7 +146,7 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
 
 
 WORTH_A_FIT_S = 3000.0
-"""Total simulated time of one specimen above which batches save more than their collision fit costs [s]."""
+"""Total simulated time of one specimen above which batches save more time than their collision fit [s]."""
 AUTOMATIC_S = 10.0
 """Assumed length of a run with an automatic duration, to compare batches with single runs [s]."""
 
@@ -154,14 +154,14 @@ AUTOMATIC_S = 10.0
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
     """Return whether batches are faster for this number of motions of one specimen.
 
-    The choice depends only on request and processor, not on measured times, so results are reproducible.
+    The decision depends on request and processor, not on measured times, so results are reproducible.
     """
     each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Largest time [s] and number of drive periods between two checks of a batch; storage limits both."""
+"""Largest time [s], and largest number of drive periods, between two checks of a batch; limit memory."""
 HELD_STATES, FULL = 1 << 20, 16
 """Largest number of states stored for a batch, and number of motions that fill the SIMD registers."""
 

@@ -2,7 +2,7 @@
 
 While collisions limit abs(p) to the gap, the fundamental of the stop force equals the force of a spring
 between m1 and m2 that reduces abs(p) to the gap. This is a first-order harmonic balance (as in Gong et al.
-2025, eq. 5) with rigid stops without loss. The stop force acts along p only, so the motion has a closed form:
+2025, eq. 5) with loss-free rigid stops. The stop force acts along p only, so the motion has a closed form:
 the sum of the motion without stops and the response to this force.
 """
 
@@ -28,7 +28,7 @@ class LinearMotion:
     per_volt: ComplexArray
     """Motion without contact, per volt at the amplifier's input, shape (n, 5)."""
     per_newton: ComplexArray
-    """Motion per newton of stop force, which acts on m1 and oppositely on m2, shape (n, 5)."""
+    """Motion per newton of stop force, which acts on m1 and in the opposite direction on m2, shape (n, 5)."""
 
     @cached_property
     def lever(self) -> ComplexArray:
@@ -125,9 +125,8 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
-    """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N].
-
-    Its stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.
+    """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N]. The
+    stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.
     """
     excess = np.maximum((np.abs(p) / gap_m) ** 2 - 1.0, 0.0)
     size = np.maximum(np.abs(receptance) ** 2, np.finfo(np.float64).tiny)

@@ -1,8 +1,8 @@
 """Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
 All results are means over a time step. They are exact, because the voltage is constant in a step and the
-integrals of base acceleration and m0 velocity are known at both ends. Such means do not alias impacts. They
-refer to the centre of the step, so that all channels agree in phase.
+integrals of base acceleration and m0 velocity are known at both ends. Impacts do not alias in such means.
+They refer to the centre of the step, so that all channels agree in phase.
 """
 
 import math
@@ -158,8 +158,8 @@ class LoadedShaker:
 
     Coil and table are solved exactly for a voltage and a force that are constant in a time step. The specimen
     is solved exactly between impacts; impacts are integrated within a step (native/cubic.hpp). The specimen's
-    force on the table is extrapolated and constant in a step. This causes a relative error (omega h)^2 / 12
-    in the resulting motion (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
+    force on the table is extrapolated and constant in a step. This causes a relative error of (omega h)^2 /
+    12 in the motion (docs/decisions/0006-virtual-rig.md). Use an object in one thread at a time.
     """
 
     def __init__(
@@ -252,7 +252,7 @@ class LoadedShaker:
         noise_v
             Voltage that is added at the amplifier's output [V], shape (steps,).
         end_rows
-            Number of steps, from the first, whose final states are stored.
+            Number of steps, counted from the first, whose final states are stored.
         block
             Number of steps between two counts of the contacts; 0 for no counts.
         """

@@ -22,7 +22,7 @@ Gain = Callable[[FloatArray], ComplexArray]
 """Function that returns a sensor's complex gain at frequencies [Hz], shape of its argument."""
 
 FINEST_STEP_HZ = 5e4
-"""Lowest step rate [Hz]; the specimen's force on the table then has a relative error of 5e-4 at 600 Hz."""
+"""Lowest rate of steps [Hz]; the specimen's force on the table has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
 """Ratio of the pass band's end to the sample rate; a cosine edge to half the sample rate follows."""
 _MARGIN = 2048
@@ -30,7 +30,7 @@ _MARGIN = 2048
 _PIECE = 1 << 15
 """Number of samples in a piece of the recording; each piece is filtered in one call."""
 _BLOCK_S = 0.02
-"""Length of the blocks after which impacts are counted [s]."""
+"""Length of the blocks at whose ends impacts are counted [s]."""
 
 
 def identity(frequency_hz: FloatArray) -> ComplexArray:
@@ -43,7 +43,7 @@ class DrivenTable:
     """Model of a test bench: amplifier, shaker, specimen and sensors."""
 
     amplifier: Amplifier
-    """Amplifier; the default one for a voltage measured at the coil."""
+    """Amplifier; use the default one for a voltage measured at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
@@ -121,9 +121,9 @@ def follow_voltage(
 
 
 class _Resampling:
-    """Resampling of a voltage to time steps, and of means over steps to samples after sensor and converter.
+    """Resampling of a voltage to time steps, and of step means to the samples after sensor and converter.
 
-    A mean over a step refers to a time half a step after the resampled voltage. The two shifts cancel.
+    Resampled voltages refer to the start of a step, means to its centre; both shifts cancel.
     """
 
     def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:
@@ -159,7 +159,7 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return factors for the lines of ``size`` samples: for conversion to steps, or back via a sensor."""
+        """Return factors for spectral lines of ``size`` samples: to time steps, or back through a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)

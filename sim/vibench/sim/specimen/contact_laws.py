@@ -25,7 +25,7 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Largest exponent; a 0.1 % change of p then changes the force by a factor of e, like a rigid wall."""
+"""Largest exponent; with it a 0.1 % change of p changes the force by a factor of e, like a rigid wall."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class LinearGap(Strict):
 
 
 def fit_linear_gap(contact_stiffness: float, indentation_m: float = PAPER_INDENTATION_M) -> LinearGap:
-    """Return linear stops with the force of a Hertz contact of k [N/m^1.5] at the given indentation."""
+    """Return linear stops with the same force as a Hertz contact of k [N/m^1.5] at the given indentation."""
     require_positive("Indentation of the fit", indentation_m, "m")
     return LinearGap(contact_stiffness * math.sqrt(indentation_m))
 
@@ -211,7 +211,7 @@ def fit_power_law(
     indentation_m: float = PAPER_INDENTATION_M,
     shares: Sequence[float] | None = None,
 ) -> PowerLaw:
-    """Return the power law with the force of a Hertz contact at p = gap + indentation, as in the paper.
+    """Return the power law whose force equals a Hertz contact's at p = gap + indentation, as in the paper.
 
     Raises ValueError when an argument is not allowed.
 
@@ -220,10 +220,10 @@ def fit_power_law(
     exponents
         Odd exponents in any order, such as (5,) or (3, 5, 7).
     contact_stiffness, gap_m, indentation_m
-        k_contact of the Hertz contact [N/m^1.5]; gap and indentation, where both forces are equal [m].
+        k_contact of the Hertz contact [N/m^1.5]; gap and indentation at which both forces are equal [m].
     shares
-        Share of each power in the force; the sum must be 1. The paper does not state the shares; the default
-        is equal shares.
+        Share of each power in the force; the shares must add up to 1. The paper does not state them; by
+        default they are equal.
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
@@ -259,7 +259,7 @@ def _parse_no_contact(detail: str, _reference: Reference) -> NoContact:
 
 
 def _parse_power_law(detail: str, reference: Reference) -> PowerLaw:
-    """Return the law for ``3+5+7`` (equal shares) or ``3@0.2+7@0.8``; an indentation may follow a colon."""
+    """Return the law for ``3+5+7`` (equal shares) or ``3@0.2+7@0.8``; ``:`` and an indentation may follow."""
     powers, _, indentation = detail.partition(":")
     terms = [term.partition("@") for term in powers.split("+")]
     try:

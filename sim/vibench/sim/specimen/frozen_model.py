@@ -80,7 +80,7 @@ def _check_of(schema: Any) -> Callable[[object], object] | None:
 
 
 def _with_checks(schema: Any) -> Any:
-    """Return the core schema; number fields accept only numbers, and lengths of lists are checked."""
+    """Return the core schema; it accepts only numbers in number fields, and checks the lengths of lists."""
     match schema:
         case {"type": "bool"}:
             return {**schema, "strict": True}
@@ -107,6 +107,6 @@ class FrozenModel(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the core schema of the model with the check of number types."""
+        """Return the core schema of the model, with the checks of its fields."""
         schema: CoreSchema = _with_checks(handler(source))
         return schema

@@ -88,7 +88,7 @@ PROPORTIONAL = 1e-12
 CRITICAL = 1e-12
 """Value of abs(1 - damping ratio^2) below which a mode counts as critically damped."""
 WIDEST = 1e10
-"""Ratio of the highest to the lowest natural frequency above which double precision loses the lowest mode."""
+"""Ratio of highest to lowest natural frequency above which double precision loses the lowest mode."""
 REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
 
 
@@ -210,12 +210,12 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
 
 @dataclass(frozen=True, eq=False)
 class BaseResponse:
-    """Response of x and p = y - z to the base U; each field has shape (n,); time factor exp(+i w t)."""
+    """Response of x and p = y - z to the base motion U, for exp(+i w t); each field has shape (n,)."""
 
     free_p: Complex
     """Ratio p / U of relative motion to base motion, without contact."""
     free_x: Complex
-    """Ratio x / U of m0 to base motion, without contact."""
+    """Ratio x / U of m0 motion to base motion, without contact."""
     stuck_x: Complex
     """Ratio x / U while m1 sticks to m2."""
     lever: Complex
@@ -223,7 +223,7 @@ class BaseResponse:
 
 
 def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
-    """Return the response of x and p to the base at frequencies of shape (n,), zero or positive [Hz]."""
+    """Return the response of x and p to the base motion at frequencies of shape (n,), not negative [Hz]."""
     free = base_transmissibility(specimen, frequency_hz)
     omega = angular_frequencies(frequency_hz)
     dynamic = (
@@ -243,7 +243,7 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
 # native engine computes this motion and finds the time at which the force would become tensile.
 
 PLACES = [X, Z, VX, VZ]
-"""Indices, within the state of six, of the four unknowns while m1 sticks to m2."""
+"""Indices, in the six-element state, of the four unknowns while m1 sticks to m2."""
 
 
 class BoundMotion(NamedTuple):

@@ -216,7 +216,7 @@ def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]
 
 
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Return the scales of a state, shape (6,): the smaller gap [m], and this gap times 2 pi f [m/s]."""
+    """Return the scales of a state, shape (6,): smaller gap [m] and, for velocities, gap times 2 pi f."""
     speed = 2.0 * np.pi * drive.frequency_hz
     return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
 

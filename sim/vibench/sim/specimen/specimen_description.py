@@ -1,6 +1,6 @@
-"""Description of a specimen: its parameters and their sources, as a file or as a table in another file.
+"""Description of a specimen, in its own file or as a table in another file: parameters and their sources.
 
-In a description no parameter has a default value. Instead a description may name another one (``model``, a
+No parameter of a description has a default value. Instead a description may name another one (``model``, a
 name or path) and state only the differences, as the specimen tables of rigs, studies and imports do.
 """
 
@@ -37,7 +37,7 @@ from .specimen import Gaps, Specimen, Triple
 from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
-"""Key for the name or path of the specimen whose values a table takes over."""
+"""Key for the name or path of the specimen from which a table takes its missing values."""
 FOLDER = "folder"
 """Key, in pydantic's validation context, for the folder to which paths in ``model`` are relative. Without a
 folder only names of vibench's specimens are allowed, so that a recording cannot open other files."""
@@ -46,7 +46,7 @@ SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
 """Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Maximum length of a chain of descriptions in which each names the next in ``model``."""
+"""Largest number of descriptions of which each names the next one in ``model``."""
 USUAL_SPECIMEN = "gong2025"
 """Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
@@ -107,7 +107,7 @@ ContactWord = Annotated[str, AfterValidator(_require_law)]
 
 
 def _infinity(value: object) -> object:
-    """Convert the word for an infinite gap to a number, because JSON has no infinite numbers."""
+    """Convert the word for an infinite gap to infinity, because JSON has no infinite numbers."""
     return math.inf if value in ("inf", "Infinity") else value
 
 
@@ -131,7 +131,7 @@ class SpecimenDescription(_DescribedModel):
     masses_kg: PositiveTriple
     """Masses m0, m1, m2 [kg]."""
     single_frequencies_hz: PositiveTriple | None = None
-    """f0, f1, f2 of each mass on its spring alone, k_i = m_i (2 pi f_i)^2; alternative to the stiffnesses."""
+    """Frequencies f_i of each mass on its spring alone, k_i = m_i (2 pi f_i)^2; replace the stiffnesses."""
     stiffnesses_n_per_m: PositiveTriple | None = None
     """Stiffnesses k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2) [N/m]."""
     damping_time_s: DampingTime | None = None
@@ -148,7 +148,7 @@ class SpecimenDescription(_DescribedModel):
     sources: dict[str, str] = Field(default={})
     """Source of each parameter, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
-    """Default keys and values of a table."""
+    """Keys and values that a table has by default."""
 
     def __hash__(self) -> int:
         # The dict of sources cannot be hashed; the JSON text contains all fields.
@@ -178,7 +178,7 @@ class SpecimenDescription(_DescribedModel):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Report a fault in the description of the two bodies instead of pydantic's "not a number"."""
+        """Report what is wrong with the two bodies of a contact instead of pydantic's "not a number"."""
         try:
             return handler(value)
         except ValidationError as error:
@@ -287,7 +287,7 @@ def usual_specimen() -> SpecimenTable:
 
 
 def load_specimen(specimen: str | Path) -> SpecimenDescription:
-    """Return the description of a specimen, by the name of one in vibench or the path of a TOML file.
+    """Return the description of a specimen, from its name in vibench or the path of a TOML file.
 
     Raises UnknownSpecimenError when there is no such file, or it does not describe a specimen.
     """
@@ -329,7 +329,7 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Return the table of a file without its format version; refuse any version but this one."""
+    """Return the table of a file without its format version; refuse any version except `VERSION`."""
     table = toml_table(path)
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:

@@ -35,7 +35,7 @@ class Stops(NamedTuple):
 
     @property
     def term(self) -> tuple[float, float]:
-        """Coefficient and exponent of the force's term with the highest power of d."""
+        """Coefficient and exponent of the term with the highest power of d in the force."""
         if self.contact_stiffness:
             return self.contact_stiffness, HERTZ_EXPONENT
         return self.linear_stiffness, 1.0

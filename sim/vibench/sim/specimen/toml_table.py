@@ -58,7 +58,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it selects the kind of this table",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""Messages in TOML's terms, by pydantic's error type; they replace pydantic's, which use Python's terms."""
+"""Messages in TOML's terms, by pydantic's error type; they replace those of pydantic in Python's terms."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:

@@ -67,7 +67,7 @@ class ClusterExecutor:
 
     @property
     def slots(self) -> int:
-        """Number of threads of all workers at the last query; 0 while the scheduler does not answer."""
+        """Total number of threads of the workers at the last query; 0 while the scheduler does not answer."""
         if not self._is_in_contact():
             return 0
         now_s = time.monotonic()
@@ -109,7 +109,7 @@ class ClusterExecutor:
         self._arrived.put((bundle, future))
 
     def _fetch(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
-        """Return the results of all finished futures, fetched together; nothing for lost results."""
+        """Return the results of all finished futures, fetched together; lost results are left out."""
         if not futures:
             return {}
         try:

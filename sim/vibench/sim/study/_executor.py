@@ -1,6 +1,6 @@
 """Interface between the queue and its workers, which are local threads or remote processes.
 
-Times of scenes exclude work that a process does only once: loading modules and computing tables.
+Computing times of scenes exclude what a process does only once: loading modules, computing tables.
 """
 
 import math
@@ -26,7 +26,7 @@ class Bundle:
     """Scenes that are sent to a worker together, because sending short scenes one by one is slow."""
 
     numbers: tuple[int, ...]
-    """Number of the study's point to which each scene belongs."""
+    """Index of the point of the study to which each scene belongs."""
     scenes: tuple[Scene, ...]
 
 
@@ -141,7 +141,7 @@ class ThreadExecutor:
         return empty_queue(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:
-        """Start no more scenes, not even of a started bundle; return replies when running scenes end."""
+        """Start no more scenes, not even in a running bundle; return the replies once running scenes end."""
         self._is_cancelled.set()
         self._pool.shutdown(wait=True, cancel_futures=True)
         return self.replies(0.0)

@@ -33,8 +33,8 @@ _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 def sole_writer(path: Path) -> OpenFile:
     """Open a file for writing, with a lock while it is open.
 
-    Readers keep the file open only briefly. Raises StudyError when another process keeps it open longer, as a
-    writer does, or when the file cannot be opened.
+    Readers keep the file open only briefly. Raises StudyError when another process keeps it open for longer,
+    as a writer does, or when the file cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -71,7 +71,7 @@ _COMPONENTS = {
 }
 """Coordinates of the additional axes of columns with several components, by name of the axis."""
 HEAD_BYTES = 2_000_000
-"""Upper bound on the size of everything in the file except the columns [bytes]."""
+"""Upper bound on the size of the file without its columns [bytes]."""
 
 
 def make_file(path: Path, plan: layout.GridPlan) -> None:
@@ -161,7 +161,7 @@ def _scale(file: h5py.File, axis: layout.StudyAxis) -> h5py.Dataset:
 
 
 def _column(file: h5py.File, column: layout.Column, shape: tuple[int, ...]) -> h5py.Dataset:
-    """Create a contiguous dataset for a column, in which all values are missing."""
+    """Create a contiguous dataset for a column, filled with missing values."""
     whole = shape if column.components == 1 else (*shape, column.components)
     kind = np.dtype(column.dtype)
     stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
@@ -191,7 +191,7 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Store that writes to the file of a study; as a context manager it closes the file.
+    """Store that writes to the file of a study; used as a context manager, it closes the file.
 
     Raises StudyError when the file is not that of a study, contains another study, or is being written by
     another run.
@@ -233,7 +233,7 @@ class FileStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Write the results of points: first their numbers, then the point states.
 
-        Raises StudyError after a write error; results written before are safe.
+        Raises StudyError after a write error; earlier results are safe.
         """
         for answer in answers:
             cells = {**answer.cells, layout.SESSION: self._session}
@@ -301,7 +301,7 @@ SHOWN = 60
 
 
 def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) -> str:
-    """Return text that says how a field differs between two plans; for lists, the first difference."""
+    """Describe how a field differs between two plans; for lists, describe the first difference."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, requested))
     match there, here:
         case [*some], [*others]:

@@ -1,4 +1,4 @@
-"""Content of the file of a study: points on a grid over named axes, columns with units, and the layout.
+"""Content of a study's file: points on a grid over named axes, columns with units, and file layout.
 
 ``docs/studies.md`` describes the file for users of h5py, xarray or MATLAB.
 """
@@ -21,10 +21,10 @@ from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
-"""Version of the file format; it increases if older readers would misread the file."""
+"""Version of the file format; increased whenever older readers would misread the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""HDF5 versions for which HDF5 writes superblock 0; all readers since HDF5 1.8 support it, also MATLAB."""
+"""HDF5 versions for which HDF5 writes superblock 0, which all readers since HDF5 1.8 support, also MATLAB."""
 
 STUDY = "study_json"
 STATE = "state"
@@ -210,7 +210,7 @@ class Grid:
 
     shape: tuple[int, ...]
     is_ordered: tuple[bool, ...]
-    """Whether neighbours along each axis are similar: True for frequencies, False for models."""
+    """Whether neighbours along each axis have similar results: True for frequencies, False for models."""
 
     @property
     def size(self) -> int:
@@ -256,7 +256,7 @@ class StudyAxis:
 
     @property
     def is_ordered(self) -> bool:
-        """Whether the values are numbers, so that neighbours along the axis are similar."""
+        """Whether the values are numbers, so that neighbours along the axis have similar results."""
         return bool(self.units)
 
 

@@ -70,14 +70,14 @@ class Costs:
 
 
 NOBODY = -1
-"""Number in place of a predecessor, for a point that continues no other point."""
+"""Predecessor of a point that continues no other point."""
 
 
 class PointScheduler:
     """Points still to be computed, in the order in which they are started.
 
-    The longest point is started first, which keeps all workers busy to the end. Its time includes all points
-    that continue it. Each point is taken once, unless it is put back.
+    The point with the longest computing time is started first, which keeps all workers busy to the end. Its
+    time includes all points that continue it. Each point is taken once, unless it is put back.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
@@ -115,7 +115,7 @@ class PointScheduler:
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Take the longest ready point, and more points up to ``worth_s`` [s] in total or ``most`` points."""
+        """Take the longest ready point, and more up to a total of ``worth_s`` [s] or ``most`` points."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -153,7 +153,7 @@ class PointScheduler:
         self._push(number)
 
     def put_back_alone(self, number: int) -> None:
-        """Return a point of a failed bundle to the queue, to be computed in a separate bundle."""
+        """Put a point of a failed bundle back into the queue, to be computed in a separate bundle."""
         self._is_alone[number] = True
         self.put_back(number)
 
@@ -171,7 +171,7 @@ class PointScheduler:
         heapq.heappush(self._queue, (-self._weight(number), number))
 
     def _pop(self) -> int | None:
-        """Return the longest ready point; drop entries that are done or have an outdated estimate."""
+        """Return the longest ready point; drop entries of done points and entries with outdated estimates."""
         while self._queue:
             weight, number = heapq.heappop(self._queue)
             if self._is_ready(number) and -weight == self._weight(number):
@@ -192,9 +192,9 @@ class PointScheduler:
 
 
 MOST_IN_BUNDLE = 64
-"""Largest number of points in a bundle; limits the results that are lost with a worker."""
+"""Largest number of points in a bundle; limits how many results are lost with a worker."""
 SHARE = 8
-"""Ratio of the remaining work per worker to the largest bundle; makes all workers end together."""
+"""Ratio of the remaining work per worker to the largest bundle, so that all workers end together."""
 QUEUED_PER_SLOT = 2
 """Number of bundles per worker: one runs and one waits, so that no worker is idle."""
 LOOK_S = 0.2
@@ -214,7 +214,7 @@ several neighbours."""
 
 
 class Points(ABC):
-    """Points of a plan: their scenes, which are created on demand, and which of them to compute."""
+    """Points of a plan: their scenes, created on demand, and the selection of the points to compute."""
 
     bundle_s: float
     """Largest planned computing time of a bundle [s]."""
@@ -278,7 +278,7 @@ class Points(ABC):
 
     @abstractmethod
     def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the points to compute next, given the results so far; called when all others are done."""
+        """Return the points to compute next, given the results so far; called when these are complete."""
 
     @abstractmethod
     def new_scene(self, number: int) -> Scene:

@@ -1,4 +1,4 @@
-"""Results of a study so far: point states, and arrays over its axes in which unknown numbers are NaN."""
+"""Results of a study so far: point states, and arrays over the axes, with NaN for unknown numbers."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -97,11 +97,11 @@ def _stored_columns(file: "h5py.File", plan: GridPlan) -> list[layout.Column]:
 
 
 CHECKED = 2000
-"""About the number of points whose digests are checked when a file is opened; this takes 0.05 s."""
+"""Approximate number of points whose digests are checked when a file is opened, in 0.05 s."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:
-    """Raise ValueError if a result is not possible, was changed, or belongs to another point or plan.
+    """Raise ValueError if a result is impossible, was changed, or belongs to another point or plan.
 
     Digests are checked for some of the points that this version has computed, evenly spread.
     """
@@ -322,7 +322,7 @@ class StudyResults(GridResults[Study]):
 
 
 def open_study(path: Path | str) -> StudyResults:
-    """Return the results in the file of a study, complete or still being computed.
+    """Return the results in the file of a study that is complete or still being computed.
 
     Raises StudyError if the file does not contain a study, or has another format version.
     """

@@ -25,8 +25,8 @@ from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
 from ._study import Study, scene_identity, start_name, study_solver
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Computing time of a bundle [s], long compared with the milliseconds of a transfer on a cluster; and
-computing time of a bundle that is solved in SIMD batches."""
+"""Computing time of a bundle, and of a bundle that is solved in SIMD batches [s]; both are long compared with
+the milliseconds of a transfer on a cluster."""
 
 
 class Expansion(Points):
@@ -84,7 +84,7 @@ def planned_work_s(study: Study) -> float:
 
 
 class ExistingStudy(StrEnum):
-    """What to do with a file that already exists."""
+    """Action if the file for the results already exists."""
 
     REFUSE = "refuse"
     RESUME = "resume"
@@ -176,9 +176,9 @@ def run_study(
 ) -> StudyEnd:
     """Compute every point that is missing in the store, the longest first.
 
-    Results do not depend on the executor or the order of computation. A point that continues another point
-    waits for it. An error in a scene is stored as the result of its point. Raises StudyError when the store
-    or the executor fails; results stored before are safe.
+    Results do not depend on the executor or the order of computation. A point that continues another one
+    waits for its result. An error in a scene is stored as the result of its point. Raises StudyError when the
+    store or the executor fails; results stored earlier are safe.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class PointAnswer:
 
 
 def empty_arrays(plan: layout.GridPlan) -> Arrays:
-    """Return arrays in which every value is missing, shape (points,) or (points, components)."""
+    """Return arrays filled with missing values, shape (points,) or (points, components)."""
     return {
         column.name: np.full(_shape(column, plan.grid), column.missing, column.dtype)
         for column in plan.columns
@@ -60,7 +60,7 @@ def _shape(column: layout.Column, grid: layout.Grid) -> tuple[int, ...]:
 
 
 def is_failed(state: NDArray[np.uint8] | layout.PointState) -> NDArray[np.bool_]:
-    """Return whether a scene raised an error or its run did not finish, shape of ``state``."""
+    """Return whether each scene raised an error or did not finish its run, shape of ``state``."""
     return np.isin(state, (layout.PointState.STOPPED, layout.PointState.FAILED))
 
 

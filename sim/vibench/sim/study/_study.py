@@ -39,7 +39,7 @@ from ._grid import (
 )
 
 LONGEST = 1_000_000
-"""Largest number of values of all ranges together; more values are probably a mistake."""
+"""Largest total number of values of all ranges; more values are probably a mistake."""
 WHOLE = 1e-9
 """Relative tolerance within which a range has a whole number of steps and so includes its stop."""
 
@@ -223,7 +223,7 @@ class Study(GridPlan):
     duration_s: PositiveFloat | Literal["auto"] = 30.0
     """Length of each run [s]; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
-    """Length of the window at the end of the run, from which responses are taken [s]."""
+    """Length of the window at the end of the run in which responses are evaluated [s]."""
     budget_s: NonNegativeFloat = BUDGET_S
     """Processor time per point [s] for integrating chaos further and, with sensitive dependence on the start,
     for other starts."""
@@ -334,7 +334,7 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
 
 
 def start_name(frequency_hz: float) -> str:
-    """Return the name of an initial state that is the final state at this frequency [Hz]."""
+    """Return the name of an initial state taken from the final state at this frequency [Hz]."""
     return f"end at {frequency_hz:g} Hz"
 
 
@@ -343,7 +343,7 @@ OTHER_STARTS = 8
 
 
 def study_solver(study: Study) -> Solver:
-    """Return the solver of a study: in batches, or one by one.
+    """Return the solver of a study, which solves points in batches or one by one.
 
     Batches need points that do not continue others, wide processor registers, and enough simulated time per
     specimen. Even then, points with non-Hertz stops or the accuracy *reference* are solved one by one.
@@ -356,10 +356,10 @@ def study_solver(study: Study) -> Solver:
 
 
 MOST_GAPS = 1000.0
-"""Ratio of base amplitude to gap above which a warning is given; with the paper's gap it is an amplitude of
-45 mm, more than the stroke of any shaker."""
+"""Ratio of base amplitude to gap above which a warning is given; for the paper's gap this means 45 mm, more
+than the stroke of any shaker."""
 WIDEST_M = 0.1
-"""Gap above which a warning is given [m], because a specimen on a shaker is hardly larger."""
+"""Gap above which a warning is given [m]; a whole specimen on a shaker is hardly larger."""
 _MICRO = 1e-6
 
 
