@@ -19,7 +19,7 @@ FIT_M = 1e-6
 """Indentation [m] at which continuous models are fitted to the stops: p = 46 um (section 2)."""
 STEEPEST_FALL = 10.0
 PUSH, PUSHED_HZ = 1e-6, 260.0
-"""Largest displacement of initial states except rest, relative to the gap; frequency for velocities [Hz]."""
+"""Largest displacement of initial states other than rest [gaps]; frequency that scales velocities [Hz]."""
 
 
 class ExponentsBy(StrEnum):
@@ -230,7 +230,7 @@ SCORED_S = (1e-5, 1.5e-5, 2e-5, 2.5e-5, 3e-5, 4e-5, 5e-5)
 ALIKE = change("zeta", 0.0165)
 BY_ODE45 = change("exponents", ExponentsBy.ODE45)
 DAMPINGS = (*(damping(value) for value in SCORED_S if value != FigureOptions.damping_time_s), ALIKE)
-"""Damping values to test for a claim that depends on damping, in this order."""
+"""Damping values to test, in this order, for a claim that depends on damping."""
 NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)

@@ -65,7 +65,7 @@ def at_most(name: str, unit: str, high: float) -> Expectation:
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Return one requirement per expected peak: its frequency must be correct within ``within_hz``."""
+    """Return one requirement per expected peak: its frequency must be met within ``within_hz``."""
     return tuple(about(f"{each:g} Hz peak", "Hz", each, within_hz) for each in wanted_hz)
 
 
@@ -87,7 +87,7 @@ class Claim:
     tried: tuple[Alternative, ...]
     """Alternatives to test in this order if the claim fails under the defaults."""
     remark: str
-    """Comment on a failed claim, without numbers, because the page gives the measured numbers."""
+    """Comment on a failed claim, without measured numbers, which the page states itself."""
     draws: int
     """Number of initial states: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool
@@ -128,7 +128,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """With the defaults, the claim holds only for some initial states, which chance determines."""
+    """With the defaults, the claim holds only for some initial states; which ones is a matter of chance."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
@@ -188,8 +188,8 @@ class Judgement:
 def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim with the options of one case, from every initial state.
 
-    With alternative options, a claim that fails for the motion from rest is not measured from other states.
-    Raises InvalidRequest when the number of measured values differs from the number of requirements.
+    With alternative options, a claim that fails for the motion from rest is not measured from other initial
+    states. Raises InvalidRequest when the number of measured values differs from the number of requirements.
     """
     draws = [_measure(claim, evidence, case)]
     if claim.is_met_by(draws[0]) or case.name == AS_CHOSEN:
@@ -208,7 +208,7 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim with a case's options; if it fails, try its alternatives until it holds with one."""
+    """Measure a claim with a case's options; if it fails, try alternatives until one makes it hold."""
     findings = [finding(claim, evidence, case)]
     for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

@@ -15,7 +15,7 @@ _HIGHER_M = 7e-6
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_S = 150.0, 350.0, 200.0
 """Sweep of the paper's section 5."""
 _SAMPLED_HZ = 8192.0
-"""Sample rate of the drive [Hz]: over 20 samples per cycle make the drive's spline accurate to 1e-4."""
+"""Sample rate of the drive [Hz]; with over 20 samples per cycle, the drive's spline is accurate to 1e-4."""
 _AMPLITUDE_AT_HZ = 266.0
 _SWEEP_COLLIDES_HZ = (240.0, 290.0)
 """Ends of the colliding region [Hz]; section 5 of the paper gives them as "about"."""

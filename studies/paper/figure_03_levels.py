@@ -42,7 +42,7 @@ def four_levels(
     results: StudyResults,
     background: Callable[["Axes", Responses, float], None],
 ) -> report.DrawnFigure:
-    """Draw Responses I and II at each amplitude in one panel; ``background`` draws behind the curves."""
+    """Draw Responses I and II in one panel per amplitude; ``background`` draws behind the curves."""
     tables: list[report.Table] = []
     with report.figure_style():
         figure = report.new_figure(6.6)

@@ -22,7 +22,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 
 
 def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
-    """Draw both models at four amplitudes; similar frequencies are shaded, rates are in the titles."""
+    """Draw both models at four amplitudes; shade frequencies of similar response; titles state the rates."""
     columns: dict[str, Reals] = {"frequency_hz": np.asarray(results.study.frequencies_hz)}
     with report.figure_style():
         figure = report.new_figure(8.6)

@@ -10,7 +10,7 @@ from vibench.sim import Accuracy, Observable, Specimen, SpecimenTable, usual_spe
 from vibench.sim.study import Study, StudyObservable, frequency_range
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
-"""The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
+"""The paper's four amplitudes, from weak to strong (section 3.1; Figs. 3, 6 and 7)."""
 LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
 """Largest damping time, more than fifteen times critical damping in the paper's third mode."""
@@ -54,7 +54,7 @@ class FigureOptions:
     window_s: float = 5.0
     """Observed window as in the paper: the last 5 s of 30 s from rest."""
     budget_s: float = 0.0
-    """Time for runs from further initial states: zero, because each point in the paper is from one run."""
+    """Time for runs from other initial states: zero, because each point in the paper is from one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:

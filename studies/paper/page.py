@@ -66,7 +66,7 @@ class Reproduction:
 def reproduction(
     sections: Mapping[str, tuple[Claim, ...]], evidence: Evidence, case: Case, on_step: Callable[[str], None]
 ) -> Reproduction:
-    """Measure every claim under a case, under its alternatives, at every damping and with every setting."""
+    """Measure every claim for a case, with its alternatives, at every damping and with every setting."""
     judgements = {}
     for heading, claims in sections.items():
         found = []
@@ -84,7 +84,7 @@ def reproduction(
 
 
 def _origin_text(evidence: Evidence) -> str:
-    """Return the number of computed points, the processor time and the version, from the study files."""
+    """Return the number of computed points, the processor time and vibench's version, as text."""
     studies = evidence.studies
     points = sum(each.study.grid.size for each in studies)
     minutes = sum(float(np.nansum(each.values("taken"))) for each in studies) / 60.0

@@ -38,7 +38,7 @@ def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
-    """Return the two highest peaks in ascending order [Hz], and the height ratio of third to second peak."""
+    """Return the two highest peaks in ascending order [Hz], and the ratio of third to second peak height."""
     found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
     if found.size < 2:
         return np.nan, np.nan, np.nan

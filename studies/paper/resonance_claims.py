@@ -136,7 +136,7 @@ def any_gap_ii(r: Reading) -> Values:
 
 
 def _worst_gap(r: Reading, what: str) -> Values:
-    """Return the largest deviation from the terminal resonances, and the largest third-to-second ratio."""
+    """Return the largest deviation from the terminal resonances, and the largest ratio of peaks 3 and 2."""
     furthest, following = 0.0, 0.0
     for study in clearance_studies(r.case):
         curve = responses(r.evidence.study(study))

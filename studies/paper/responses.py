@@ -84,7 +84,7 @@ def draw_responses(axes: "Axes", curve: Responses) -> None:
 
 
 def finish(axes: "Axes", frequency_hz: Reals, label: str) -> None:
-    """Set the axes of a response panel; `label_outer` of the panels of a grid removes the inner labels."""
+    """Set the axes of a response panel; in a grid of panels, `label_outer` then removes the inner labels."""
     report.frequency_axis(axes, float(max(frequency_hz[0], 10.0)), float(frequency_hz[-1]))
     report.magnitude_axis(axes)
     axes.set(ylabel=label, xlabel="drive frequency [Hz]")

@@ -30,7 +30,7 @@ FITTED = (
     NARROWER_FIT,
     CLOSEST,
 )
-"""Alternatives: choices in eq. 6, which need no further simulation, and the indentation of the fit."""
+"""Alternatives: other choices in eq. 6, which need no new simulation, and other indentations of the fit."""
 _OTHERS = ("n = 5", "n = 7", "n = 3+5+7")
 _fitted_claim = partial(costly_claim, tried=FITTED, draws=_DRAWS)
 """Decorator for a claim on the rates of several models."""

@@ -1,10 +1,10 @@
 """The paper's equations and explicit Runge-Kutta methods in textbook form, for comparison. SI units.
 
-The equations share nothing with the engine: they use no modes, no special unknowns in contact, and no
-polynomial instead of a sine. The methods do not detect contacts.
-Their steps cross a contact at arbitrary points; the error changes the energy of every impact, and the
-exponents in chaos. Dormand and Prince's pair is controlled like MATLAB's `ode45` (Shampine and Reichelt, The
-MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997), with its default tolerances.
+The equations share nothing with the engine: no modes, no special unknowns in contact, and no polynomial in
+place of a sine. The methods do not detect contacts. Their steps cross the start of a contact at arbitrary
+points; the error changes the energy of every impact and, in chaos, the exponents. Dormand and Prince's pair
+is controlled like MATLAB's `ode45` (Shampine and Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18,
+1997), with its default tolerances.
 """
 
 import math
@@ -105,10 +105,9 @@ def textbook_exponents(
 ) -> Reals:
     """Return the largest Lyapunov exponents of a method for motions from rest [1/s]; NaN after divergence.
 
-    An exponent is the mean divergence rate of a neighbour that takes the same steps, over ``duration_s``
-    after ``settle_s``. The resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per
-    drive; all motions are integrated together.
-    Raises ValueError for rigid stops.
+    An exponent is the mean divergence rate, over ``duration_s`` after ``settle_s``, of a neighbour that takes
+    the same steps. The resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per drive;
+    all motions are integrated together. Raises ValueError for rigid stops.
     """
     states = np.zeros((6, 2, len(drives)))
     states[:, 1] = APART_M / math.sqrt(6.0) * _scales(drives)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SPECTRUM_HZ = 600.0
 _RATE_HZ = 8192.0
 _STRETCHES = 600
-"""Number of outline sections, each with its smallest and largest value."""
+"""Number of sections of the outline, which shows the smallest and largest value of each."""
 _DECADES = 5.0
 
 
