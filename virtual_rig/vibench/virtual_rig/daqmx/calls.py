@@ -51,7 +51,7 @@ class DaqmxSystem:
         return self.tasks[name]
 
     def create(self, request: Any) -> Fields:
-        """Create a task; an empty name selects an unused one. Programs cannot share a task (-200089)."""
+        """Create a task; an empty name selects an unused name. Programs cannot share a task (-200089)."""
         name = request.session_name
         if name in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
@@ -110,7 +110,7 @@ def _add_outputs(task: Task, request: Any) -> None:
 def _new_channels(
     task: Task, request: Any, side: Callable[[Device], tuple[str, ...]]
 ) -> list[tuple[str, str, Device]]:
-    """Return name, physical name and device of the voltage channels that a request creates."""
+    """Return name, physical name and device of each voltage channel that a request creates."""
     if pick(request, "units") not in (0, VoltageUnits.VOLTS.value):
         raise unsupported_value("units", pick(request, "units"), "VOLTS")
     found = task.rig.catalogue.physical(request.physical_channel, side)
@@ -189,8 +189,8 @@ _BY_OTHERS = math.inf
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    Like a reader, a listener waits for rig time. With time on demand, it advances time, and continues when
-    the announced samples have been read.
+    Like a reader, a listener waits for rig time. With time on demand, it advances time itself, and goes on
+    once the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"

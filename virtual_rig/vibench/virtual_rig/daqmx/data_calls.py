@@ -39,7 +39,7 @@ class Reading:
 def read(task: Task, samples: int, deadline_s: float) -> Reading:
     """Read ``samples`` per channel, starting the task if necessary; a negative number reads all.
 
-    Raises DaqmxRefusal: -200279 for lost samples, -200278 past the end, -200284 if no sample came in time.
+    Raises DaqmxRefusal: -200279 for lost samples, -200278 past the end, -200284 if no sample arrived in time.
     """
     if not task.inputs:
         task.require_channels()
@@ -61,7 +61,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
 
 def default_samples(task: Task) -> int:
-    """Return how many samples "all" means: the total of a finite task, or the unread of a continuous one."""
+    """Return how many samples "all" means: all of a finite task, or the unread ones of a continuous task."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -79,7 +79,7 @@ def available(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples. Time on demand advances if no read followed the last query."""
+    """Return the number of unread samples. Time on demand advances if none was read since the last query."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -134,7 +134,7 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
 def _await(
     task: Task, stream: Stream, until_s: float, is_there: Callable[[], bool], deadline_s: float
 ) -> bool:
-    """Wait for samples of a run; return whether they came in time. A stopped run is refused (-88709)."""
+    """Wait for samples of a run; return whether they arrived in time. A stopped run is refused (-88709)."""
 
     def has_ended() -> bool:
         return stream.failure is not None or task.stream is not stream
@@ -211,7 +211,7 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 
 
 def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:
-    """Read samples, converted, in the caller's layout; "all" means as many as fit the caller's array."""
+    """Read and convert samples, in the caller's layout; "all" means as many as fit into its array."""
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan
@@ -284,7 +284,7 @@ def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
-    """Refuse to write to a task without outputs, or values whose number does not fit its channels."""
+    """Refuse writes to a task without outputs, and numbers of values that do not match its channels."""
     if not task.outputs:
         task.require_channels()
         raise task.refusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK)

@@ -32,19 +32,19 @@ _NI_9234_MAX_DIVISOR = 31
 _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
-"""Relative tolerance: a rate that is read back and set again must not change to the next possible rate."""
+"""Relative tolerance of rates: a rate read back and set again must not become the next possible rate."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Sample rates within an interval; with a clock, only the clock rate divided by an integer."""
+    """Sample rates within an interval; with a clock, only integer fractions of the clock rate."""
 
     minimum_hz: float
     maximum_hz: float
     clock_hz: float | None = None
 
     def next_up(self, rate_hz: float) -> float:
-        """Return the smallest possible rate not below ``rate_hz``, except for rounding errors."""
+        """Return the smallest possible rate that, but for rounding errors, is not below ``rate_hz``."""
         if self.clock_hz is None:
             return rate_hz
         return self.clock_hz / math.floor(self.clock_hz / rate_hz * (1 + _ROUNDING))
@@ -65,7 +65,7 @@ class AnalogInputs:
     terminals: tuple[TerminalConfiguration, ...]
     """Possible terminal configurations; the first is the default."""
     untimed: SampleTimingType
-    """Timing of a task without a sample clock; delta-sigma converters then use their default clock rate."""
+    """Timing of a task whose sample clock is not set; delta-sigma converters use their default clock rate."""
     detects_overloads: bool = False
     """Whether the device reports clipped inputs."""
     is_multiplexed: bool = False

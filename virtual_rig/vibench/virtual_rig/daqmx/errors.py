@@ -65,7 +65,7 @@ class Faults:
     def add(self, code: int | None, *calls: str) -> Callable[[], None]:
         """Make all calls of these names fail with a DAQmx code; return the function that ends the fault.
 
-        With None, no call at all is answered, as if the computer were off; afterwards, all tasks are lost.
+        With None, no call at all is answered, as if the computer were off, and all tasks are lost afterwards.
         """
         fault = (code, calls)
         self._in_force += (fault,)

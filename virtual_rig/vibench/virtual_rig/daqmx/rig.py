@@ -31,7 +31,7 @@ SLICE_S = 0.1
 """Longest rig time computed without releasing the lock [s]; also the interval of updates without a task."""
 
 YIELD_S = 1e-4
-"""Pause between two slices while the rig lags behind the clock [s]."""
+"""Pause between two slices of rig time while the rig lags behind the clock [s]."""
 
 
 class Rig:
@@ -67,7 +67,7 @@ class Rig:
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
-        """Advance in slices: feed the outputs, acquire the inputs, then advance all other parts.
+        """Advance in slices of rig time: feed the outputs, acquire the inputs, then advance all other parts.
 
         If the world fails, all running tasks and waiting calls end.
         """

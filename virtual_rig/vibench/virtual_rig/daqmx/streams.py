@@ -28,7 +28,7 @@ class Timing:
     requested_hz: float = 1000.0
     mode: AcquisitionType = AcquisitionType.FINITE
     samples: int = 1000
-    """Samples to acquire; for a continuous task, the smallest buffer size."""
+    """Number of samples to acquire; for a continuous task, the smallest buffer size."""
     clock_source: str = ""
     trigger_source: str = ""
     """Terminal of the start trigger; if empty, sampling begins when the task is started."""
@@ -75,7 +75,7 @@ class Stream:
         return self.began_s + count / self.rate_hz if count <= self.total else math.inf
 
     def due(self, now_s: float) -> int:
-        """Return how many samples a stream without end would have transferred by rig time ``now_s``."""
+        """Return how many samples an endless stream would have transferred by rig time ``now_s``."""
         return math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
 
 
@@ -140,7 +140,7 @@ class Acquisition(Stream):
 
 
 LEAD_S = 0.005
-"""Lead of the samples passed to the world [s]: long enough to avoid gaps, short enough for new data."""
+"""Lead of the samples passed to the world [s]: avoids gaps, but lets newly written samples act soon."""
 
 
 class OutputBuffer:
@@ -159,7 +159,7 @@ class OutputBuffer:
 
     @property
     def buffered(self) -> int:
-        """Number of samples in the buffer; a regeneration repeats them."""
+        """Number of samples in the buffer, which a regeneration repeats."""
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
@@ -192,7 +192,7 @@ class Generation(Stream):
         self._idle = device.idle
         self._memory = np.empty((len(self._outputs), 0))
         self._most_in_memory = 0 if self.repeats else device.memory
-        """Most samples in the device's memory; a repeated buffer is not transferred in advance."""
+        """Memory limit of the device in samples; a repeated buffer is not transferred in advance."""
         self._fetched = 0
         self._recent = np.empty((len(self._outputs), 0))
         self._is_open = True

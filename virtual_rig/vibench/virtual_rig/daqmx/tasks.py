@@ -163,7 +163,7 @@ class Task:
     def _awaited_terminal(self) -> str:
         """Terminal whose edge starts the task; empty if it begins without a trigger.
 
-        Another task's sample clock starts with that task, so it is treated like that task's trigger.
+        Another task's sample clock starts with that task, so its start trigger is awaited instead.
         """
         if self.timing.trigger_source:
             return self.timing.trigger_source
@@ -215,7 +215,7 @@ class Task:
     # --- states --------------------------------------------------------------------------
 
     def control(self, action: TaskMode) -> None:
-        """Carry out an action that changes the state."""
+        """Carry out an action that changes the state of the task."""
         match action:
             case TaskMode.TASK_RESERVE | TaskMode.TASK_COMMIT:
                 self._verify()

@@ -124,7 +124,7 @@ class AFG1022(ScpiInstrument):
             self._replace(channel, self._power_on)
 
     def trigger(self) -> None:
-        """Start a waiting burst or sweep (``*TRG``)."""
+        """Start a burst or sweep that waits for a trigger (``*TRG``)."""
         self._output.trigger(self._channels[SOUNDING_CHANNEL], self.now_s)
 
     def align_phases(self) -> None:
@@ -164,7 +164,7 @@ class AFG1022(ScpiInstrument):
 
 
 def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings with a mode switched on or off; in SCPI, each mode has its own switch."""
+    """Return settings with a run mode switched on or off; in SCPI, each mode has a separate switch."""
     if wanted:
         return replace(settings, mode=mode)
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings

@@ -191,7 +191,7 @@ class ChannelOutput(Timeline):
         self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a waiting burst or sweep; do nothing during a burst, or if none is waiting.
+        """Start a burst or sweep that waits for a trigger; do nothing during a burst, or if none is waiting.
 
         A gated burst never starts, because nothing is connected to the gate input.
         """
@@ -217,7 +217,7 @@ class ChannelOutput(Timeline):
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
     ) -> PhaseCourse:
-        """Return the phase course; the same object as before if it is unchanged."""
+        """Return the phase as a function of time; the same object as before if it is unchanged."""
         running = self.latest.course
         if _course_key(previous) == _course_key(settings):
             return running
@@ -225,7 +225,7 @@ class ChannelOutput(Timeline):
         return self._course(settings, (running.phase(own_s) + turn) % 1.0, own_s)
 
     def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
-        """Return the mode's phase as a function of time, with ``phase`` [cycles] at ``own_s``."""
+        """Return the run mode's phase as a function of time, with ``phase`` [cycles] at ``own_s``."""
         if settings.mode is RunMode.SWEEP:
             return self._sweep(settings, phase, own_s, math.inf)
         return SteadyPhase.with_phase(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
@@ -241,4 +241,4 @@ _course_key = attrgetter(
     "mode", "frequency_hz", "phase_deg",
     "sweep_start_hz", "sweep_stop_hz", "sweep_s", "sweep_hold_s", "sweep_spacing",
 )  # fmt: skip
-"""Settings that determine the phase course."""
+"""Settings that determine the phase as a function of time."""

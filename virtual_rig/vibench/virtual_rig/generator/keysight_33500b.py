@@ -60,7 +60,7 @@ class Keysight33500B(AFG1022):
 
 
 def _name(parameter: bytes) -> str:
-    """Return the name of a waveform in quotes, so that it differs from the names of other memories."""
+    """Return a waveform's name in quotes, which distinguish it from the names of other memories."""
     bare = scpi.text(parameter).strip('"').upper()
     return f'"{bare}"'
 

@@ -13,7 +13,7 @@ from .channel_output import ChannelSettings
 
 CHANNELS = 2
 _RANGE_ROUNDING = 1e-9
-"""Relative tolerance at range limits, for numbers in other units."""
+"""Relative tolerance at range limits, for numbers converted from other units."""
 
 Setter = Callable[..., None]
 """Function that executes a command, given instrument, channel and parameters."""
@@ -88,7 +88,7 @@ def setting(
     show: Callable[[Any], bytes] = lambda is_on: b"1" if is_on else b"0",
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the command of a setting that ``get`` reads and ``put`` replaces, on or off by default."""
+    """Return the command of a setting that ``get`` reads and ``put`` replaces; by default a switch."""
 
     def write(generator: Any, channel: int, parameter: bytes) -> None:
         generator.configure(channel, put(generator.settings(channel), parse(parameter)))
@@ -205,7 +205,7 @@ class ScpiInstrument:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; if the host's read times out, the host's next read receives this reply."""
+        """Delay the next reply; if a read by the host times out, the host's next read receives this reply."""
         with self.lock:
             self._next_delay_s = delay_s
 

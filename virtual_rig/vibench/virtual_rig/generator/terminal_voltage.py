@@ -22,7 +22,7 @@ Samples = NDArray[np.float64]
 MICROHERTZ = 1e-6
 UHZ_PER_HZ = 1_000_000
 CURVATURE_TOLERANCE_CYCLES = 1e-6
-"""Largest deviation of the phase from a straight line within a piece."""
+"""Largest deviation of the phase from a straight line within a piece of an interval [cycles]."""
 FINEST_SPLIT = 256
 """Maximum number of pieces per interval; only sweeps above about 1e9 Hz/s would need more."""
 NO_TIMES: Samples = np.empty(0)
@@ -38,7 +38,7 @@ class SteadyPhase:
 
     @classmethod
     def with_phase(cls, frequency_uhz: int, phase: float, time_s: float) -> "SteadyPhase":
-        """Return the course with a given phase at a given time."""
+        """Return the phase as a function of time that has a given phase at a given time."""
         since_zero = cls(frequency_uhz, 0.0).phase(time_s)
         return cls(frequency_uhz, (phase - since_zero) % 1.0)
 
@@ -240,7 +240,7 @@ NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Number of noise samples per block; each block has its own seed."""
 _CONTINUES = 1e-3
-"""Largest gap between the start of a block and the end of the block before, in intervals."""
+"""Largest gap between the end of one block and the start of the next, in intervals."""
 
 
 class Relay(Enum):
@@ -339,9 +339,9 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> tuple[float, float]:
-        """Return when a command sent at ``time_s`` acts, in rig time and in the generator's own time [s].
+        """Return the time of effect of a command sent at ``time_s``, in rig time and generator time [s].
 
-        A command does not act before the end of the rendered part.
+        A command does not take effect before the end of the rendered part.
         """
         at_s = max(time_s, self._end_s, self._since_s[-1])
         return at_s, float(self.terminal.own_time(np.asarray(at_s)))

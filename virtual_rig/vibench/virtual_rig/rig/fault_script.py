@@ -122,7 +122,7 @@ class RigFaults:
         return self._until(lambda: self._world.set_amplifier_gain_db(self._world.configured_gain_db))
 
     def widen_gaps(self, by_m: Annotated[float, Field(ge=-1e-4, le=1e-3)]) -> Heal:
-        """Move the specimen's stops away from m1, or closer to m1 [m], as by a loose screw or wear."""
+        """Move the specimen's stops away from m1, or closer to m1 [m], as a loose screw or wear would."""
         self._world.widen_gaps(by_m)
         return self._until(lambda: self._world.widen_gaps(0.0))
 
@@ -159,7 +159,7 @@ class RigFaults:
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
-        A fault of one call that reads samples applies to all such calls, because a driver may use any.
+        A fault of one call that reads samples applies to all of these calls, as a driver may use any.
         """
         calls = _READS if call in _READS else (call,)
         return self._until(self._daq.faults.add(code, *calls))
@@ -178,7 +178,7 @@ class RigFaults:
 
 
 class ScriptedFault(FrozenModel):
-    """Start and duration of a fault, and parameters of the method of `RigFaults` named by ``fault``."""
+    """Start and duration of a fault, and parameters of the method of `RigFaults` that ``fault`` names."""
 
     at_s: NonNegativeFloat
     """Start of the fault in rig time since switch-on [s]."""

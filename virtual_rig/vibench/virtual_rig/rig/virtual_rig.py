@@ -40,7 +40,7 @@ class DiskFaults(Enum):
     PLAYED = auto()
     """Allowed: this process records, so disk faults of the script act on its recording."""
     REFUSED = auto()
-    """Not allowed: another process records, and this one cannot cause faults on its disk."""
+    """Not allowed: another process records, and this process cannot cause faults of that process's disk."""
 
 
 class VirtualRig:

@@ -69,7 +69,7 @@ def usb_service(device: UsbTmcInstrument) -> grpc.GenericRpcHandler:
 
 
 def _handler(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
-    """Return a handler that puts the outcome of the transfer before the response."""
+    """Return a handler that puts the error number of the transfer before the response."""
 
     def serve(request: bytes, context: grpc.ServicerContext) -> bytes:
         try:
@@ -273,7 +273,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         return handle
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close a device and end its claim."""
+        """Close a device and release its interface."""
         self.release_interface(dev_handle, 0)
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:  # noqa: ARG002 - there is one
@@ -359,7 +359,7 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
     """Context that converts a device's OSError to the errors of PyUSB's own backends.
 
-    A generator function would not do: from Python 3.13 on, its frame would keep a failed session's handle.
+    A generator function would not work: from Python 3.13 on, its frame keeps the handle of a failed session.
     """
 
     def __enter__(self) -> None:

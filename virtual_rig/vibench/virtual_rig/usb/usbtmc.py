@@ -73,7 +73,7 @@ class _Flight:
     """Pending data between host and instrument; they are lost if the cable or the instrument fails."""
 
     message: bytes = b""
-    """Parts of an incomplete message that were received so far."""
+    """Parts received so far of an incomplete message."""
     reply: bytes = b""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""
@@ -139,8 +139,8 @@ class UsbTmcInstrument:
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Return the requested reply (3.3), or time out.
 
-        A read without a query queues -420 and times out. A reply that is later than the timeout stays
-        pending, with its delay reduced by the timeout.
+        A read without a query queues -420 and times out. A reply that comes after the timeout stays pending,
+        with its delay reduced by the timeout.
         """
         with self._lock:
             self._check_cable()

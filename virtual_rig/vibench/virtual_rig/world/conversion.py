@@ -23,7 +23,7 @@ GROUP_DELAY_SAMPLES = 40
 """Common delay of all channels, in output samples: typical of a delta-sigma converter."""
 
 _HALF_WIDTH_SAMPLES = 32
-"""Half width of the filter: pass band up to 0.45, and -100 dB from 0.55 of the sample rate on."""
+"""Half width of the filter: pass band up to 0.45 of the sample rate, -100 dB from 0.55 of it on."""
 _STOP_BAND_DB = 100.0
 _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
 """Kaiser 1974, as in Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
@@ -96,7 +96,7 @@ def _half_width_steps(ratio: float) -> int:
 
 
 def _weights(ratio: float, fractions: FloatArray) -> FloatArray:
-    """Return weights, oldest first, one row for each delay of a sample after a grid point [steps].
+    """Return weights, oldest first, one row for each delay of a sample relative to a grid point [steps].
 
     All rows are computed at once, because a run waits while a conversion starts.
     """
@@ -128,7 +128,7 @@ AC_CUT_HZ = 0.5
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
-"""Output resistance of generator, divider and decoder [ohm]; excitation currents cause a voltage on it."""
+"""Output resistance of generator, divider and decoder [ohm]; excitation currents cause a voltage drop."""
 COMPLIANCE_V = 19.0
 """Voltage of an open input with excitation [V]."""
 OVER_RANGE = 1.02
@@ -203,10 +203,10 @@ class ConverterInput:
         noise_v: float,
         noise: NoiseStream,
     ) -> None:
-        """Begin at a step of the world, after the steps whose signals are in ``history``.
+        """Begin at a step of the world; ``history`` contains the signals of the preceding steps.
 
-        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay that belongs to
-        the present cable.
+        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay of the present
+        cable, even if the cable is replaced.
         """
         self.has_clipped = False
         self._stage = stage
@@ -314,4 +314,4 @@ class Conversion:
 
 
 _ROUNDING = 1e-6
-"""Tolerance in steps, far above rounding errors and far below any relevant length."""
+"""Tolerance of times in steps, far above rounding errors and far below any relevant time."""

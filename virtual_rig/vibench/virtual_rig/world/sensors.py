@@ -102,7 +102,7 @@ class RandomDropouts:
 
 
 _FIT_BAND = 0.2
-"""Upper end of the fit, relative to the grid's rate: the pass band of a converter at half that rate."""
+"""Upper end of the fit [grid rates]: the pass band of a converter that samples at half the grid's rate."""
 _FIT_FLOOR = 1e-2
 """Lower end of the fit; below this, the exact gain at zero frequency determines the gain."""
 _FIT_POINTS = 64
@@ -195,8 +195,8 @@ class SensorParts:
 class MotionSensor:
     """A sensor in front of an input: vibrometer, accelerometer, displacement probe or force cell.
 
-    The order of the effects: bandwidth or resonance, white noise, drop-outs, conversion to volts, clipping at
-    full scale. The converter's filter applies the rest of the sensor's delay (``delay_steps``).
+    The effects occur in this order: bandwidth or resonance, white noise, drop-outs, conversion to volts,
+    clipping at full scale. The converter's filter applies the rest of the sensor's delay (``delay_steps``).
     """
 
     def __init__(
@@ -225,7 +225,7 @@ class MotionSensor:
         self._demanded: list[Disturbance] = []
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """Output a level instead of the motion for some steps: a drop-out or an over-range on demand."""
+        """Output a constant level for some steps instead of the motion: drop-out or over-range on demand."""
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:

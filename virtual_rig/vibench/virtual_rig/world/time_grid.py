@@ -23,8 +23,9 @@ class TimeGrid:
     Physical time differs by the clock's error, and the equations of motion use the physical step.
 
     The usual grid has twice the highest usual sample rate. Every rate of an NI 9234 is an integer fraction of
-    it, and the transition band of its anti-alias filter fits below the Nyquist frequency. A step (9.8 us) is
-    short compared with the specimen's shortest period (2 ms). Shorter contacts are resolved within a step.
+    this rate, and the transition band of its anti-alias filter fits below the Nyquist frequency. A step (9.8
+    us) is short compared with the specimen's shortest period (2 ms). Shorter contacts are resolved within a
+    step.
     """
 
     rate_hz: float = USUAL_GRID_RATE_HZ
@@ -35,7 +36,7 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """Return the physical length of a step, for a converter clock that is fast by this error [s]."""
+        """Return the physical length of a step, for a converter clock that runs fast by this error [s]."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:

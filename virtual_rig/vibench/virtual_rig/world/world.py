@@ -52,7 +52,7 @@ class AnalogueOutput:
         """Start of the first queued sample in steps, including fractions."""
 
     def queue(self, volts: FloatArray, sample_rate_hz: float, now_step: int) -> None:
-        """Append samples, which start now if no other sample is left to play.
+        """Append samples, which start now if no other samples are waiting to be played.
 
         If the rate differs, samples that are still to be played also change to the new rate.
         """
@@ -90,7 +90,7 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""Tolerance for samples that end exactly at a step [samples]."""
+"""Tolerance for samples that end exactly at the end of a step [samples]."""
 
 
 LOWEST_RATE_HZ = 500.0
@@ -148,7 +148,7 @@ class World:
         specimen: Specimen | None = None,
         loop: ClosedLoop | None = None,
     ) -> None:
-        """Create a world; ``specimen`` replaces the rig's; ``loop`` is a controller besides the generator."""
+        """Create a world; ``specimen`` replaces the rig's specimen; ``loop`` is an additional controller."""
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
@@ -364,7 +364,7 @@ class World:
             self._truth.append(motion.ends)
 
     def _means(self, role: Role, ends: FloatArray) -> FloatArray:
-        """Return a sensor's quantity as means over steps, from the states at their ends, shape (steps,)."""
+        """Return a sensor's quantity as means over steps, from the states at step ends, shape (steps,)."""
         h, column = self.plant.step_s, dict(zip(MOTION_COLUMNS, ends.T, strict=True))
         place, velocity = (column[name] for name in _STATES[role.place])
         match role.quantity:
@@ -390,7 +390,7 @@ _STATES = {
     "m1": ("y", "vy"),
     "m2": ("z", "vz"),
 }
-"""Columns of displacement and velocity of the motion, for each place of a sensor."""
+"""Columns of the motion, displacement and velocity, for each place of a sensor."""
 
 
 def _sensors_of(rig: Rig, virtual: VirtualConfig, grid: TimeGrid) -> Iterator[tuple[Role, MotionSensor]]:
