@@ -5,7 +5,7 @@
 // takes the next motion of the batch. Other lanes can delay a motion, but never change its results.
 //
 // Observed motions: lines need only the moments of each collision's force. New peaks are rare, and bounds
-// exclude almost all steps and collisions. The rest are observed alone, as in observe.hpp.
+// exclude almost all steps and collisions. The others are observed one by one, as in observe.hpp.
 #pragma once
 #include "collision_fit.hpp"
 #include "observe.hpp"
@@ -21,12 +21,12 @@ constexpr int SHORT = 6, LONG = 10;       // number of sine and cosine terms for
 constexpr int WAITING = 1;                // a march ends when at most this many lanes are clear of the stops
 constexpr int TOUCH_CORRECTIONS = 3;      // number of Newton steps to a touch from a second-order guess
 constexpr int ROOT_CORRECTIONS = 3;       // corrections of the fifth root from a guess with a few % error
-constexpr int HIGHEST = 8;                // order of the highest derivative of p at a touch
+constexpr int HIGHEST = 8;                // order of the highest derivative of p that is used at a touch
 constexpr double LONGEST_PART = 0.25;     // longest collision / drive period, so that LONG terms suffice
 // Bound of the largest depth of a collision, in its units: a quadratic function of the acceleration at its
 // middle, plus a part proportional to the derivative of this acceleration. It is at most 0.7 % too large.
 constexpr double DEEPEST[3] = {1.005, 0.796, 0.16}, DEEPER_BY_CHANGE = -0.728;
-constexpr double SPARE = 2.0;             // factor on a bound of x: the force of a stop bends x a little
+constexpr double SPARE = 2.0;             // factor on a bound of x, because a stop's force bends x a little
 constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
@@ -127,7 +127,7 @@ class BatchRun {
   struct Limits {
     Lanes x, p;  // a step has no new peak if |x| and |p| are below these limits at both ends
   };
-  Lanes peak_x = {}, peak_p = {};            // peaks so far; infinite if no larger one is to be found
+  Lanes peak_x = {}, peak_p = {};            // peaks so far; infinite if no larger one need be found
   Lanes bound_x = {};                        // bound of |d2x/dt2| until the next touch
   Limits of_step = {}, of_four = {};
   LanePhasor impulse = {};                   // integral of the stops' force times exp(-i omega t) [N s]
@@ -566,7 +566,7 @@ class BatchRun {
   }
 
   // Computes the collisions of lanes that touch a stop. Returns the lanes outside the polynomials' range.
-  // Lanes in `last` end at their next due state; they are also returned if it is due during the collision.
+  // Lanes in `last` end at their next due state; they are also returned if that state is due in a collision.
   unsigned collide(unsigned lanes, unsigned last) {
     Lanes approach = 0.0;
     for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, term[j], rate[j]);

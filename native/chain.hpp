@@ -9,7 +9,7 @@
 namespace vibench {
 
 constexpr int WINDOW_MOMENTS = 9;           // number of M_k; the next is below 7e-10 of the first at 0.4 rad
-constexpr int BLOCK = 8;             // cells in parallel; in a window a force reaches fewer cells per side
+constexpr int BLOCK = 8;             // cells in parallel; a force reaches fewer cells per side in a window
 constexpr int NUMBERS = 3;           // displacements of a cell, at indices P, AT_X, AT_Z; their rates follow
 constexpr int PIECE_TERMS = 8;
 constexpr double LONGEST_WINDOW = 0.5;  // limit of fastest rate times length, so that AHEAD terms suffice [rad]
@@ -20,8 +20,8 @@ constexpr int MOST_STRETCHES = 100000;  // largest number of flights, contacts a
 // one for each CELLS_AS_ONE cells of the chain, is at most MOST_CUT. Otherwise contact steps cost less.
 constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
 constexpr double SOON = 1e-3;        // a touch in this first fraction of a window does not cut it
-constexpr double HAIR = 1e-12;       // a contact that begins in this last part continues in the next window
-constexpr double ROUNDED_PIECE = 1e-9;  // a smaller remaining part of a piece of the drive is rounding error
+constexpr double HAIR = 1e-12;       // a contact beginning in this last part continues in the next window
+constexpr double ROUNDED_PIECE = 1e-9;  // below this, the rest of a piece of the drive is rounding error
 // Constants for steps under a power law, whose windows are short; see power_law.hpp.
 constexpr double FINER_FIT = 0.01, CLOSE_PLACE = 1e-3, CLOSEST_PLACE = 1e-15, CELL_FADING = 0.999;
 constexpr double LONGER_STEP = 1.4142135623730951, SHORTER_STEP = 0.5;
@@ -681,7 +681,7 @@ class ChainRun {
     begin_contact(c.contact, motion, side, step_tolerance(), t);
   }
 
-  // Adds a force that ended `ago` seconds before `cross` ends; moment(k) is its integral with (1 - s)^k.
+  // Adds a force that ended `ago` seconds before `cross` ends; moment(k) is its integral times (1 - s)^k.
   template <class Moment>
   void add_impulse(CellMotion &c, double side, double length, double ago, int count, const Moment &moment) const {
     double added[WINDOW_MOMENTS] = {}, factor = side * length;

@@ -16,8 +16,8 @@ constexpr double LONGEST = 3.5;         // duration at the HARDEST press, in uni
 constexpr double LONGEST_COLLISION = 0.4;  // limit of fastest rate times duration, for the series [rad]
 constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed, from m v^2 / 2 = 2 k d^(5/2) / 5
 constexpr double LEAST_TOLERANCE = 1e-7;  // sixteen points are not accurate enough for stricter tolerances
-constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
-constexpr double LAG = 3e-6;  // the slow terms of the force are recomputed if depths change by more
+constexpr double CLOSE = 0.1;  // corrections end when changes of depths are below this part of the tolerance
+constexpr double LAG = 3e-6;  // the force's slow terms are recomputed if depths change by more than this
 
 // One collision. Coordinates are mirrored so that p is positive at either stop.
 template <class T> struct Collision {

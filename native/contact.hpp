@@ -53,7 +53,7 @@ INLINE double step_tolerance(double tolerance, const Specimen &s) {
 
 INLINE double step_scale(double tolerance) { return eighth_root(tolerance / STANDARD_TOLERANCE); }
 
-// Returns the longest accurate step, divided by the collision's time scale; `depth` is w / its largest value.
+// Returns the longest accurate step, divided by the collision's time scale; `depth` is w / its maximum.
 // Steps must be half as long at the turning point, which the last error estimate cannot predict. The values
 // are from Hertz collisions, which are alike at all speeds. They are slightly short for linear stops.
 INLINE double foreseen_step(double depth, double rate) {
@@ -61,8 +61,8 @@ INLINE double foreseen_step(double depth, double rate) {
   return depth > 0.93 ? 0.48 : depth > 0.65 ? 0.6 : 0.9;
 }
 
-// Starts a contact from a flight. The first step resolves the faster of: the elastic collision (a half-wave
-// in s about 5.1 w_max / v long), and a slow contact pressed with the acceleration a (w'' = -(a / 2) w).
+// Starts a contact from a flight. The first step resolves the faster of two motions: the elastic collision (a
+// half-wave in s about 5.1 w_max / v long) and a slow contact under the acceleration a (w'' = -(a / 2) w).
 template <class T>
 inline void begin_contact(Contact<T> &c, const T *motion, double side, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
@@ -245,7 +245,7 @@ inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &lim
     steps.rates(point, steps.stages[0]);
     step *= factor;
     double depth = value_of(point[W]) / c.root_scale;
-    // The prediction of the step is valid only up to about the predicted largest depth.
+    // The predicted step length is valid only up to about the predicted largest depth.
     if (depth < 1.05) step = smaller(step, longest * foreseen_step(depth, value_of(point[R])));
   }
   c.w = point[W], c.r = point[R], c.step = step;

@@ -11,7 +11,7 @@ constexpr int MOST_PHASES = 100000;  // largest number of flights and contacts i
 constexpr double ALMOST = 1.0 - 1e-12;  // tolerance for the rounding error of an interval's length
 constexpr int64_t WHOLE_PIECE = int64_t(1) << (LEVELS - 1);  // length of a piece in steps of the last level
 constexpr int PIECE_ORDER = 16;  // number of series terms over a piece under a power law
-constexpr double TRY_TWICE = 5e-4;  // ratio of misfit to allowed misfit below which the next step is doubled
+constexpr double TRY_TWICE = 5e-4;  // a misfit below this part of the allowed misfit doubles the next step
 
 // ---- The base
 

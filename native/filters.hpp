@@ -83,7 +83,7 @@ INLINE int64_t filter_samples(MotionFilter &f, int size) {
     const double *of_m0 = covariance + VX * size, *of_base = covariance + BASE_VELOCITY * size;
     double variance =
         of_m0[VX] + 2.0 * of_m0[BASE_VELOCITY] + of_base[BASE_VELOCITY] + f.velocity_variance;
-    // A sample is not used if m1 is in contact or the velocity was not measured.
+    // A sample is not used if m1 is in contact or if the velocity was not measured.
     bool is_used = kind != IN_CONTACT && is_finite(innovation);
     if (const TrackRecord &kept = f.record; kept.states.size > 0) {
       __builtin_memcpy(kept.states.at + k * TRACKED, state, sizeof moved);

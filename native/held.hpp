@@ -7,10 +7,10 @@
 
 namespace vibench {
 
-constexpr double RESOLVED = 4.0;       // a hop lower than this multiple of the closed gap counts as rest
-constexpr double LARGEST_PART = 1e-3;  // largest closed gap, as a part of the distance between the stops
-constexpr double SHORTEST_PART = 1e-3;  // shortest departure, as a part of a grid step: the run advances, and
-                                        // m1 cannot enter the stop by more than rounding
+constexpr double RESOLVED = 4.0;       // a hop below this multiple of the largest closed gap counts as rest
+constexpr double LARGEST_PART = 1e-3;  // largest gap that counts as closed, relative to the stops' distance
+constexpr double SHORTEST_PART = 1e-3;  // shortest departure, as a part of a grid step: the run must advance,
+                                        // but m1 must not enter the stop by more than rounding
 constexpr double NEARLY = 0.99;         // factor on the shortest time to the other stop: a margin for rounding
 
 // Returns the largest distance at which m1 counts as touching a stop [m]; `reach` is the size of p's terms.

@@ -67,7 +67,7 @@ template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
 }
 
 constexpr int64_t MOST_STEPS = 2000000000;  // largest number of grid steps of flight in a run
-constexpr int64_t RESOLVED_STEP = 50;       // computing time of a contact step, in grid steps
+constexpr int64_t RESOLVED_STEP = 50;       // computing time of a contact step, in units of a grid step
 
 // Returns the number of grid steps of a flight; MOST_STEPS if its length or its grid is not finite.
 INLINE int64_t steps_of(double length, double grid) {

@@ -147,7 +147,7 @@ struct Observer {
     if (t.specimen.law == SPRINGS)
       record.peak_p = rests + peak_of(record.peak_p - rests, t.held.path, first, clock, length, t.held, t);
     if (!wants_lines()) return;
-    double push = t.specimen.law == SPRINGS ? t.specimen.linear_stiffness : t.pair;  // force per pull
+    double push = t.specimen.law == SPRINGS ? t.specimen.linear_stiffness : t.pair;  // force per unit pull
     Phasor begun = conjugate(first[t.held.modes]), ended = conjugate(last[t.held.modes]);
     Phasor at_rest = integral({0.0, -t.omega}, length, begun, ended);
     impulse = impulse + push * (line_of(t.pulls, first, last, length, t.held) - (side * t.let_go * gap) * at_rest);

@@ -22,9 +22,9 @@ constexpr double TRY_LONGER = 0.015;  // below this part of the allowed misfit, 
 constexpr double FAR_TOO_LONG = 20.0;  // above this multiple of the allowed misfit, the step is halved
 constexpr double WALL_TURN = 5.0;  // longest step times the rate of the stiffest spring [rad]
 constexpr double FADING = 0.98;    // decay factor per step of the recorded sizes of a motion
-constexpr double SMALLEST_PART = 1e-3;  // every displacement counts as at least this part of the largest
+constexpr double SMALLEST_PART = 1e-3;  // each displacement counts as at least this part of the largest one
 constexpr double NOTHING_MOVES = 1e-150;
-constexpr double FINEST_FIT = 1e-10;  // smallest tolerance; a finer fit to a steep wall is below rounding
+constexpr double FINEST_FIT = 1e-10;  // smallest tolerance; a finer fit to a steep wall is lost in rounding
 
 INLINE double fit_tolerance(double tolerance, const Specimen &s) {
   return larger(step_tolerance(tolerance, s), smaller(tolerance, FINEST_FIT));
@@ -84,7 +84,7 @@ INLINE PowerForce power_force(const PowerTerms &law) {
 
 // ---- Coefficients of a step of given length
 
-// One coordinate at the points, as response to a unit of each coordinate at the start or of F at a point.
+// One coordinate at the points, in response to a unit of each coordinate at the start, or of F at a point.
 struct AtPoints {
   double free[WIDE][GAUSS], gain[GAUSS][GAUSS];
 };

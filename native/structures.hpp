@@ -67,7 +67,7 @@ STRUCTURE(LinearMotion,
 // Motion of m1 on a rigid or linear stop: a linear motion about another rest position.
 STRUCTURE(HeldMotion,
   LinearMotion motion;
-  Phasor pulls[7];             // per unit phasor: quantity that keeps m1 on the stop; the last is the drive's
+  Phasor pulls[7];             // quantity that keeps m1 on the stop, per unit phasor of modes and drive
   double let_go;               // constant part of this quantity, divided by the gap
   double rests;                // constant part of |p|, divided by the gap
 )
@@ -143,7 +143,7 @@ STRUCTURE(State,
   double side;                 // +1 or -1 while m1 is on the stop at positive or negative p; 0 in flight
   double root;                 // w, the square root of the penetration [m^0.5]
   double rate;                 // r = d|p|/dt [m/s]
-  double step;                 // length of the next step in s, where dt = w ds [s/m^0.5]
+  double step;                 // length of the next step in the variable s, where dt = w ds [s/m^0.5]
   double root_scale;           // expected largest w [m^0.5]
   double rate_scale;           // expected largest r [m/s]
   double pace;                 // expected largest w divided by expected largest r [s/m^0.5]
@@ -187,7 +187,7 @@ STRUCTURE(Tangent,
   double growth[6];            // logarithm of the factor removed from each row
 )
 
-// Growth of the tangent vectors per interval. They are made orthonormal in a metric at equal time steps.
+// Growth of the tangent vectors per interval. They are made orthonormal in a metric at regular intervals.
 STRUCTURE(Readings,
   double interval;             // length of an interval [s]; reading k is taken at time (k + 1) interval
   int64_t parts;               // parts of an interval; vectors are made orthonormal after each part
@@ -195,7 +195,7 @@ STRUCTURE(Readings,
   double *growth;              // [room][changes]: logarithm of the growth factor of each vector
   int64_t *impacts;            // [room]: number of impacts in each interval
   double *motions;             // [room][6]: x, y, z, vx, vy, vz at the end of each interval
-  int64_t room, made;          // number of readings that fit, and number of readings taken
+  int64_t room, made;          // number of readings that fit, and number taken so far
 )
 
 // ---- Batches: motions of one specimen, eight at a time
@@ -250,7 +250,7 @@ STRUCTURE(Decimation,
   Numbers table;               // [rows][reach]: weights for fractions 0 to 1 of a step, or only one row
   double ratio;                // steps per sample
   double begin;                // time of the sample before sample 0 [steps]
-  int64_t origin;              // index of the oldest mean of a sample, minus the whole steps of its time
+  int64_t origin;              // index of the oldest mean of a sample, minus the sample's time in whole steps
   int64_t first;               // number of the first sample
   Numbers samples;             // result
 )
@@ -288,13 +288,13 @@ STRUCTURE(Controller,
   double omega;                // increase of the phase per sample [rad]
   double omega_from, omega_to;  // omega before and after a glide
   double glide, glide_step;    // progress of the glide from 0 to 1, and its increase per sample
-  double fade, fade_step;      // factor on the output, which falls from 1 to 0; its decrease per sample
+  double fade, fade_step;      // factor on the output, which falls from 1 to 0, and its decrease per sample
   double limit;                // largest output [V]
-  double at_limit, most_at_limit;  // number of consecutive samples at the output limit, and its maximum
-  double unheard, most_unheard;  // number of samples since the host's last request, and its maximum
-  double block;                // length of a block, which gives Fourier coefficients [periods]
+  double at_limit, most_at_limit;  // number of consecutive samples at the output limit, and its limit
+  double unheard, most_unheard;  // number of samples since the host's last request, and its limit
+  double block;                // length of a block, from which Fourier coefficients follow [periods]
   double turns;                // periods since the start of the block
-  double weight;               // sum of the weights in the block
+  double weight;               // sum of the weights of the samples in the block
   int64_t is_steady;           // whether frequency, reference and fade were constant in the block
   int64_t done;                // 1 after a completed block, 2 if `is_steady` as well
   int64_t is_on;
@@ -332,7 +332,7 @@ STRUCTURE(LoadedShaker,
   Numbers ends;                // [first steps][9]: U, dU/dt, current, x, y, z, vx, vy, vz at the end of each
   Numbers begun;               // [blocks]: number of contacts up to the end of each block of steps; or empty
   int64_t block;               // steps per block
-  int64_t impacts, bumps, limited_steps;  // numbers of contacts, steps in the rubber stops, clipped steps
+  int64_t impacts, bumps, limited_steps;  // numbers of contacts, rubber-stop steps and clipped steps
 )
 
 // Connections of a controller to the analogue part. The controller samples means; its output is delayed.
@@ -343,7 +343,7 @@ STRUCTURE(LoopCables,
   Numbers drive;               // [steps]: amplifier input of other sources; the controller's output is added
   Numbers late;                // [steps of latency + one sample]: delayed output [V], from the next step on
   int64_t first;               // number of the first step, counted from the start of the simulation
-  int64_t begin, stop;         // range of the steps to be simulated next
+  int64_t begin, stop;         // first step to be simulated next, and the step after the last
   int64_t steps_per_sample;
   double base_sum, m0_sum;     // sums of the sensor voltages since the last sample
   double steps_heard;          // number of steps in the two sums
@@ -384,7 +384,7 @@ STRUCTURE(MotionFilter,
   int64_t small_steps;         // number of substeps of a step with contact
   Numbers noise;               // [states][states]: covariance Q of the process noise of a step
   double velocity_variance;    // variance of the measured velocity [m^2/s^2]
-  double impulse_share;        // relative error of a collision's impulse
+  double impulse_share;        // assumed relative error of a collision's impulse
   Numbers force_variance;      // [samples]: variance of an unknown force, constant over a sample [N^2]
   Numbers force_input;         // [8]: change of the state by a force pair of 1 N on m1 and m2 over a step
   double level;                // running mean of the squared normalised innovation
@@ -416,7 +416,7 @@ STRUCTURE(ContactSearch,
   Numbers stop;                // one `TrackedStop`
   double step;                 // [s]
   int64_t small_steps;         // number of substeps of a step
-  int64_t longest;             // longest contact [samples]; a longer one counts as rest on the stop
+  int64_t longest;             // longest contact [samples]; anything longer counts as rest on the stop
   Numbers contacts;            // [contacts][7]: results, in the order of `TrackedContact`
 )
 
@@ -446,7 +446,7 @@ STRUCTURE(ChainMotion,
   double tolerance;
   double fastest;              // largest rate of chain and drive [1/s]
   Numbers windows;             // [levels]: lengths of windows, from long to short [s]
-  Numbers clashes;             // [levels]: a window is too long if cells within this distance may touch
+  Numbers clashes;             // [levels]: a window is too long if two cells within this distance may touch
   Drive drive;
   Numbers pieces;              // [pieces][8]: force of the base on the first m0 [N] instead of the drive, as
                                // a polynomial in the time since the start of each piece; or empty

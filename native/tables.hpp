@@ -149,7 +149,7 @@ inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const 
     for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
 }
 
-// Sums half of each mode and half of its conjugate, which is also correct for real modes.
+// Sums half of each mode and half of its conjugate; this is also correct for real modes.
 inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Specimen &s) {
   lines = {};
   Phasor drive = t.rates[t.modes], half{0.5, 0.0};

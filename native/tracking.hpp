@@ -8,7 +8,7 @@ namespace vibench {
 constexpr int TRACKED = 8;  // number of states without parameters
 constexpr int BASE_VELOCITY = 6;  // index of W, after X, Y, Z, VX, VY, VZ relative to the base and before B
 constexpr double HERTZ_EXPONENT = 1.5;
-constexpr double WATCHED_REACH = 2e-7;  // a step that comes this close to a stop is divided into substeps [m]
+constexpr double WATCHED_REACH = 2e-7;  // a step that comes closer to a stop is divided into substeps [m]
 
 enum StepKind { FLIGHT, TOUCHED, IN_CONTACT };  // far from stops; near a stop, ends free; ends in contact
 
