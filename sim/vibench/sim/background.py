@@ -101,7 +101,7 @@ class Pool:
     """Pool of worker processes; its owner must call `poll` regularly.
 
     Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the worker
-    ended, TimeoutError or MemoryError if a limit was exceeded, otherwise the exception of the function.
+    died, TimeoutError or MemoryError if a limit was exceeded, otherwise the exception of the function.
     """
 
     def __init__(self, workers: int, longest_s: float = math.inf) -> None:

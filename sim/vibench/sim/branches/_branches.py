@@ -257,7 +257,7 @@ UPDATES_TO_HOLD = 10.0
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
     """Return the time in which a small perturbation of a motion grows by a factor e [s]; infinite if stable.
 
-    It is T / ln|mu| with the period T of the motion and its largest multiplier mu, for a given base motion.
+    It is T / ln|mu|, with the motion's period T and largest multiplier mu, for a prescribed base motion.
 
     Parameters
     ----------

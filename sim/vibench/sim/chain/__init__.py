@@ -1,8 +1,8 @@
 """Chains of vibro-impact cells: specimens coupled at their m0.
 
 Cell i is a `Specimen` whose (k0, c0) couple its m0 to the previous cell, or to the base; the far end is free.
-A run is divided into short windows. In each window, every cell in contact is integrated alone, and the
-motion of the rest of the chain is a Taylor series (docs/decisions/0011-chains.md). All drives are supported;
+A run is divided into short windows. In each window, every cell in contact is integrated alone, and a Taylor
+series gives the motion of the rest of the chain (docs/decisions/0011-chains.md). All drives are supported;
 periodic orbits and branches are not. Lyapunov exponents are computed from two neighbouring motions.
 
 >>> from vibench.sim import gong2025

@@ -119,7 +119,7 @@ class BandGap(NamedTuple):
 def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
     """Return the band gaps of the infinite chain without damping and contact.
 
-    Units are coupled in one displacement only. In a band, frequency is therefore monotone in mu from 0 to pi.
+    Units are coupled by one displacement only; in a band, frequency is therefore monotone in mu from 0 to pi.
     """
     ends = band_frequencies_hz(unit, [0.0, np.pi])
     lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()

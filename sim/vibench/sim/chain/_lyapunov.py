@@ -1,7 +1,7 @@
 """Largest Lyapunov exponent of a chain, from two neighbouring motions. SI units.
 
 Two motions a small distance apart are integrated. After every interval their distance in the energy norm is
-recorded, and the second motion is moved back to the small distance along the line between them (Benettin,
+recorded. The second motion is then moved back to the small distance, along the line between them (Benettin,
 Galgani and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The small
 distance must be far above the integration error and far below the motion's size: use REFERENCE accuracy.
 """

@@ -78,8 +78,8 @@ def chain_response(
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the evaluated part at the end.
-    initial_state
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the evaluated part at the end of the
+    run. initial_state
         Initial state of every cell, shape (cells, 6) [m, m/s]; None for rest.
     """
     accuracy = member(Accuracy, accuracy)
@@ -129,7 +129,7 @@ def chain_response(
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     """Return the response of a specimen as the response of a chain of one cell.
 
-    The spectral line of z follows from the equation of m0 times exp(-i omega t), integrated by parts.
+    The spectral line of z follows from m0's equation of motion times exp(-i omega t), integrated by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
@@ -217,7 +217,7 @@ def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> 
 
 
 class MeanEnergies(NamedTuple):
-    """Time average of the energy of every cell, shape (cells,) each."""
+    """Time average of the energy of every cell; each field has shape (cells,)."""
 
     mean_j: Floats
     standard_error_j: Floats

@@ -45,7 +45,7 @@ class ChainTables(NamedTuple):
     kind_of: Vector
     """Index of the kind of each cell, shape (cells,)."""
     fastest: float
-    """Largest rate of change of any mode of the chain and of the drive [1/s]."""
+    """Largest rate of change of the modes of the chain and of the drive [1/s]."""
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector

@@ -1,4 +1,4 @@
-"""Responses of a chain, to within a requested relative error or a requested computing time. SI units."""
+"""Responses of a chain, with a requested relative error or in a requested computing time. SI units."""
 
 import math
 import time

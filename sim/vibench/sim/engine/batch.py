@@ -1,7 +1,7 @@
 """SIMD batches: integrate eight motions of one specimen at the same time.
 
-native/batch.hpp supports Hertz contacts at the accuracies *quick* and *standard*. It returns the state once
-per drive period, and peaks and spectral lines (docs/decisions/0061-lanes.md). SI units.
+native/batch.hpp supports Hertz contacts at the accuracy levels *quick* and *standard*. It returns states once
+per drive period, peaks and spectral lines (docs/decisions/0061-lanes.md). SI units.
 """
 
 import math
@@ -131,7 +131,7 @@ def _fastest(specimen: Specimen) -> float:
 
 
 def _time_over_fifth_root(specimen: Specimen) -> float:
-    """Return u times the fifth root of the approach speed: u = depth / speed, m v^2 / 2 = 2 k d^(5/2) / 5."""
+    """Return u times the fifth root of the approach speed v: u = d / v, m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
     return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
@@ -263,7 +263,7 @@ def _turns_in_p(specimen: Specimen) -> bool:
 def follow_batch(
     runs: Sequence[NativeRun], periods: Sequence[int], watch: Watch = Watch.NOTHING
 ) -> list[BatchedMotion | None]:
-    """Advance motions of one specimen in a batch, each by a number of its drive periods.
+    """Advance motions of one specimen in a batch, each by a given number of drive periods.
 
     Parameters
     ----------

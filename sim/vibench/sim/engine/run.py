@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
 """Largest number of time steps out of contact: enough for two days of the paper's motion."""
 MOST_IMPACTS = 1 << 26
-"""Largest number of impacts in one run. Their times take up to 0.5 GB, used only as impacts occur."""
+"""Largest number of impacts in one run. Their times take up to 0.5 GB, allocated as they occur."""
 SPARE_IMPACTS = 100
 """Number of impacts allowed in addition to the mean rate, so that even a short run may have a few."""
 DIRECTIONS = 6
@@ -47,7 +47,7 @@ KNOWN_MOTION = (
 KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 SLICE_STEPS = 1 << 20
-"""Steps between two checks of a time limit: a few milliseconds of computing."""
+"""Number of steps between two checks of a time limit; they take a few milliseconds."""
 _END_S: ContextVar[float] = ContextVar("end of the computing time", default=math.inf)
 
 
@@ -62,7 +62,7 @@ def time_limit(end_s: float) -> Iterator[None]:
 
 
 def check_time() -> None:
-    """Raise TimeoutError if the computing time of the innermost `time_limit` is over."""
+    """Raise TimeoutError if the innermost `time_limit` has expired."""
     if time.monotonic() > _END_S.get():
         raise TimeoutError("The requested computing time is over.")
 
@@ -84,7 +84,7 @@ def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def next_slice(steps_left: int, size: int) -> int:
-    """Check the time limit; return the number of steps until the next check, or all without a limit."""
+    """Check the time limit; return the number of steps until the next check; all if no limit is set."""
     check_time()
     return min(steps_left, size) if _END_S.get() < math.inf else steps_left
 
@@ -164,12 +164,12 @@ class RunRecord:
 
     @property
     def area_x(self) -> complex:
-        """Integral of x exp(-i (omega t + phase)) over the time of observing spectral lines [m s]."""
+        """Integral of x exp(-i (omega t + phase)) while spectral lines were observed [m s]."""
         return complex(self.structure["line_x"])
 
     @property
     def area_p(self) -> complex:
-        """Integral of p exp(-i (omega t + phase)) over the time of observing spectral lines [m s]."""
+        """Integral of p exp(-i (omega t + phase)) while spectral lines were observed [m s]."""
         return complex(self.structure["line_p"])
 
 
@@ -464,8 +464,8 @@ class CubicRun(_Run):
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0
-"""Default limit of the mean impact rate, several times the largest rates of the paper's specimen at 50 um:
-4300 per second with Hertz contacts, and 23000 in chatter on rigid stops with restitution 0.8."""
+"""Default limit of the mean impact rate. At 50 um the paper's specimen reaches 4300 impacts per second with
+Hertz contacts, and 23000 in chatter on rigid stops with restitution 0.8."""
 
 
 def start_motion(initial_state: ArrayLike | None) -> Floats:

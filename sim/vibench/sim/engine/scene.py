@@ -68,7 +68,7 @@ def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
 
 
 def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
-    """Fill a `CellKind` with a cell of a chain and the k0, c0 of the next cell [N/m], [N s/m]."""
+    """Fill a `CellKind` with the data of a cell and the k0, c0 of the next cell [N/m], [N s/m]."""
     fill_specimen(target["specimen"], cell)
     match cell.contact:
         case LinearGap():
@@ -178,7 +178,7 @@ def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m
 def _fill_springs(
     scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
 ) -> None:
-    """Fill the modal data of motion in a linear stop: a spring parallel to k1, with shifted equilibrium."""
+    """Fill the modal data of contact with a linear stop: a spring parallel to k1, shifted equilibrium."""
     k0, k1, k2 = specimen.stiffnesses
     pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
     held = scene["held"]

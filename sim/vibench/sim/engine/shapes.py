@@ -2,8 +2,8 @@
 
 Let t = T (1 - cos phi) / 2 during a collision of duration T. Near both ends the depth is a function of square
 roots of t, but smooth in phi. Sixteen Gauss points in phi therefore describe a whole collision. In units of
-the depth and the time of a free collision at the same speed, collisions differ only by the acceleration due
-to the other springs, called press. Collisions and their derivatives are tabulated over the press
+the depth and time of a free collision at the same speed, collisions differ only by the press: the
+acceleration due to the other springs. Collisions and their derivatives are tabulated over the press
 (docs/decisions/0008-speed-of-contacts.md).
 """
 
@@ -58,8 +58,8 @@ def _about_middle() -> Table:
 ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""Largest distance of the maximum from the middle of phi [rad], at which eight terms have an error of 1e-7;
-at a tenth of this distance they have only rounding errors."""
+"""Largest distance of the maximum from mid-phi [rad]. At this distance eight terms have an error of 1e-7, at
+a tenth of it only rounding errors."""
 
 
 def _top_of(terms: Vector) -> float:

@@ -2,8 +2,8 @@
 
 A tangent vector is propagated exactly with and without contact; its mean growth rate is the exponent. The
 final motion decides the method: decay of the modes if no impact will follow, Floquet multipliers if the
-motion has become periodic, otherwise the mean growth, with a standard error that allows for correlation of
-successive intervals. Chaos that ends during the run is reported separately.
+motion has become periodic, otherwise the mean growth. Its standard error allows for correlation of successive
+intervals. Chaos that ends during the run is reported separately.
 """
 
 import math
@@ -141,8 +141,8 @@ def lyapunov_exponent(
     """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
     During ``settle_s`` the motion approaches its attractor. Growth is averaged over the following
-    ``duration_s``, or only over the final motion if its kind differs. The defaults add up to the paper's 30 s
-    from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
+    ``duration_s``, or only over the final motion if that differs in kind. The defaults add up to the paper's
+    30 s from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
 
     Parameters
     ----------

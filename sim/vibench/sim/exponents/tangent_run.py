@@ -243,8 +243,8 @@ LONGEST_CYCLE = 16
 SURE = 3.0
 """Distance of a mean growth rate from zero, in standard errors, above which its sign is significant."""
 CHANGED = 5.0
-"""Smallest significant difference of mean growth before and after a change, in standard errors. It is larger
-than SURE, because the time of the change is chosen to make the difference largest."""
+"""Smallest significant difference between mean growth before and after a change, in standard errors. It is
+larger than SURE, because the time of the change is chosen to make the difference largest."""
 FEWEST_INTERVALS = 32
 """Smallest number of intervals before and after a change of sign of the exponent."""
 ALIGNING = 8
@@ -291,7 +291,7 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Return the interval after which mean growth is no longer significantly positive; else None."""
+    """Return the interval after which mean growth is no longer significantly positive, or None."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None

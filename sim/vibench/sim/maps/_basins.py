@@ -41,7 +41,7 @@ class UncertaintyExponent:
 
     exponent: float
     low: float
-    """Lower end of the 95 % confidence interval for the boundary as resolved by the grid."""
+    """Lower 95 % confidence limit of the exponent, for the boundary as the grid resolves it."""
     high: float
     steps: tuple[int, ...]
     """Distances between initial states that the fit uses, in grid steps."""

@@ -1,4 +1,4 @@
-"""Points of a map as scenes: their initial states, their stored results, and which points to compute."""
+"""Points of a map as scenes: initial states, stored results, and the selection of points to compute."""
 
 import math
 import os

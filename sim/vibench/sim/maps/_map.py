@@ -95,9 +95,8 @@ def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
-    """Return the largest energy stored in a stop [J], from the penetration; None without elastic stops.
-
-    None also if the gaps differ and abs(p) exceeds the smaller one: it is unknown which stop was reached.
+    """Return the largest energy stored in a stop [J], from the penetration; None without elastic stops. Also
+    None if the gaps differ and abs(p) exceeds the smaller one: it is unknown which stop was reached.
     """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:
@@ -255,7 +254,7 @@ class Map(GridPlan):
     hertz_stiffness: Positive | None = None
     """Hertz stiffness k of a stop, F = k d^(3/2) [N/m^1.5]."""
     x_m: Number = 0.0
-    """Initial absolute displacement of m0; then those of m1 and m2, and the three velocities [m, m/s]."""
+    """Initial absolute displacement of m0; next fields: those of m1 and m2, then the velocities [m, m/s]."""
     y_m: Number = 0.0
     z_m: Number = 0.0
     vx_m_per_s: Number = 0.0

@@ -59,7 +59,7 @@ class Audit:
         return wilson_share(self.wrong, self.audited)
 
     def corrected_shares(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
-        """Return the shares of the motions in a map with ``cells`` cells, corrected for wrong filling.
+        """Return the shares of the motions in a map with ``cells`` cells, corrected for filling errors.
 
         Where motions are finely mixed, the most common one is filled in too often. The gains and losses found
         by the audit are extrapolated to all filled-in cells.

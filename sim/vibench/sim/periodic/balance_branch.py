@@ -37,7 +37,7 @@ TAIL = 4
 
 @dataclass(frozen=True)
 class BalanceOptions:
-    """Options of a harmonic balance: harmonics and tolerance."""
+    """Options of a harmonic balance: numbers of harmonics, and tolerance."""
 
     kept: HarmonicSet = HarmonicSet.ODD
     fewest: int = 15
@@ -68,7 +68,7 @@ class Guess:
 def first_guess(
     structure: LinearStructure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
 ) -> Guess:
-    """Return the smallest first-order motion for a power law, otherwise the linear motion, as a guess."""
+    """Return an initial guess: for a power law the smallest first-order motion, else the linear motion."""
     match spring:
         case PowerSpring():
             return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]

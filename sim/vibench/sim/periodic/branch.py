@@ -130,7 +130,7 @@ class OrbitShape(StrEnum):
     """Symmetry of a periodic motion."""
 
     MIRRORED = "mirrored"
-    """Mirror image of itself half a period later; needs an odd number of drive periods, and equal gaps."""
+    """The motion is mirrored half a period later; needs equal gaps and an odd number of drive periods."""
     REPEATED = "repeated"
     """The motion repeats after a whole number of drive periods."""
 

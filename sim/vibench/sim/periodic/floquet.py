@@ -1,7 +1,7 @@
 """Stability of a periodic motion: Floquet multipliers from the variational equation. SI units.
 
 Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
-e = dF/d(dp/dt) along the motion. Their map over one period is the monodromy matrix, whose eigenvalues
+e = dF/d(dp/dt) along the motion. The monodromy matrix maps them over one period, and its eigenvalues
 determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Motion
 without contact takes one matrix exponential. Contacts begin and end at the exact times at which p reaches a
 stop; each is integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253).

@@ -4,7 +4,7 @@ At a phase resonance the fundamental of m0 lags the base by a given angle, usual
 (Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u exerts the inertia force m w^2 u
 on the motion relative to the base. This force is in phase with u, so the relative motion lags u by a quarter
 of a period. Shooting finds the phase resonance, with the phase as a seventh equation and the frequency as a
-seventh unknown. Pseudo-arclength continuation follows it along the level.
+seventh unknown. Pseudo-arclength continuation follows it along the drive level.
 """
 
 import math

@@ -55,7 +55,7 @@ class _Kind:
         return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
 
     def after(self, ratio: float) -> Self:
-        """Return the statistics with one more run; old runs fade (West, Comm. ACM 22 (1979) 532)."""
+        """Return the statistics with one more run; old runs lose weight (West, Comm. ACM 22 (1979) 532)."""
         runs = min(self.runs + 1, MEMORY)
         off, share = math.log(ratio) - self.mean, 1.0 / runs
         spread = (1.0 - share) * (self.variance + share * off * off)
@@ -153,7 +153,7 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Return a kind of run, ``a/b/c``, then the more general kinds ``a/b`` and ``a``."""
+    """Return a kind of run, ``a/b/c``, followed by the more general kinds ``a/b`` and ``a``."""
     parts = kind.split("/")
     return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
 

@@ -66,9 +66,9 @@ class SceneRun:
 class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
-    The state is checked once per drive period. If the motion does not repeat after the expected transient, a
-    tangent vector is propagated and the peaks of blocks are stored: a motion that never repeats is described
-    by the growth of perturbations and by statistics.
+    The state is checked once per drive period. A motion that does not repeat after the expected transient is
+    described by the growth of perturbations and by statistics. For these, a tangent vector is propagated and
+    the peaks of blocks are stored.
     """
 
     def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
@@ -118,9 +118,9 @@ def classify(
 ) -> SceneRun:
     """Classify a motion from its response window and the stretches of the run before the window.
 
-    The stretches before the window are as long as its blocks. A motion that repeats counts as periodic
-    only if Newton's iteration finds a stable periodic motion nearby, because chaos also comes close to
-    unstable periodic motions, and lingers where a periodic motion has just vanished in a fold.
+    The stretches before the window are as long as its blocks. A motion that repeats counts as periodic only
+    if Newton's iteration finds a stable periodic motion nearby. Chaos also comes close to unstable periodic
+    motions, and lingers where a periodic motion has just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -327,7 +327,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the number of drive periods in a slice (between two checks), and of slices in a window."""
+    """Return the numbers of drive periods in a slice (between two checks), and of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))

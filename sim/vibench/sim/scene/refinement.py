@@ -81,8 +81,8 @@ SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""
 FIRST_STARTS, MOST_STARTS = 6, 1_000_000
 NEWTON_COST, NEWTON_SHARE = 100.0, 0.3
-"""Ratio of the computing time of Newton's iteration to that of one period of motion, and the largest part of
-the remaining time that the iteration may use."""
+"""Computing time of Newton's iteration, relative to one period of motion; largest share of the remaining time
+that the iteration may use."""
 
 
 class _Clock:
@@ -529,7 +529,7 @@ class _Refinement:
                     wanted = LANES * math.ceil(wanted / LANES)
 
     def _needs_batches(self, starts: Sequence[Start], each_s: float) -> bool:
-        """Return whether the missing starts save more time in batches than the collision fit takes.
+        """Return whether batches of the missing starts save more time than the collision fit takes.
 
         ``each_s`` is the simulated time of a start. The decision uses nominal costs, so it is reproducible.
         """
@@ -553,7 +553,7 @@ class _Refinement:
         return seen is not None
 
     def _observe_starts(self, starts: list[Start], count: int, begins_s: float) -> bool:
-        """Add the next ``count`` starts, with a window each; return False at the end of the time."""
+        """Add the next ``count`` starts, with one window each; return False after the time limit."""
         paths = [self._new_path(len(starts) + k) for k in range(count)]
         # In a batch, simulating a settled run further takes less time than a check.
         looks = 1 if self._is_batched else LOOKS

@@ -91,8 +91,8 @@ def repetition(
 ) -> Repetition | None:
     """Return the shortest period with which a motion repeats at its end; None if it does not repeat.
 
-    Two changes over the same number of periods, about a decay time, are compared, because a small change in
-    one period may be part of a slow drift. The ratio of the two changes gives the remaining distance.
+    Two changes, each over about one decay time, are compared, because a small change in one period may be
+    part of a slow drift. The ratio of the two changes gives the remaining distance.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def _change(after: Floats, before: Floats) -> float:
 FORGETTING = 8.0
 """Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""Ratio of the longest run to the longest decay time used; longer decay times are cut to that time."""
+"""Ratio of the longest run to the longest decay time used; longer decay times are limited to it."""
 MOST_STATES = 2_000_000
 """Largest number of drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32

@@ -1,6 +1,6 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
-Response I is the largest value in a window and therefore has an extreme-value distribution: in chaos it
+Response I is the largest value in a window and therefore has an extreme-value distribution. In chaos it
 scatters by a few per cent at any accuracy. The scatter is estimated from the largest values in blocks of one
 run, or from several runs with slightly different starts.
 """

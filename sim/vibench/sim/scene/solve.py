@@ -123,8 +123,8 @@ class SolvedScene:
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for the scene [s], including its share of batches. NaN if modules were
-    loaded in this time."""
+    """Processor time of this thread for the scene [s], including the scene's share of batches. NaN if modules
+    were loaded in this time."""
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
@@ -343,7 +343,7 @@ class _StartedScene:
     def ensemble(
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
-        """Return the motions from as many other starts as budget or ``draw`` allow; None if too few."""
+        """Return the motions from as many other starts as the budget or ``draw`` allows; None if too few."""
         scene, pace = self._scene, self._pace
         requested = ReachedMotion(
             self.run,
@@ -441,7 +441,7 @@ def _final_kind(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> Moti
 
 
 def _confirm_chaos(found: ScenePrediction, exponent: "LyapunovEstimate") -> ScenePrediction:
-    """Return the prediction; the kind "chaotic" is corrected if the exponent is not positive."""
+    """Return the prediction; correct the motion kind "chaotic" if the exponent is not positive."""
     from ..exponents.lyapunov import ExponentVerdict  # noqa: PLC0415 - as above
 
     is_chaotic = found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}

@@ -40,7 +40,7 @@ ROUNDING = 1e-11
 """Relative rounding error of an exact result."""
 ROUNDED = 1e-13
 """Offset of the start of the stricter run, relative to the drive amplitude. It is several times the
-accumulated rounding error of a run, because one offset shows only one sample of the effect of rounding."""
+accumulated rounding error of a run, because one offset is only one sample of rounding errors."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Signs of the offset of each coordinate; those of y and z are equal, so that p does not change."""
 SLOWEST_RATIO = 0.9
@@ -215,7 +215,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
     """Integrate a motion from its start with a smaller tolerance, until it separates or the window ends.
 
     The start is offset by a rounding error. Otherwise exact motion between contacts would be compared with
-    itself, and a motion that amplifies rounding errors would appear exact.
+    itself. A motion that amplifies rounding errors would then appear exact.
     """
     loose, strict = begin.copy(scene.accuracy.tolerance), begin.copy(STRICTER[scene.accuracy])
     strict = strict.with_push(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
@@ -237,7 +237,7 @@ def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
 
 
 def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
-    """Return whether the states of two runs agree within `PARTED` times the gap; False if one failed."""
+    """Return whether the states of two runs agree within `PARTED` times the gap; False if a run failed."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
     apart = np.abs(one.state - other.state) / _places_and_speeds(scene)

@@ -193,6 +193,6 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Integrate each motion in a batch for its number of periods; return those that need more periods."""
+    """Integrate each motion in a batch for its number of periods; return the motions that need more."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
     return [each for (each, _), stretch in zip(ready, found, strict=True) if each.note(stretch) is None]

@@ -3,7 +3,7 @@
 While collisions limit abs(p) to the gap, the fundamental of the stop force equals the force of a spring
 between m1 and m2 that reduces abs(p) to the gap. This is a first-order harmonic balance (as in Gong et al.
 2025, eq. 5) with loss-free rigid stops. The stop force acts along p only, so the motion has a closed form:
-the sum of the motion without stops and the response to this force.
+motion without stops plus the response to this force.
 """
 
 from dataclasses import dataclass

@@ -42,7 +42,7 @@ class Amplifier:
     clip_v: float = math.inf
     """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; the amplifier reduces its voltage so as not to exceed it."""
+    """Largest current, peak [A]; the amplifier reduces its voltage to keep the current below it."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -86,7 +86,7 @@ class Shaker:
     """Resistance of coil and cable in series [ohm]."""
     coil_inductance_h: float
     stroke_m: float = math.inf
-    """Displacement from rest at which the table touches its rubber stops [m]."""
+    """Displacement of the table from rest at which it touches its rubber stops [m]."""
     stop_stiffness_n_per_m: float = STOP_STIFFNESS_N_PER_M
     stop_damping_ns_per_m: float = STOP_DAMPING_NS_PER_M
 

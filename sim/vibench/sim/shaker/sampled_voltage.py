@@ -1,7 +1,7 @@
 """Motion of shaker and specimen under a sampled voltage, at the times of its samples.
 
-The voltage is resampled to the time steps of a `LoadedShaker`, and the motion is resampled to the samples of
-the voltage, both as band-limited signals. Recordings are processed in pieces to limit memory. SI units.
+The voltage is resampled to the time steps of a `LoadedShaker`, and the motion to the voltage's sample times,
+both as band-limited signals. Recordings are processed in pieces to limit memory. SI units.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -65,7 +65,7 @@ class SampledMotion:
     impact_times_s: FloatArray
     """Time zero and the ends of blocks of 20 ms, shape (blocks + 1,)."""
     impacts: FloatArray
-    """Number of contacts up to time zero and to the end of each block, shape (blocks + 1,)."""
+    """Number of contacts up to each of these times, shape (blocks + 1,)."""
 
 
 def follow_voltage(

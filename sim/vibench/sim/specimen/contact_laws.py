@@ -72,7 +72,7 @@ def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> f
     """Return the stiffness k of a sphere on a plane, F = k d^(3/2) [N/m^1.5].
 
     k = 4/3 E* sqrt(R) with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Johnson, Contact Mechanics (1985), eq.
-    4.23), valid for a frictionless, elastic contact much smaller than the radius.
+    4.23). Valid for a frictionless, elastic contact much smaller than the radius.
 
     Raises ValueError when the radius is not positive.
     """
@@ -141,7 +141,7 @@ class RigidStops(Strict):
     """Rigid stops: m1 and m2 separate at ``restitution`` times the approach speed (Newton's law)."""
 
     restitution: float
-    """Coefficient of restitution: 0 (the masses stay together) to 1 (no energy is lost)."""
+    """Coefficient of restitution, from 0 (the masses stay together) to 1 (no energy is lost)."""
     kind: Literal["rigid"] = "rigid"
 
     def __post_init__(self) -> None:
@@ -294,7 +294,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = {
         _parse_power_law,
     ),
 }
-"""Contact laws by the names that the command line and files use."""
+"""Contact laws, keyed by their names on the command line and in files."""
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:

@@ -107,8 +107,8 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     The undamped modes solve a symmetric eigenproblem, so they are orthogonal even if two frequencies nearly
     coincide. If the damping is zero or proportional to the stiffness, they are also the damped modes.
 
-    Raises ValueError when two modes coincide (critical damping), because modes then do not span all states,
-    or when the natural frequencies are too far apart.
+    Raises ValueError when two modes coincide (critical damping), so that modes do not span all states, or
+    when the natural frequencies are too far apart.
     """
     root = np.sqrt(np.diag(mass))
     try:

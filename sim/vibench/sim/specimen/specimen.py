@@ -127,7 +127,7 @@ def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""Matrix, shape (3, 2), that maps (x, z) to (x, y, z) while m1 sticks to m2; the gap is left out."""
+"""Matrix, shape (3, 2), that maps (x, z) to (x, y, z) while m1 sticks to m2, without the constant gap."""
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
@@ -167,8 +167,8 @@ def gong2025(
     Parameters
     ----------
     damping_time_s
-        Damping over stiffness, c_i = damping_time_s * k_i [s]. The paper does not state this value. Of the
-        values tried, only the default reproduces both statements of the paper on chaos.
+        Damping over stiffness, c_i = damping_time_s * k_i [s]. The paper does not state this value. Among the
+        values tried, only the default reproduces both of the paper's statements on chaos.
     gap_m
         Clearance at each stop [m], or (lower, upper); a power law is fitted at the smaller clearance.
     contact
@@ -204,7 +204,7 @@ def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
 
 
 def _chain_matrix(links: Triple) -> Matrix:
-    """Return the matrix for (x, y, z) of three links: base to m0, m2 to m1, and m0 to m2."""
+    """Return the matrix for (x, y, z) of the three links base to m0, m2 to m1, and m0 to m2."""
     c0, c1, c2 = links
     return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
 

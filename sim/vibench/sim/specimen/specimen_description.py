@@ -157,7 +157,7 @@ class SpecimenDescription(_DescribedModel):
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, value: object, info: ValidationInfo) -> object:
-        """Complete a table with the values of the specimen that it names; text alone is such a name."""
+        """Complete a table with the values of the specimen that it names; plain text counts as a name."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match value:
             case str():
@@ -191,7 +191,7 @@ class SpecimenDescription(_DescribedModel):
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
-        """Return the clearances with infinite ones as words, because JSON has no infinite numbers."""
+        """Return the clearances, with words for infinite ones, because JSON has no infinite numbers."""
         if isinstance(gap_m, float):
             return gap_m
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
@@ -351,7 +351,7 @@ def _shipped_texts() -> Mapping[str, str]:
 
 
 def _merge(base: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``base`` with the values of ``table``, without `about` and the replaced values' sources."""
+    """Return ``base`` updated with ``table``, without `about` and the sources of replaced values."""
     replaced = {key for pair in ALTERNATIVES if table.keys() & pair for key in pair} | table.keys()
     replaced |= {"about"} if table else set()
     kept = {key: value for key, value in base.items() if key not in replaced}

@@ -62,7 +62,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:
-    """Return the message for a wrong value in a TOML file, in terms of TOML instead of Python.
+    """Return the message for a wrong value in a TOML file, in the terms of TOML instead of Python.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class ClusterExecutor:
         future.add_done_callback(partial(self._note, bundle))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Return the replies for finished bundles; a bundle dropped by the scheduler has no results."""
+        """Return the replies for finished bundles; a bundle that the scheduler dropped has no results."""
         arrived = empty_queue(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()

@@ -35,7 +35,7 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """State of a point; the file receives the state after the point's numbers."""
+    """State of a point; it is written to the file after the point's numbers."""
 
     MISSING = 0
     """The point has not been computed yet."""
@@ -50,7 +50,7 @@ class PointState(IntEnum):
 
 
 SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
-"""Columns of the table of sessions, with sizes [bytes]. A session is a run or a resumption of the study."""
+"""Columns of the table of sessions, and their sizes [bytes]. A session is a run or resumption of a study."""
 MOST_SESSIONS = 1024
 """Number of rows of the table of sessions; all further sessions use the last row."""
 
@@ -87,7 +87,7 @@ class Column:
     meanings: tuple[str, ...] = ()
     """Meanings of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """Number of components per point; if there are several, the array has an additional last axis."""
+    """Number of components per point; with several components, the array has an additional last axis."""
     along: str = COORDINATE
     """Name of the additional axis for the components."""
 

@@ -30,7 +30,7 @@ SHORTEST_S = 1e-6
 
 
 class Costs:
-    """Estimated computing times of points, which improve as neighbouring points are done.
+    """Estimated computing times of points; the estimates improve as neighbouring points are done.
 
     A run takes about 4 us per impact, and neighbouring points have similar numbers of impacts. The time of a
     neighbour is therefore a better estimate than the plan.
@@ -60,7 +60,7 @@ class Costs:
     def remaining_s(self, is_missing: NDArray[np.bool_]) -> float:
         """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
 
-        Without a finished neighbour, a planned time is multiplied by the ratio of actual to planned times.
+        Without a finished neighbour, the planned time is scaled by the ratio of actual to planned times.
         """
         known = ~np.isnan(self._taken_s)
         off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
@@ -179,7 +179,7 @@ class PointScheduler:
         return None
 
     def _times_behind(self) -> NDArray[np.float64]:
-        """Return the planned computing time of all points that must wait for each point, (points,) [s]."""
+        """Return for each point the planned time of all points that must wait for it, shape (points,) [s]."""
         behind = np.zeros(len(self._after))
         for last in np.flatnonzero(self._next == NOBODY):
             number, sum_s = int(last), 0.0
@@ -256,7 +256,7 @@ class Points(ABC):
         return np.repeat(some, every)[: self.grid.size]
 
     def predecessor(self, number: int, arrays: Arrays) -> int:
-        """Return the number of the point to continue; `NOBODY` if none, or if its state is not finite."""
+        """Return the number of the point to continue; `NOBODY` if there is none, or its state is NaN."""
         before = int(self.after[number])
         if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
             return NOBODY
@@ -300,7 +300,7 @@ def run_points(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the wanted points that are missing in the store, until ``cancelled``, as `run_study` does."""
+    """Compute the requested points that the store lacks, until ``cancelled``, as `run_study` does."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)

@@ -53,7 +53,7 @@ def read_plan(path: Path, kind: type[Plan]) -> Plan:
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Return all columns of a file, shape (points, ...) each; points without a result are missing.
+    """Return all columns of a file, each of shape (points, ...); points without a result are missing.
 
     Raises StudyError when the file cannot be read, or contains another kind of plan.
     """

@@ -110,7 +110,7 @@ class MemoryStore:
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
-    """Return the values of a prediction to store, except those that are not requested or not known."""
+    """Return the values of a prediction to store, except values that are not requested or not known."""
     return {
         **_cells_of(prediction, layout.NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),
@@ -210,7 +210,7 @@ def prediction_at(
 
 
 def cut_text(text: str) -> bytes:
-    """Return text as UTF-8 bytes, cut between characters to the size of a column."""
+    """Return text as UTF-8 bytes, cut between two characters to fit the size of a column."""
     return text.encode()[: layout.TEXT_BYTES].decode(errors="ignore").encode()
 
 

@@ -61,7 +61,7 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 
 
 def expand_ranges(given: object) -> object:
-    """Replace each table of start, stop and step, also in lists, by its numbers; return the result."""
+    """Replace each table of start, stop and step, also within lists, by its numbers; return the result."""
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
             # Do not use isinstance, because true is also an int.
@@ -94,7 +94,7 @@ def _flatten(given: list[object] | tuple[object, ...]) -> object:
 MOST_POINTS = 10_000_000
 """Largest number of points of a study; the file then has 2 GB."""
 AS_DESCRIBED = "as described"
-"""Label of an axis without given values, for which the specimen's value is used."""
+"""Label of an axis for which no values are given, so that the specimen's value is used."""
 
 
 class Start(StrEnum):
@@ -156,7 +156,7 @@ def _own_gap(values: dict[str, Any]) -> tuple[float, ...] | None:
 
 
 def _described_specimen(values: dict[str, Any]) -> SpecimenTable:
-    """Return the specimen of a study being validated; the default specimen if the given one is not valid."""
+    """Return the specimen of a study during validation; the default specimen if the given one is invalid."""
     found: SpecimenTable = values.get("specimen") or usual_specimen()
     return found
 
@@ -327,7 +327,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis of numbers, or of the label `AS_DESCRIBED` if there are no numbers."""
+    """Return an axis with these numbers, or with the label `AS_DESCRIBED` if there are none."""
     if values is None:
         return StudyAxis(name, (AS_DESCRIBED,), "", long_name)
     return StudyAxis(name, values, units, long_name)
