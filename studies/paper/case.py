@@ -1,4 +1,4 @@
-"""A case: one value for each option that the paper leaves open, with alternatives to test."""
+"""Cases: one value for each option that the paper leaves open, and alternatives to test."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -52,7 +52,7 @@ class Case(FigureOptions):
     """The model n = 3+5+7 with the shares of its terms, which the paper does not give."""
     exponents_by: ExponentsBy = ExponentsBy.EXACT
     changed: tuple[str, ...] = ()
-    """Options that differ from the program's defaults."""
+    """Options that differ from the program's defaults, in words."""
     draw: int = 0
     """Number of the initial state: 0 is rest; each other state is a millionth of the gap away from it."""
 
@@ -145,7 +145,7 @@ class Option:
     """Format of the name of a case in which this setting is changed."""
     read: Callable[[str], Any] = float
     scale: float | None = None
-    """Factor from the value to the number in the label; None for the value itself."""
+    """Factor that converts the value to the number in the label; None for the value itself."""
 
 
 OPTIONS: Mapping[str, Option] = {
@@ -235,4 +235,4 @@ NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)
 CLOSEST = together(NARROWER_FIT, SEVENTH_COUNTS, COMPARED_LOWER)
-"""The options for continuous models with which most claims hold."""
+"""The options for continuous models for which the largest number of claims holds."""

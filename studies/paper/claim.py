@@ -85,7 +85,7 @@ class Claim:
     """Requirements; the claim holds if all of them are met."""
     measure: Callable[[Reading], Values]
     tried: tuple[Alternative, ...]
-    """Alternatives to test in this order if the claim fails under the defaults."""
+    """Alternatives to test, in this order, if the claim fails with the defaults."""
     remark: str
     """Comment on a failed claim, without measured numbers, which the page states itself."""
     draws: int
@@ -110,7 +110,7 @@ def claim(
     remark: str = "",
     is_scored: bool = True,
 ) -> Callable[[Measure], Claim]:
-    """Return a decorator for a measuring function, whose docstring is the paper's statement."""
+    """Return a decorator for a function that measures a claim; its docstring is the paper's statement."""
 
     def make_claim(measure: Measure) -> Claim:
         key, says = measure.__name__.replace("_", "-"), " ".join((measure.__doc__ or "").split())

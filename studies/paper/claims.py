@@ -21,5 +21,5 @@ SECTIONS: dict[str, tuple[Claim, ...]] = {
         "Similarity of the models": similarity_claims,
     }.items()
 }
-"""Claims by heading; within a section, they have the order of the section's file."""
+"""Claims by heading; within a section, claims have the order of the section's source file."""
 CLAIMS = tuple(claim for claims in SECTIONS.values() for claim in claims)

@@ -20,7 +20,7 @@ _AMPLITUDE_AT_HZ = 266.0
 _SWEEP_COLLIDES_HZ = (240.0, 290.0)
 """Ends of the colliding region [Hz]; section 5 of the paper gives them as "about"."""
 _ABOUT_HZ, _ROUGHLY_HZ = 5.0, 10.0
-"""Tolerances of the ends of a colliding region: in a sweep, and on a frequency grid of 5 Hz [Hz]."""
+"""Tolerances of the ends of a colliding region: in a sweep, and on a grid with steps of 5 Hz [Hz]."""
 
 
 @claim(

@@ -18,7 +18,7 @@ _WHAT = ("response_i", "response_ii")
 
 
 def studies(options: FigureOptions) -> tuple[Study, ...]:
-    """Return the study with and without damping, at 5 and 7 um; raises InvalidRequest without damping."""
+    """Return the study with and without damping, at 5 and 7 um; raises InvalidRequest if damping is zero."""
     damped_s = options.only_damping_time_s
     if damped_s == 0.0:
         raise InvalidRequest("figure 5 compares with an undamped specimen; give a damping time above 0 s")

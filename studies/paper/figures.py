@@ -1,4 +1,4 @@
-"""The simulated figures of the paper, by number; 12 to 14 show the experiment."""
+"""The simulated figures of the paper, by number; figures 12 to 14 show the experiment."""
 
 from importlib import import_module
 from pathlib import Path

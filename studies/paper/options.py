@@ -82,7 +82,7 @@ class FigureOptions:
         return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
-        """Return the study of models at amplitudes under these options; other fields may be replaced."""
+        """Return the study of models at amplitudes with these options; other fields may be replaced."""
         chosen: dict[str, Any] = {
             "gaps_m": (self.gap_m,),
             "specimen": self._specimen_table,
@@ -96,16 +96,13 @@ class FigureOptions:
         return Study(models=models, amplitudes_m=amplitudes_m, **(chosen | replaced))
 
     def specimen(self, contact: str = "hertz") -> Specimen:
-        """Return the paper's specimen under these options."""
+        """Return the paper's specimen with these options."""
         damping_time_s = self.damping_time_s if self.damping_ratio is None else None
         return self._specimen_table.specimen(contact, damping_time_s, self.gap_m)
 
     @property
     def only_damping_time_s(self) -> float:
-        """Damping time for a figure without a damping ratio.
-
-        Raises InvalidRequest if a damping ratio is set.
-        """
+        """Damping time for a figure without damping ratio; raises InvalidRequest if a ratio is set."""
         if self.damping_ratio is not None:
             raise InvalidRequest("this figure takes no damping ratio; give a damping time")
         return self.damping_time_s

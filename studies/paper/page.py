@@ -134,7 +134,7 @@ def _cells(result: Judgement) -> tuple[str, ...]:
 
 
 def verdict_text(result: Judgement) -> str:
-    """Return the verdict with the option for which it holds."""
+    """Return the verdict, with the option for which the claim holds."""
     under, first = result.first_met, result.findings[0]
     match result.verdict:
         case Verdict.HOLDS_FOR_SHARE:
@@ -158,13 +158,13 @@ def target_text(claim: Claim) -> str:
 
 
 def _difference(result: Judgement) -> str:
-    """Return the measured numbers, the requirements, and the options under which the claim holds."""
+    """Return the measured numbers, the requirements, and the options with which the claim holds."""
     found = _values(result.claim, result.findings[0])
     return f"We find {found}; required {target_text(result.claim)}. {_upholding_options(result)}".strip()
 
 
 def _upholding_options(result: Judgement) -> str:
-    """Return the options under which a claim holds, with their numbers, and the comment."""
+    """Return the options with which a claim holds, the numbers measured with them, and the comment."""
     claim, alternatives = result.claim, result.findings[1:]
     sentences = [
         f"{'It holds under' if each.is_met else 'Values with'} {each.case.name}: {_values(claim, each)}."
@@ -177,7 +177,7 @@ def _upholding_options(result: Judgement) -> str:
 
 
 def _except(result: Judgement) -> str:
-    """Return the options under which a claim holds only for some initial states."""
+    """Return the options with which a claim holds only for some initial states."""
     return "".join(
         f"; with {each.case.name} it holds for {each.met_draws} of {len(each.draws)} starts"
         for each in result.findings

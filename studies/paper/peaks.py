@@ -21,7 +21,7 @@ def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float
 
 
 def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Return the frequencies of the peaks of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
+    """Return the peak frequencies of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     return response_peaks(fine, linear_transmissibility(specimen, fine))
 

@@ -17,7 +17,7 @@ from .textbook_methods import ode45, textbook_exponents
 PIECE_WISE, CONTINUOUS = "hertz", "power:5"
 WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
 SECOND_REGION_HZ = (220.0, 320.0)
-"""Range around the second linear resonance, between the two terminal resonances [Hz]."""
+"""Frequency range around the second linear resonance, between the two terminal resonances [Hz]."""
 Computed = TypeVar("Computed")
 Values = tuple[float | np.floating[Any], ...]
 """The numbers of a claim: one per requirement; NaN for a missing value."""
@@ -59,11 +59,11 @@ class Reading:
         return self.case.specimen(model)
 
     def curve(self, amplitude_m: float, model: str = PIECE_WISE, **replaced: Any) -> Responses:
-        """Return the curve at any amplitude; fields of the curve's study may be replaced."""
+        """Return the response curve at any amplitude; fields of its study may be replaced."""
         return responses(self.evidence.study(self.case.study((model,), (amplitude_m,), **replaced)))
 
     def level(self, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
-        """Return the curve at one of the paper's amplitudes."""
+        """Return the response curve at one of the paper's amplitudes."""
         curve = responses(self.evidence.study(self.levels(model)), amplitude=amplitude_m)
         return replace(curve, exponent_per_s=self.exponents_of(curve, amplitude_m, model))
 

@@ -36,7 +36,7 @@ class Responses:
 
 
 def responses(results: StudyResults, **fixed: float | str) -> Responses:
-    """Return one curve of a study; each axis except frequency is fixed or has one value."""
+    """Return one curve of a study; each axis except frequency must be fixed or have one value."""
     only = {axis.name: axis.values[0] for axis in results.axes if len(axis.values) == 1}
     at = {name: value for name, value in {**only, **fixed}.items() if name != "frequency"}
     return Responses(
@@ -55,7 +55,7 @@ def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
 
 
 def stretches(flags: Flags) -> NDArray[np.intp]:
-    """Return first index and end of each run of consecutive flags, shape (runs, 2)."""
+    """Return the first index and the end of each run of consecutive flags, shape (runs, 2)."""
     changes = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
     return np.flatnonzero(changes).reshape(-1, 2)
 

@@ -53,7 +53,7 @@ def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[Dam
 
 
 def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
-    """Return the score over damping, with the claims that do not hold."""
+    """Return a table of the score over damping, with the claims that do not hold."""
     first, second, third = (f"{each:.2g}" for each in gong2025(0.01).damping_ratios)
     most = max(len(each.held) for each in scores)
     best = ", ".join(f"{each.damping_time_s:.3g} s" for each in scores if len(each.held) == most)

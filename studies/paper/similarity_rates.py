@@ -18,7 +18,7 @@ RESPONSES = {"response_i": "Response I", "response_ii": "Response II"}
 
 
 def similarity_study(options: FigureOptions, models: tuple[str, ...]) -> Study:
-    """Return the study of stops and models at the four amplitudes, on the grid for comparison."""
+    """Return the study of stops and models at the four amplitudes, on the frequency grid for comparison."""
     return options.study(("hertz", *models), AMPLITUDES_M, frequencies_hz=options.similarity_frequencies_hz)
 
 

@@ -20,7 +20,7 @@ from vibench.sim import Harmonic, RestoringForce, Specimen, spring_of
 from .responses import Reals
 
 APART_M = 1e-11
-"""Distance of the neighbouring motion for an exponent [m]; far below indentations, above rounding errors."""
+"""Distance of the neighbouring motion, for exponents [m]; far below indentations, above rounding errors."""
 READING_S = 1e-3
 """Interval at which the distance of the neighbour is measured and reset [s]."""
 LOST_M = 1.0
@@ -146,7 +146,7 @@ def march(
 ) -> tuple[Reals, Reals]:
     """Integrate motions to a time, optionally with neighbours; return states and divergence rates [1/s].
 
-    ``states`` has shape (6, 1 or 2, motions); the second entry is a neighbouring state of the first.
+    ``states`` has shape (6, 1 or 2, motions); a second entry is a neighbouring state of the first.
     """
     tableau, spring, scales = method.tableau, spring_of(specimen), _scales(drives)
     numbers = np.array([numbers_of(specimen, drive) for drive in drives]).reshape(-1, 12).T

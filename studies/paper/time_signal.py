@@ -39,7 +39,7 @@ class TimeSignal:
 
 
 def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> TimeSignal:
-    """Simulate a dwell from rest and return its outline and the spectrum of its end."""
+    """Simulate a dwell from rest; return its outline and the spectrum of its last part."""
     run = integrate(specimen, drive, options.duration_s, options.accuracy, sample_rate_hz=_RATE_HZ)
     motion = run.states[:, 0] / drive.amplitude_m
     count = round(options.window_s * _RATE_HZ)
