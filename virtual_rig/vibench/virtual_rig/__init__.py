@@ -4,7 +4,7 @@ Unmodified pyvisa finds an AFG1022, and unmodified nidaqmx finds a converter beh
 are simulated in rig time, from the generator's output through amplifier, shaker, specimen, vibrometer and
 converter. Faults occur on demand or by a script (docs/campaigns.md). Configuration, errors and disk faults
 come from `vibench.acquisition`, physics from `vibench.sim`; no driver, plan or run is imported. Only a bench
-and ``vibench serve-rig`` start the rig. See docs/decisions/0006-virtual-rig.md for levels and time.
+and ``vibench serve-rig`` start the rig (levels and time steps: docs/decisions/0006-virtual-rig.md).
 
 ::
 

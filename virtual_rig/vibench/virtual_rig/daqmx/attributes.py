@@ -35,7 +35,7 @@ DRIVER_VERSION = (24, 8, 0)
 
 @dataclass(frozen=True)
 class Attribute:
-    """One property: how it is read and, if writable, how it is set by a program."""
+    """One property: how a program reads it and, if it is writable, how a program sets it."""
 
     get: Callable[[Any], object]
     set: Callable[[Any, Any], None] | None = None
@@ -120,7 +120,7 @@ def _start_terminal(task: Task) -> str:
 
 
 def _running_acquisition(task: Task) -> Acquisition:
-    """Return the running acquisition of a device with overload detection."""
+    """Return the running acquisition of a task, whose device must detect overloads."""
     if not (isinstance(task.side, AnalogInputs) and task.side.detects_overloads):
         device = task.devices[0]
         raise not_supported("Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})")
@@ -256,7 +256,7 @@ GROUPS = {
         is_set_at_rest=True,
     ),
 }
-"""Groups of properties, keyed by their part of the call names in the protocol."""
+"""Groups of properties, keyed by the part of the protocol's call names that denotes them."""
 
 
 # Tables that map calls to properties, and values to messages

@@ -81,7 +81,7 @@ TaskCall = Callable[[Task, Any], Fields | None]
 
 
 def pick(request: Any, field: str) -> int:
-    """Return the number of an enum in a request: the raw number if given, else the named value."""
+    """Return the number of an enum in a request: its raw number if given, else that of its named value."""
     return int(getattr(request, f"{field}_raw") or getattr(request, field))
 
 
@@ -183,7 +183,7 @@ TASK_CALLS: Mapping[str, TaskCall] = {
 
 Listener = Iterator[Any]
 _BY_OTHERS = math.inf
-"""Stands for the rig time [s] of an event that only other calls can cause."""
+"""Rig time [s] that stands for an event that only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
@@ -210,7 +210,7 @@ def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerCon
 
 
 def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.ServicerContext) -> Listener:
-    """Yield the responses from a separate thread, which holds the rig's lock only while it checks."""
+    """Yield the responses from a separate thread, which holds the rig's lock only during its checks."""
     subscription = _Subscription(system, task, context)
     while stream := subscription.await_run():
         count = response.n_samples

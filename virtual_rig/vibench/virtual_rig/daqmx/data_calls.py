@@ -149,7 +149,7 @@ def _await(
 def write(task: Task, volts: NDArray[np.float64], request: Any) -> Fields:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
-    ``request`` gives the timeout, and whether a stopped task is started.
+    ``request`` contains the timeout, and whether to start a stopped task.
     Raises DaqmxRefusal: -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full
     buffer, -200290 after an underflow.
     """

@@ -195,9 +195,9 @@ class Catalogue:
     def physical(
         self, names: str, side: Callable[[Device], tuple[str, ...]]
     ) -> tuple[tuple[str, Device], ...]:
-        """Return each channel in a list of names and ranges, in its device's spelling, with the device.
+        """Return each channel in a list of names and ranges, as its device spells it, with the device.
 
-        ``side`` returns the inputs or the outputs of a device. -200220, -200170 or -200096 for unknown names.
+        ``side`` returns the inputs or the outputs of a device. Unknown names: -200220, -200170 or -200096.
         """
         found, prefix = [], ""
         for given in expand(names):
@@ -258,7 +258,7 @@ def catalogue_with(product_type: str, name: str) -> Catalogue:
 
 
 _SLACK = 1 + 1e-9
-"""Relative tolerance for limits of a channel, as these may have rounding errors."""
+"""Relative tolerance for the limits of a channel, which may have rounding errors."""
 
 
 @dataclass
@@ -314,7 +314,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def raw_bits(self) -> int:
-        """Number of bits of an unscaled sample in transfers."""
+        """Number of bits of an unscaled sample when it is transferred."""
         return 16 if self.side.bits <= 16 else 32
 
     def verify(self) -> None:
@@ -376,7 +376,7 @@ Channel = InputChannel | OutputChannel
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of virtual channels: the given names, or the physical names if none is given.
 
-    ``given`` is a list or range with one name per channel, or one name to which numbers are added.
+    ``given`` is a list or range with one name per channel, or a single name to which numbers are added.
     """
     if not given:
         return physical

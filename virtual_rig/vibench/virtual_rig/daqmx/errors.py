@@ -10,7 +10,7 @@ from vibench.acquisition import InstrumentError
 
 
 class DaqmxRefusal(InstrumentError):
-    """A call that the driver answers with a negative status."""
+    """Error: the driver answers a call with a negative status."""
 
     def __init__(
         self, code: int, detail: str = "", samples_read: int | None = None, samples_written: int | None = None
@@ -78,7 +78,7 @@ class Faults:
         return end
 
     def take_restart(self) -> bool:
-        """Return whether the server has restarted, and so lost its tasks, since the last call."""
+        """Return whether the server has restarted since the last call, and thus lost its tasks."""
         is_due, self._restart_is_due = self._restart_is_due, False
         return is_due
 

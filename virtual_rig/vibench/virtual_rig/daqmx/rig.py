@@ -28,7 +28,7 @@ Without this time, a temporary fault would never end for a program that retries.
 TICK_S = 0.02
 """Interval of updates in real time while a task runs [s], well below the usual read times."""
 SLICE_S = 0.1
-"""Longest rig time computed without releasing the lock [s]; also the interval of updates without a task."""
+"""Longest rig time computed without releasing the lock [s]; also the update interval without a task."""
 
 YIELD_S = 1e-4
 """Pause between two slices of rig time while the rig lags behind the clock [s]."""
@@ -63,7 +63,7 @@ class Rig:
         return bool(self._acquisitions or self._generations)
 
     def wall_s(self, rig_s: float) -> float:
-        """Return the wall-clock time of a rig time [s since 1970]; both coincide at switch-on."""
+        """Return the wall-clock time for a rig time [s since 1970]; both agree at switch-on."""
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
@@ -94,7 +94,7 @@ class Rig:
             self.changed.notify_all()
 
     def run(self, stream: Acquisition | Generation) -> None:
-        """Include a stream in the advance of time; the stream starts now."""
+        """Let a stream advance with rig time from now on."""
         if isinstance(stream, Generation):
             stream.prepare(self.now_s)
             self._generations.append(stream)
@@ -103,7 +103,7 @@ class Rig:
         self.changed.notify_all()
 
     def end(self, stream: Acquisition | Generation) -> None:
-        """Close a stream, and exclude it from the advance of time."""
+        """Close a stream, which no longer advances with rig time."""
         stream.close()
         self._acquisitions = [other for other in self._acquisitions if other is not stream]
         self._generations = [other for other in self._generations if other is not stream]

@@ -174,7 +174,7 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Raise an error if a rule applies. The first failure takes no rig time; repeated failures do.
+        """Raise an error if a rule applies. The first failure takes no rig time, but repeated failures do.
 
         Successful calls take no time, because readers would otherwise fall behind.
         """
@@ -200,7 +200,7 @@ class DaqServer:
 
 @contextmanager
 def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
-    """Convert a refusal to gRPC status UNKNOWN with the code in the trailing metadata, as clients expect."""
+    """Convert a refusal to gRPC status UNKNOWN, with the code in the trailing metadata, as clients expect."""
     try:
         try:
             yield
@@ -221,7 +221,7 @@ def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
 
 
 def _require_address(address: str) -> None:
-    """Refuse text other than ``host:port``; gRPC would map port numbers above the limit to other ports."""
+    """Refuse text other than ``host:port``; gRPC would map too large port numbers to other ports."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdecimal() or int(port) > LAST_PORT:
         raise ConfigurationError(

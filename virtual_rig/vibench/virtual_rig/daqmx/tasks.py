@@ -19,7 +19,7 @@ from .streams import Acquisition, Generation, OutputBuffer, Timing, check_memory
 
 
 class TdmsLog:
-    """TDMS file of a task's runs, each of which replaces the file. Needs npTDMS."""
+    """TDMS file of a task; each run of the task replaces it. Needs npTDMS."""
 
     def __init__(self, path: Path, group: str) -> None:
         if find_spec("nptdms") is None:
@@ -59,7 +59,7 @@ class TdmsLog:
 
 _OWN_CLOCKS = ("", "onboardclock")
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
-"""Buffer size in samples per channel, up to each rate (NI-DAQmx Help, "How is buffer size determined?")."""
+"""Buffer sizes [samples per channel] up to each rate (NI-DAQmx Help, "How is buffer size determined?")."""
 
 
 class TaskState(IntEnum):

@@ -84,8 +84,8 @@ class AFG1022(ScpiInstrument):
         """Return the mean voltage at channel 1's terminal over ``count`` intervals, shape (count,) [V].
 
         The first interval begins at ``start_s`` [s of rig time], which must not decrease from call to call.
-        The load is the one in ``Terminal``. Commands act at the rig time of their arrival, or at the end of
-        the part already rendered if that is later.
+        The load is the one in ``Terminal``. Commands take effect at the rig time of their arrival or, if
+        later, at the end of the rendered part.
         """
         with self.lock:
             return self._output.render(start_s, interval_s, count)
@@ -147,7 +147,7 @@ class AFG1022(ScpiInstrument):
     # Faults
 
     def stick_output_relay(self, *, is_stuck: bool) -> None:
-        """Make ``OUTP OFF`` ineffective (it is accepted, and off is reported), or repair the relay."""
+        """Make ``OUTP OFF`` ineffective (accepted and reported as off, but still on), or repair the relay."""
         now_s = self.clock()
         with self.lock:
             self._output.relay_is_stuck = is_stuck
@@ -171,7 +171,7 @@ def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> Channel
 
 
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings without a mode that is not simulated: such a mode cannot be switched on (-241)."""
+    """Return settings without a mode that is not simulated; such a mode cannot be switched on (-241)."""
     if wanted:
         raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)

@@ -32,7 +32,7 @@ from .terminal_voltage import (
 LOWEST_FREQUENCY_HZ = 1e-6
 LOWEST_BURST_FREQUENCY_HZ = 2e-3
 OPEN_AMPLITUDE_RANGE_VPP = (2e-3, 20.0)
-"""Amplitude limits in open circuit: 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
+"""Amplitude limits in open circuit, for 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
 OPEN_PEAK_V = 10.0
 """Largest |offset| + amplitude/2 in open circuit [V], the stricter of two published values."""
 _PEAK_ROUNDING_V = 1e-9
@@ -78,14 +78,14 @@ def standard_shape(word: str) -> str | None:
 
 
 class BurstMode(StrEnum):
-    """How a burst is started; nothing is connected to the gate input."""
+    """Trigger of a burst; nothing is connected to the gate input."""
 
     TRIGGERED = "TRIGgered"
     GATED = "GATed"
 
 
 class Trigger(StrEnum):
-    """How a sweep is started, for generators that offer a choice."""
+    """Trigger of a sweep, for generators that offer a choice."""
 
     IMMEDIATE = "IMMediate"
     BUS = "BUS"
@@ -162,7 +162,7 @@ def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShap
 
 
 class ChannelOutput(Timeline):
-    """Output that plays the settings; a change acts at the rig time of its command."""
+    """Output that plays the settings; a change takes effect at the rig time of its command."""
 
     def __init__(self, terminal: Terminal, memory: ArbitraryMemory, power_on: ChannelSettings) -> None:
         self.relay_is_stuck = False

@@ -136,11 +136,11 @@ class Quirks:
     first_identity_after_clear_is_empty: bool = True
     """The first ``*IDN?`` after ``*CLS`` returns an empty line."""
     high_impedance_has_ohm_sign: bool = True
-    """``OUTP:IMP?`` at high impedance returns ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
+    """``OUTP:IMP?`` at high impedance returns ``9.9E+37`` and an ohm sign in GBK, not ASCII."""
     unknown_is_syntax_error: bool = True
-    """An unknown command queues -102; an unknown query also returns an empty line (else -113, no reply)."""
+    """An unknown command queues -102; an unknown query also gets an empty line (if False: -113, no reply)."""
     out_of_range_becomes_default: bool = True
-    """A number out of range silently sets the default of the parameter (else -222 and no change)."""
+    """A number out of range silently sets the parameter's default (if False: -222 and no change)."""
     panel_load_ohm: float | None = None
     """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (one driver's report); else None."""
 

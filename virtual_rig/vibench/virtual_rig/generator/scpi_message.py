@@ -304,7 +304,7 @@ def integer(parameter: bytes) -> int:
 
 
 def boolean(parameter: bytes) -> bool:
-    """Return the value of ON, OFF or a number; a number that rounds to zero is OFF."""
+    """Return whether ON, OFF or a number means on; a number that rounds to zero means off."""
     word = text(parameter).upper()
     if word in ("ON", "OFF"):
         return word == "ON"

@@ -149,7 +149,7 @@ class Sine:
     """Sine: sin(2 pi phase)."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the sine at the middle, multiplied by sinc(span)."""
+        """Return the mean: the sine at the middle phase, multiplied by sinc(span)."""
         return np.asarray(np.sin(np.pi * (2 * start + span)) * np.sinc(span))
 
 
@@ -160,7 +160,7 @@ class Rectangle:
     duty: float = 0.5
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean, computed from the part of the range in which the output is high."""
+        """Return the mean, computed from the part of the phase range in which the output is high."""
         end = start + span
         cycles = np.floor(end)
         high = cycles * self.duty + np.minimum(end - cycles, self.duty) - np.minimum(start, self.duty)
@@ -175,7 +175,7 @@ class Triangle:
     """A ramp with 50 % symmetry: from 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the middle value if the range contains no corner, else from the integral."""
+        """Return the mean: the middle value if the phase range contains no corner, else from the integral."""
         begin = start + 0.25  # phase is counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
@@ -299,7 +299,7 @@ class Terminal:
     clock_error_ppm: float = 0.0
     """Error of the generator's clock relative to rig time [ppm]."""
     noise_v_per_rt_hz: float = 50e-9
-    """One-sided density of the output's own noise (assumed; the data sheet gives none)."""
+    """One-sided noise density of the output (assumed; the data sheet gives none)."""
     seed: int = 0
     clock_offset_s: float = 0.0
     """Total shift of the generator's clock since switch-on [s]."""
@@ -310,7 +310,7 @@ class Terminal:
         return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.load_ohm)
 
     def own_time(self, time_s: Samples) -> Samples:
-        """Return the time by the generator's clock at a rig time [s]."""
+        """Return the time that the generator's clock shows at a rig time [s]."""
         return time_s + time_s * (self.clock_error_ppm * 1e-6) + self.clock_offset_s
 
 
@@ -372,7 +372,7 @@ class Timeline:
         return volts * self.terminal.divider
 
     def _edges(self, start_s: float, interval_s: float, count: int) -> Samples:
-        """Return the limits of the intervals; consecutive blocks share one grid."""
+        """Return the edges of the intervals [s]; consecutive blocks share one time grid."""
         expected_s = self._origin_s + self._rendered * self._interval_s
         if interval_s != self._interval_s or abs(start_s - expected_s) > _CONTINUES * interval_s:
             self._origin_s, self._interval_s, self._rendered = start_s, interval_s, 0
@@ -400,7 +400,7 @@ class Timeline:
         return volts
 
     def _noise(self, count: int) -> Samples:
-        """Return unit noise that depends only on the seed and the sample number."""
+        """Return noise of unit variance that depends only on the seed and the sample number."""
         begin, self._noise_index = self._noise_index, self._noise_index + count
         blocks = range(begin // NOISE_BLOCK, (self._noise_index - 1) // NOISE_BLOCK + 1)
         drawn = np.concatenate([self._draw(block) for block in blocks])
@@ -408,7 +408,7 @@ class Timeline:
         return drawn[skip : skip + count]
 
     def _draw(self, block: int) -> Samples:
-        """Return a block of unit noise; the last block is cached."""
+        """Return a block of noise of unit variance; the last block is cached."""
         if self._noise_block[0] != block:
             generator = np.random.default_rng((self.terminal.seed, block))
             self._noise_block = block, generator.standard_normal(NOISE_BLOCK)

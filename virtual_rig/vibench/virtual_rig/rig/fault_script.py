@@ -127,7 +127,7 @@ class RigFaults:
         return self._until(lambda: self._world.widen_gaps(0.0))
 
     def drop_laser(self, for_s: PositiveFloat) -> Heal:
-        """Set the output of the m0 sensor to zero for a while, like a vibrometer without light."""
+        """Set the output of the m0 sensor to zero for a while, as a vibrometer without light does."""
         self._world.disturb_response(for_s, level=0.0)
         return nothing_to_heal
 
@@ -194,7 +194,7 @@ class ScriptedFault(FrozenModel):
 
 
 def _script_model(fault: Callable[..., Heal]) -> type[ScriptedFault]:
-    """Return the model of a fault in a script, whose keys are the parameters of the fault's method."""
+    """Return the model of a scripted fault; its keys are the parameters of the fault's method."""
     keys = {
         name: (each.annotation, ... if each.default is each.empty else each.default)
         for name, each in signature(fault).parameters.items()

@@ -48,7 +48,7 @@ class VirtualRig:
 
     In this process, pyvisa finds the generator at ``visa_resource``, and nidaqmx finds the converter at
     ``daq_address``. Programs of other processes find both at ``daq_address``: the generator after
-    ``plug_in_remote(daq_address)``, or without it at ``socket_resource``.
+    ``plug_in_remote(daq_address)`` or, without this call, at ``socket_resource``.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """A USB bus in memory; any program that uses pyvisa-py or PyUSB finds its devices.
 
-For a generator in another process, one line is enough, before or after pyvisa opens its resource manager::
+For a generator in another process, one call is enough, before or after pyvisa opens its resource manager::
 
     from vibench.virtual_rig import plug_in_remote
     plug_in_remote("127.0.0.1:31763")
@@ -138,7 +138,7 @@ class RemoteUsbDevice:
 
 
 UsbDevice = UsbTmcInstrument | RemoteUsbDevice
-"""A device with one USBTMC interface, at the level of whole transfers."""
+"""A device with one USBTMC interface, simulated at the level of whole transfers."""
 _GET_DESCRIPTOR = 6
 _REQUEST_TYPE_MASK = 0x60
 

@@ -46,7 +46,7 @@ class Identification:
 AFG1022_IDS = 0x0699, 0x0353
 """USB vendor and product number, the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
-"""Bulk header: message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
+"""Bulk header: message id, tag, inverted tag, length, attributes, termination character (tables 1 to 4)."""
 ALIGNMENT = 4
 NEVER_MS = 2**32 - 1
 

@@ -26,7 +26,7 @@ _HALF_WIDTH_SAMPLES = 32
 """Half width of the filter: pass band up to 0.45 of the sample rate, -100 dB from 0.55 of it on."""
 _STOP_BAND_DB = 100.0
 _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
-"""Kaiser 1974, as in Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
+"""Window parameter by Kaiser (1974); Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
 
 _DROOP_REACH = 3
 """Number of grid points on each side of a step that the droop correction uses."""
@@ -35,12 +35,12 @@ _DROOP_BAND = 0.23
 _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
-"""Rows of the table per output sample. The error of linear interpolation is 110 dB below the signal."""
+"""Number of table rows per output sample. The error of linear interpolation is 110 dB below the signal."""
 _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest channel delay for which the filter needs no future means [steps]; negative for an advance."""
+"""Smallest delay of a channel for which the filter needs no future means [steps]; negative if ahead."""
 
 
 class Decimator:

@@ -19,7 +19,7 @@ PAGE = 16_384
 
 
 class NoiseStream:
-    """White Gaussian noise of unit variance for one place in the rig.
+    """White Gaussian noise of unit variance, for one source of noise in the rig.
 
     A counter-based generator (Salmon et al., Parallel random numbers: as easy as 1, 2, 3, SC11) gives any
     page of the stream directly, so that runs agree bit for bit for all block sizes.
@@ -42,7 +42,7 @@ class NoiseStream:
         return np.asarray(drawn[offset : offset + count])
 
     def generator(self, page_number: int) -> Generator:
-        """Return a random generator for the events of one page."""
+        """Return a random number generator for the events of one page."""
         # The page number is the third word of the counter, so that pages never share random numbers.
         return Generator(Philox(key=self._key, counter=np.array([0, 0, page_number, 0], dtype=np.uint64)))
 
@@ -104,7 +104,7 @@ class RandomDropouts:
 _FIT_BAND = 0.2
 """Upper end of the fit [grid rates]: the pass band of a converter that samples at half the grid's rate."""
 _FIT_FLOOR = 1e-2
-"""Lower end of the fit; below this, the exact gain at zero frequency determines the gain."""
+"""Lower end of the fit; below this, the exact gain at zero frequency determines the response."""
 _FIT_POINTS = 64
 _ZEROS = 6
 """Number of numerator weights that are fitted."""
@@ -173,7 +173,7 @@ class SensorParts:
     noise: FloatArray
     """Noise of the sensor in units of the motion, shape (steps,)."""
     instead: FloatArray
-    """Values that replace the motion where they are not NaN, in its units; empty if nothing is replaced."""
+    """Values that replace the motion, in its units, where they are not NaN; empty if nothing is replaced."""
     full_scale: float
     """Full scale of the sensor in units of the motion."""
     full_scale_v: float
@@ -243,7 +243,7 @@ class MotionSensor:
         return SensorParts(self._filter, noise, instead, self._full_scale, self._full_scale_v)
 
     def volts(self, values: FloatArray, first_step: int) -> FloatArray:
-        """Return the output [V] for the mean motion in each of the next steps, shape (steps,)."""
+        """Return the output [V], given the mean motion in each of the next steps, shape (steps,)."""
         volts = np.empty(len(values))
         parts = self.parts(first_step, len(values))
         native_engine().call("show", parts.showing(np.ascontiguousarray(values), volts))

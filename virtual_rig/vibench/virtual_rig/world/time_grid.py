@@ -19,13 +19,12 @@ PPM = 1e-6
 class TimeGrid:
     """Equal steps of rig time.
 
-    Rig time is counted by the converter's clock, so that samples always lie at integer numbers of steps.
+    The converter's clock counts rig time, so that samples always lie at whole numbers of steps.
     Physical time differs by the clock's error, and the equations of motion use the physical step.
 
     The usual grid has twice the highest usual sample rate. Every rate of an NI 9234 is an integer fraction of
     this rate, and the transition band of its anti-alias filter fits below the Nyquist frequency. A step (9.8
-    us) is short compared with the specimen's shortest period (2 ms). Shorter contacts are resolved within a
-    step.
+    us) is far shorter than the specimen's shortest period (2 ms); contacts are resolved within a step.
     """
 
     rate_hz: float = USUAL_GRID_RATE_HZ
@@ -40,7 +39,7 @@ class TimeGrid:
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:
-        """Return the rms value per step of white noise, from its rms value in ``FULL_BAND_HZ``."""
+        """Return the rms value of white noise per step, from its rms value in ``FULL_BAND_HZ``."""
         return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
 
     def step_at(self, time_s: float) -> int:

@@ -114,7 +114,7 @@ class ClosedLoop(Protocol):
 
     @property
     def is_on(self) -> bool:
-        """Whether the loop or its delayed output drives the amplifier; if not, `move` is not called."""
+        """Whether the loop or its delayed output drives the amplifier; `move` is called only if so."""
 
     def move(
         self,
@@ -262,7 +262,7 @@ class World:
             self._compute_to(self._step + 1)  # the mean velocity over a step needs the state before the step
 
     def disturb_response(self, duration_s: float, level: float) -> None:
-        """Make the sensor of m0 output ``level`` (fraction of full scale) for a while."""
+        """Hold the output of the m0 sensor at ``level`` (fraction of full scale) for a while."""
         with self._turn:
             stop = self._step + self._grid.step_at(duration_s)
             for role in RESPONSE_ROLES:
@@ -280,7 +280,7 @@ class World:
             self._cables[physical_channel] = OPEN_INPUT
 
     def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input, which inverts the sign of the input."""
+        """Swap the two wires of an input, which inverts the input's sign."""
         cable = self._plan.get(physical_channel, OPEN_INPUT)
         with self._turn:
             self._cables[physical_channel] = replace(cable, attenuation=-cable.attenuation)
@@ -383,7 +383,7 @@ class World:
 
 
 _LOOP_ROLES = (Role.BASE_ACCELERATION, Role.M0_VELOCITY)
-"""Channels that a controller can sample, because the native engine computes their means."""
+"""Channels that a controller can sample: those whose means the native engine computes."""
 _STATES = {
     "base": ("base_displacement", "base_velocity"),
     "m0": ("x", "vx"),
