@@ -44,7 +44,7 @@ class Rates:
     clock_hz: float | None = None
 
     def next_up(self, rate_hz: float) -> float:
-        """Return the smallest possible rate that, but for rounding errors, is not below ``rate_hz``."""
+        """Return the smallest possible rate that is not below ``rate_hz``, except for rounding errors."""
         if self.clock_hz is None:
             return rate_hz
         return self.clock_hz / math.floor(self.clock_hz / rate_hz * (1 + _ROUNDING))
