@@ -141,7 +141,7 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` receives each told part."""
+        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` receives what it tells."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:

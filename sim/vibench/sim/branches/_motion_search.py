@@ -28,7 +28,7 @@ NEARLY_MIRRORED = 0.1
 WITHIN = 0.9
 """Largest abs(p) of random initial states, relative to the gap on the same side."""
 RANDOM_REACH = 3.0
-"""Largest x and z of random initial states, relative to the gap or, if larger, the stop-free amplitude."""
+"""Largest x and z of random initial states, relative to the larger of gap and amplitude without stops."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class MotionSearch:
     places: int = 8
     """Number of evenly spaced parameter values at which to search, including both ends of the range."""
     starts: int = 12
-    """Number of random initial states at each value, in addition to rest and the contact-free motion."""
+    """Number of random initial states at each value, in addition to rest and motion without contact."""
     settling_periods: int = 300
     most_periods: int = 4
     """Longest period of a motion that the search finds, in drive periods."""

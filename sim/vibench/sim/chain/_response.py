@@ -78,8 +78,8 @@ def chain_response(
     Parameters
     ----------
     chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
-        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the evaluated part at the end of the
-    run. initial_state
+        As in `vibench.sim.chain.integrate_chain`; ``window_s`` [s] is the evaluated part at the end.
+    initial_state
         Initial state of every cell, shape (cells, 6) [m, m/s]; None for rest.
     """
     accuracy = member(Accuracy, accuracy)

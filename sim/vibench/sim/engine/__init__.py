@@ -1,4 +1,4 @@
-"""The native engine, compiled from C++ sources in native/: motions, chains, filters, virtual rig.
+"""The native engine, compiled from C++ in native/: motions, chains, filters, virtual rig.
 
 `NativeRun` integrates a motion of a specimen under a harmonic drive. The library that suits the processor is
 loaded once and checked with a known scene (docs/decisions/0077-native-engine.md). Python prepares modal

@@ -77,7 +77,7 @@ class LyapunovSpectrum:
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence limits of the dimension, cut to 0 to 6; Student's t is for the fewest blocks."""
+        """Return confidence limits of the dimension (0 to 6), by Student's t for the smallest block number."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 

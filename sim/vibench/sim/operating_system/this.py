@@ -34,7 +34,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write all bytes at an offset; write the rest again if the system writes only part of them."""
+    """Write all bytes at an offset, in several calls if the system writes only part of them."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)

@@ -152,7 +152,7 @@ class OrbitSigns:
     joins: BifurcationKind | None = None
     """Bifurcation where this branch meets one whose motions are mirrored or have half the period."""
     grazing_distance: float = math.inf
-    """Distance from grazing: (stop - p) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
+    """Distance from grazing: (distance to the stop) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
 
     @property
     def over_period(self) -> Complex:

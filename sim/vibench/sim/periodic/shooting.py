@@ -309,7 +309,7 @@ def _signs(
 
 
 def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
-    """Return the distance from grazing: (stop - p) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
+    """Return the distance from grazing: (distance to stop) / gap or, in contact, (dp/dt) / (gap * 2 pi f)."""
     if isinstance(specimen.contact, NoContact | PowerLaw):
         return math.inf
     lower, upper = specimen.gaps_m

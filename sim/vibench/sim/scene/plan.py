@@ -141,9 +141,9 @@ SLOW = 0.9
 """Ratio of drive frequency to lowest natural frequency, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if the stop-free p equals the gap; it grows as the cube root of p / gap."""
+"""Impacts per drive period if p without stops equals the gap; it grows as the cube root of p / gap."""
 HALF_PRESSED = 150.0
-"""Ratio of the stop-free p to the gap at which m1 touches a stop during half of the time."""
+"""Ratio of p without stops to the gap at which m1 touches a stop during half of the time."""
 MICROMETRES = 1e6
 
 

@@ -69,8 +69,8 @@ class FoundMotion:
     starts: int
     """Number of starts (initial states) that led to this motion."""
     share: Share
-    """Share of all starts; the 95 % intervals of all motions hold jointly. They allow for longer runs, in
-    which undecided or chaotic starts, also with several chaotic motions, may end elsewhere."""
+    """Share of all starts; the 95 % intervals of all motions hold jointly. They allow for longer runs, where
+    starts that are undecided, chaotic so far, or on one of several chaotic motions may end elsewhere."""
 
 
 @dataclass(frozen=True)

@@ -155,10 +155,11 @@ class _Path:
 
 
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
-    """Yield results of a scene with a target, each better than the one before. Without a requested time, it
-    ends after a minute, or after two seconds if the requested error certainly takes longer than a minute.
-    Raises ValueError when the scene has no target, the specimen cannot be simulated, or the requested time is
-    too short for one drive period.
+    """Yield results of a scene with a target, each better than the one before.
+
+    Without a requested time, it ends after a minute, or after two seconds if the requested error certainly
+    takes longer than a minute. Raises ValueError when the scene has no target, the specimen cannot be
+    simulated, or the requested time is too short for one drive period.
 
     """
     if scene.target is None:

@@ -146,7 +146,7 @@ def one_by_one(several: Sequence[StatesAlone]) -> None:
 
 
 WORTH_A_FIT_S = 3000.0
-"""Total simulated time of one specimen above which batches save more time than their collision fit [s]."""
+"""Simulated time of a specimen above which batches save more time than their collision fit takes [s]."""
 AUTOMATIC_S = 10.0
 """Assumed length of a run with an automatic duration, to compare batches with single runs [s]."""
 

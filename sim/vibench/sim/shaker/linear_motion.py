@@ -125,8 +125,9 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
-    """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N]. The
-    stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.
+    """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N].
+
+    The stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.
     """
     excess = np.maximum((np.abs(p) / gap_m) ** 2 - 1.0, 0.0)
     size = np.maximum(np.abs(receptance) ** 2, np.finfo(np.float64).tiny)

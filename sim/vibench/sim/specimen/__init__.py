@@ -1,4 +1,4 @@
-"""Definition of a simulation (specimen, contact law, drive, accuracy), and contact-free solutions.
+"""Definition of a simulation (specimen, contact law, drive, accuracy), and solution without contact.
 
 `Specimen` and the contact laws are immutable and validated. A law also has a short name, such as `power:3+5`.
 `Harmonic`, the sweeps and `Sampled` describe the base motion, `Accuracy` the error of the integration, and

@@ -192,7 +192,7 @@ class Generation(Stream):
         self._idle = device.idle
         self._memory = np.empty((len(self._outputs), 0))
         self._most_in_memory = 0 if self.repeats else device.memory
-        """Memory limit of the device in samples; a repeated buffer is not transferred in advance."""
+        """Most samples that the device stores; a repeated buffer is not transferred in advance."""
         self._fetched = 0
         self._recent = np.empty((len(self._outputs), 0))
         self._is_open = True

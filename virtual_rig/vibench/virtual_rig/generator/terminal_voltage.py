@@ -339,7 +339,7 @@ class Timeline:
         self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> tuple[float, float]:
-        """Return the time of effect of a command sent at ``time_s``, in rig time and generator time [s].
+        """Return when a command sent at ``time_s`` takes effect, in rig time and in generator time [s].
 
         A command does not take effect before the end of the rendered part.
         """

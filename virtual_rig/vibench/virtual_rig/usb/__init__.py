@@ -1,4 +1,4 @@
-"""The USB cable of the simulated generator: bus, descriptors, USBTMC, and a cable over the network.
+"""The USB cable of the simulated generator: bus, descriptors, USBTMC, and network cable.
 
 The simulation works with unmodified PyUSB and pyvisa-py, without libusb. While this bus is installed, PyUSB
 does not see the machine's own devices. Transfers fail with the errno of real transfers. Sources: USB 2.0
