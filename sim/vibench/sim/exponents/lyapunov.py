@@ -99,7 +99,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error of the exponent [1/s]; for multipliers, half the difference of two cycles; 0 for modes."""
+    """Standard error [1/s]: half the difference of two cycles for multipliers, 0 for modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion

@@ -77,7 +77,7 @@ class LyapunovSpectrum:
         return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
 
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """Return confidence limits of the dimension (0 to 6), by Student's t for the smallest block number."""
+        """Return confidence limits of the dimension (0 to 6), by Student's t for the fewest blocks."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
         return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
