@@ -127,8 +127,8 @@ def test_every_demo_measurement_agrees_with_its_ensemble_of_simulations(results)
         for name, found in results.items()
     }
     counts = {name: len(compared) for name, compared in quantities.items()}
-    # Whether the strong dwell becomes periodic during the record is a matter of chance.
-    assert counts.pop("dwell_strong") >= 5 or results["dwell_strong"]["simulated"]["escape"] is not None
+    # Whether the strong dwell becomes periodic, before or during the record, is a matter of chance.
+    assert counts.pop("dwell_strong") >= 3 or results["dwell_strong"]["simulated"]["escape"] is not None
     assert counts == {
         "noise_weak": 2,
         "noise_moderate": 2,
