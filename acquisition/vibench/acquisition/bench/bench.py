@@ -150,7 +150,7 @@ def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
 
 
 class RigPower:
-    """Power of a virtual rig, or locks of a real one. Use it in a ``with`` block.
+    """Context that keeps a virtual rig switched on, or a real rig's instruments locked.
 
     Rig time and fault script continue while a bench is closed and opened again.
     """
@@ -162,7 +162,7 @@ class RigPower:
 
     @property
     def reachable_rig(self) -> Rig:
-        """Rig with the addresses at which its instruments can be reached now."""
+        """Rig configuration with the current addresses of its instruments."""
         if self._virtual is None:
             return self.rig
         rig, virtual = self.rig, self._virtual
@@ -212,7 +212,7 @@ class RigPower:
 
 
 class _AimedDigitizer:
-    """Digitizer that renames channel ``m0_velocity`` to the role of the mass at which the beam points."""
+    """Digitizer that renames channel ``m0_velocity`` to the role of the mass on which the beam is aimed."""
 
     def __init__(self, digitizer: Digitizer, role: Role) -> None:
         self._digitizer = digitizer
@@ -259,7 +259,7 @@ class Bench:
     _power: RigPower
     _closing: ExitStack
     last_check: CheckResult | None = None
-    """Bench check by which this bench was admitted to measurements; see `vibench.acquisition.check`."""
+    """Bench check that allowed measurements on this bench; see `vibench.acquisition.check`."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -282,7 +282,7 @@ class Bench:
     def beam_on(self, role: Role) -> Iterator["Bench"]:
         """Yield the bench with the beam on the mass of ``role``; a virtual rig's beam returns to m0 at exit.
 
-        Raises ConfigurationError when the vibrometer of this rig cannot measure there.
+        Raises ConfigurationError when the vibrometer of this rig cannot measure at that mass.
         """
         aimed = copy(self)
         aimed.rig = self.rig.with_beam_on(role)

@@ -45,7 +45,7 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
 
 
 def list_rig_instruments(rig: Rig) -> InstrumentList:
-    """List the instruments that a rig's VISA and DAQmx find; a virtual rig is started for the search."""
+    """List the instruments that VISA and DAQmx find for a rig; a virtual rig is started for the search."""
     if rig.virtual is None:
         return list_instruments(rig.generator.visa_library, rig.daq.server)
     with simulated_rig(rig) as virtual:

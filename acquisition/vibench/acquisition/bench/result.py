@@ -45,7 +45,7 @@ class Finding(FrozenModel):
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds on a deviation: ok up to ``well``, a warning up to ``fail``, and a FAIL above."""
+    """Bounds on a deviation: ok up to ``well``, a warning up to ``fail``, and FAIL above ``fail``."""
 
     well: float
     fail: float
@@ -98,7 +98,7 @@ class BenchReport(FrozenModel):
         raise KeyError(f"no finding {name!r} in {', '.join(finding.name for finding in self.findings)}")
 
     def text(self) -> str:
-        """Return the report as a table, with each advice below its line."""
+        """Return the report as a table; advice stands below the line of its finding."""
         rows = [(f.verdict.upper(), f.name, f.value, f.expected) for f in self.findings]
         header = ("", "finding", "measured", "expected")
         widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]

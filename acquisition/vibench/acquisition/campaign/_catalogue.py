@@ -232,7 +232,7 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
 
 
 def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
-    """Read new or changed files and remove entries of missing files, in one transaction; return all."""
+    """In one transaction, read new or changed files and remove entries of missing files; return all."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
     noted = cache(noted_seals)
     for path in recordings_below(folder):

@@ -138,7 +138,7 @@ class CampaignProgress:
     number: int
     """Number of the current recording, from 1."""
     count: int
-    """Number of all recordings of the campaign."""
+    """Total number of recordings in the campaign."""
     path: Path
     """Path of the current recording."""
     run: Progress
@@ -159,7 +159,7 @@ class FinishedPoint:
 
     point: DonePoint
     done: tuple[DonePoint, ...]
-    """All completed points in the order of the campaign, including ``point`` and earlier sessions."""
+    """All completed points of this and earlier sessions in the order of the campaign, including ``point``."""
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
@@ -230,7 +230,7 @@ FROM points ORDER BY place
 
 
 def journal_exists(path: Path) -> bool:
-    """Return whether ``path`` is a journal; a database without a committed transaction is not."""
+    """Return whether ``path`` is a journal; a database without a committed transaction is no journal."""
     if not path.is_file():
         return False
     with sentences(path), closing(open_read_only(path)) as connection:
@@ -433,7 +433,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("INSERT INTO benches VALUES (?, ?)", (_now(), bench.model_dump_json()))
 
     def start(self, name: str, file: str) -> None:
-        """Record the start of an attempt at a point, before anything plays."""
+        """Record the start of an attempt at a point, before any signal is played."""
         with self._transaction() as connection:
             _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))

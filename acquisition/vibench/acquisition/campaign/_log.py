@@ -259,7 +259,7 @@ class CommandMessenger:
 
     @classmethod
     def of(cls, command: str) -> "CommandMessenger":
-        """Return the messenger for a command line, split as in a shell; no variables, wildcards or pipes.
+        """Return the messenger for a command line with shell quoting, but no variables, wildcards or pipes.
 
         Raises ConfigurationError if the line is empty, lacks a quotation mark, or names no existing program.
         """
@@ -282,7 +282,7 @@ class CommandMessenger:
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with ``document`` as input; return a clause on its failure, or empty text."""
+        """Run the command with ``document`` as input; return a clause on any failure, or an empty text."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,

@@ -124,7 +124,7 @@ class CampaignRunner:
                 self.say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Pause, and wait until the beam has been moved, before a measurement; return False after a stop."""
+        """Before a measurement, pause and wait until the beam has been moved; return False after a stop."""
         if point.state is not JournalPointState.DONE and self.stop.request is None:
             self.attempts.wait_before(point.name, point.measurement)
         return self.stop.request is None
@@ -206,7 +206,7 @@ def run_campaign(
     All points are checked against the limits of the rig before the first one starts. The journal records
     what was done, what failed and why. A killed campaign continues with ``existing="resume"`` at its first
     unfinished point. Ctrl-C ramps the running measurement down and ends the campaign. Returns one result per
-    recording made, kept or failed; these are fewer than planned if the campaign was stopped.
+    recording made, kept or failed; a stopped campaign returns fewer results than planned.
 
     Parameters
     ----------
@@ -354,12 +354,12 @@ class ReconnectingBench:
 
 
 WRITTEN_SHARE = 1 / 1.7
-"""Ratio of a recording's final size to its size while growing; for 24-bit white noise, less for dwells."""
+"""Ratio of a recording's final size to its size while growing, for 24-bit white noise; smaller for dwells."""
 
 
 @dataclass(frozen=True)
 class CampaignEstimate:
-    """Duration and disk space of those recordings of a campaign that do not exist yet."""
+    """Duration and disk space needed for the recordings that a campaign must still make."""
 
     recordings: int
     """Number of recordings that the campaign must still make."""

@@ -1,7 +1,7 @@
-"""Admission of a bench, which requires a recent passed check of the same configuration.
+"""Admission of a bench to measurements, which requires a recent passed check of the same configuration.
 
-The last check of each rig is stored as a JSON file in the user's state folder. The next check reports the
-changes since then: of gains in decibels, and of the clock in ppm.
+The last check of each rig is stored as a JSON file in the user's state folder. The next check reports how the
+gains (in decibels) and the clock (in ppm) have changed since then.
 """
 
 import hashlib
@@ -59,7 +59,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed_check(rig: Rig) -> CheckResult | None:
-    """Return the last check without FAIL of a rig in its current configuration; None without such a check."""
+    """Return a rig's last check without FAIL in its current configuration; None if there is no such check."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each

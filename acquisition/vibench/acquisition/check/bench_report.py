@@ -86,7 +86,7 @@ def bench_report(
 
 
 class _BlockReader:
-    """Reader of a bench in blocks; the check can be stopped between two blocks."""
+    """Reader that takes samples from a bench in blocks; the check can be stopped between two blocks."""
 
     def __init__(self, bench: Bench, switch: StopSwitch) -> None:
         self._bench = bench

@@ -123,7 +123,7 @@ LASTING: Mapping[str, Lasting] = {
 
 
 class LoopCheck:
-    """Findings from a small sine, played by the generator and read at the inputs."""
+    """Check that plays a small sine through the generator and evaluates it at the inputs."""
 
     def __init__(self, bench: Bench, amplitude_vpp: float, during: Samples, after: Samples) -> None:
         self._rig = bench.rig
@@ -138,7 +138,7 @@ class LoopCheck:
         self._base_modelled = check_phasors(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
-        """Return the findings on all recorded channels from the sine."""
+        """Return the findings on all recorded channels, as measured with the sine."""
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]

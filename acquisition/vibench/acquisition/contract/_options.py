@@ -1,4 +1,4 @@
-"""Options of the contract tests, in an entry point: with ``--pyargs``, a conftest is loaded too late."""
+"""Options of the contract tests, defined by an entry point because ``--pyargs`` loads a conftest too late."""
 
 import pytest
 

@@ -32,7 +32,7 @@ def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first suitable shipped one; None if it does not use the instrument."""
+    """Return the given bench, or the first suitable shipped one; None if no bench uses the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if name in plug_ins_of(rig)[kind] else None

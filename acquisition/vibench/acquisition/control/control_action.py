@@ -39,7 +39,7 @@ Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
 """Generator that yields actions, is sent the samples of each phase, and returns a result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
-"""Samples that the controller receives after an action without a phase: none."""
+"""Empty samples that the controller receives after an action without a phase."""
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
@@ -55,7 +55,7 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band relative to the tolerance. Smaller errors stay, because every correction disturbs the motion."""
+"""Dead band relative to the tolerance. Smaller errors remain: each correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
@@ -87,7 +87,7 @@ class MeasuredLevel:
 
 
 def measured_level(base: Phasors) -> MeasuredLevel:
-    """Return the mean fundamental of ``base``, shape (periods,), with its uncertainty from batches."""
+    """Return the mean fundamental of ``base``, shape (periods,), with its uncertainty from batch means."""
     if not len(base):
         return MeasuredLevel(0.0, 0.0)
     mean = complex(np.mean(base))

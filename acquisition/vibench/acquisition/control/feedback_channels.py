@@ -18,7 +18,7 @@ _DERIVATIVES = {Role.M0_ACCELERATION: -1, Role.M0_DISPLACEMENT: 1}
 
 @dataclass(frozen=True)
 class FeedbackChannels:
-    """Rows of drive, base and m0 in the samples, and their scales and corrections."""
+    """Rows of drive, base and m0 in the array of samples, with their scales and corrections."""
 
     drive: int
     """Index of the drive voltage's row in the samples."""
@@ -113,7 +113,7 @@ _REMEMBERED_S = 0.1
 
 
 class BridgedRows:
-    """Bridge over drop-outs in a stream of samples; it holds back samples in which a drop-out may begin."""
+    """Fills drop-outs in a stream of samples; holds back samples in which a drop-out may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
@@ -123,7 +123,7 @@ class BridgedRows:
         """Number of the next sample to be returned."""
 
     def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
-        """Add rows of drive, base, response, shape (3, n); return released rows and their first sample."""
+        """Add rows of drive, base and response, shape (3, n); return released rows and their first sample."""
         if first_sample != self._first + self._rows.shape[1]:
             self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
         self._rows = np.concatenate([self._rows, rows], axis=1)

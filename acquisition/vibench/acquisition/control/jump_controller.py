@@ -19,7 +19,7 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor by which each of `RUNGS` steps lowers the generator setting, in total to about 1/9."""
+"""Factor by which each of `RUNGS` steps lowers the generator setting; together they lower it to about 1/9."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
@@ -39,8 +39,8 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return whether a point between the ends of a jump belongs before or after the jump.
 
-    It belongs before if, of the three responses, its own and that of ``before`` are the nearest pair. A jump
-    to a third branch counts as after.
+    It belongs before if its response and that of ``before`` are the closest pair of the three responses. A
+    jump to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
@@ -112,7 +112,7 @@ class JumpBracket:
         return ratio(self.before, self.after) > factor
 
     def narrow(self, point: SettledPoint) -> None:
-        """Replace one end of the bracket by ``point``, which was measured between both ends."""
+        """Replace one end of the bracket by ``point``, which was measured between the two ends."""
         self.here = side(point, self.before, self.after)
         if self.here is JumpSide.BEFORE:
             self.branch.append(point)
@@ -137,7 +137,7 @@ class SettledPass:
     def record_at(
         self, frequency_hz: float, label: SegmentLabel, **others: int | str
     ) -> Controller[SettledPoint]:
-        """Settle at a frequency, and record a segment with the numbers of pass and settled motion."""
+        """Settle at a frequency, and record a segment labelled with the pass and the settled motion."""
         found = yield from self.settle_at(frequency_hz)
         own: dict[str, int | float | str] = {"direction": self.direction, "pass": self.number}
         numbers = {"frequency_hz": frequency_hz, **own, **others, **found.note.numbers}

@@ -48,7 +48,7 @@ class TrackedPlace:
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """Estimate of the mode; None if the loop never locked: the next level starts with a search."""
+    """Estimate of the mode; None if the loop never locked; the next level then starts with a search."""
 
 
 class PhaseLaw:
@@ -70,12 +70,12 @@ class PhaseLaw:
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
         self._plan = plan
         self._turns = plan.harmonic * plan.subharmonic * LOOK_PERIODS
-        """Number of drive periods in a look, times n for harmonic n."""
+        """Number of drive periods in a look (measurement), times n for harmonic n."""
         self._last = last
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
         self._grown = last.base_m_per_s2
-        """Base level at which a settled motion has the present amplitude [m/s2]."""
+        """Base level at which a settled motion would have the present amplitude [m/s2]."""
         self._gain = _GAIN
         self._motion = 0j
         self._looks: list[tuple[float, float, float]] = []

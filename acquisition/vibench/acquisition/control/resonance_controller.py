@@ -98,7 +98,7 @@ _FINEST = 2e-6
 """Smallest relative frequency step of a search; a smaller step means that the phase jumps."""
 _BATCHES = 8
 _KNOWN = 4.0
-"""Ratio of a motion to its standard error above which the phase of the motion is defined."""
+"""Ratio of an amplitude to its standard error above which the phase of the motion is well defined."""
 _FURTHEST = 1.5
 """Largest distance of a flank point from the resonance, in half-widths."""
 
@@ -151,7 +151,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level. Return the number of looks (measurements) and the result, None if lost."""
+    """Control phase and level. Return the number of looks (measurements), and the result or None if lost."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)

@@ -36,7 +36,7 @@ class SettledPoint:
 
 _SURE = 2.0
 _SAME_LEVEL = 0.004
-"""Relative tolerance of the level if settling is judged by a single order of the response."""
+"""Relative tolerance of the level if a single order of the response determines settling."""
 _PROMPT = 0.7
 """Exponent below 1 that reduces a correction while the specimen still responds to the last correction."""
 
@@ -300,7 +300,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Extend the range of frequencies whose level is out of tolerance; None if the level is in tolerance."""
+    """Extend the range of frequencies with levels out of tolerance; None if the level is in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

@@ -111,7 +111,7 @@ class SineLoop:
         self.drives = 1
         """Number of drive periods in one period of the motion; set before anything is played."""
         self.settling_order: int | None = None
-        """The only order of the response by which settling is judged; None for all orders. It is set before
+        """The only order of the response that determines settling; None if all orders do. It is set before
         anything is played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
         """Smallest amplitude setting of the generator [Vpp]."""

@@ -215,7 +215,7 @@ last change.
 
 @dataclass(frozen=True)
 class Judgement:
-    """Judgement on whether and how periods have settled; values are relative to the motion's rms."""
+    """Verdict on whether the motion has settled, and its period; values are relative to the motion's rms."""
 
     steadiness: Steadiness
     period: int
@@ -231,7 +231,7 @@ class Judgement:
 
 
 def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
-    """Return the judgement of a motion's newest periods by the criteria of ``rule``.
+    """Return the verdict on a motion's newest periods by the criteria of ``rule``.
 
     ``points`` are the Fourier coefficients of each drive period, shape (periods, orders); ``noise`` is the
     total rms of all orders without drive, in the unit of the points.

@@ -168,7 +168,7 @@ class AFG1022X(ScpiInstrument):
         self._arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Trigger an armed burst, so that it starts."""
+        """Start an armed burst by a trigger."""
         with self._changing():
             self.command("*TRG")
 
@@ -185,7 +185,7 @@ class AFG1022X(ScpiInstrument):
             self.output = "ON"
 
     def stop(self) -> None:
-        """Switch the output off, at any time; after a failure, try again, also over a new session.
+        """Switch the output off, at any time; after a failure, try again, if necessary in a new session.
 
         Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
         must act.
@@ -295,7 +295,7 @@ class AFG1022X(ScpiInstrument):
             self._to_quiet_sine()
 
     def _to_quiet_sine(self) -> None:
-        """Set a sine of the smallest amplitude, without modulation modes and offset, from any state."""
+        """From any state, set a sine of the smallest amplitude, without modulation or offset."""
         # *RST is not used: its effect on the output of this model is not documented.
         self._end_modes()
         self.offset_v = 0.0  # set the offset first, because this lowers every peak

@@ -17,8 +17,8 @@ _SAME_SCALE = 1e-6
 class FilePlayer:
     """A `Digitizer` that returns the volts of a recording, from its first sample at every start.
 
-    ``daq.options.recording`` is its path. If the recording's plan is run, check and segments have the same
-    sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
+    ``daq.options.recording`` is its path. When the recording's plan is run, its check and segments have the
+    same sample numbers as in the recording; ``generator.driver = "file"`` accepts the plan's commands.
     """
 
     waiting_samples = 0

@@ -176,7 +176,7 @@ _NOTHING_VPP = 1e-6
 
 @dataclass(frozen=True)
 class NoGenerator:
-    """Placeholder on a bench without generator; refuses all commands except those of a replayed recording.
+    """Placeholder on a bench without a generator; refuses all commands except those of a replayed recording.
 
     The table ``[generator]`` still describes the load of the output: ``connected_ohm``, ``load_ohm``.
     """

@@ -62,7 +62,7 @@ def _handle_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
-    """Wait until an idle engine is not used, then end it, because it may block a bench for other programs."""
+    """End an idle engine that is no longer used, because it may block a bench for other programs."""
     pause = Event()
     while not handler.is_forgotten(after_s):
         pause.wait(after_s / 10)

@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """State letters in ``/proc`` of a suspended or dead process (Linux)."""
 LEAST_OWN = 0.25
-"""Fraction of the time without an input byte that always counts; the rest may be waits for a processor."""
+"""Smallest counted fraction of the time without an input byte; the rest may be waits for a processor."""
 
 
 class _Program:

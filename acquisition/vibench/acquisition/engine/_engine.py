@@ -85,7 +85,7 @@ class Engine:
 
     @property
     def stop_sentence(self) -> str:
-        """Sentence that tells why the run was stopped and whether the output is off; empty without a stop."""
+        """Sentence on why the run was stopped and whether the output is off; empty without a stop."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""

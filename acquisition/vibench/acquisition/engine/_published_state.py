@@ -120,7 +120,7 @@ class Messages:
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
     def alarm(self, what: str, done: str, next_step: str) -> None:
-        """Report that the engine stopped the drive without a request of the operator."""
+        """Report that the engine stopped the drive without a request by the operator."""
         self._add(MessageKind.FAULT, what, done, next_step, "")
 
     def fault(self, error: BaseException) -> None:

@@ -96,9 +96,9 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 STALL_S = 0.2
 """If checks for viewers are further apart than this [s], this process counts as stalled."""
 LATE_FACTOR = 4.0
-"""Extra time allowed without requests, divided by this process's own delay (both share a computer)."""
+"""Extra time allowed without requests, divided by this process's own delay, as viewers share its computer."""
 TAKEN_OVER_S = 2.0
-"""A viewer attends an engine without parent if its last request is more recent than this [s]."""
+"""A viewer attends an engine without a parent if the viewer's last request is newer than this [s]."""
 FORGETTING = 0.995
 """Factor by which the remembered largest delay shrinks at each check; the delay halves in 7 s."""
 
@@ -161,7 +161,7 @@ class RequestHandler:
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the status of the engine, without the rows if the viewer already has them."""
+        """Return the status of the engine, without the ``rows`` if the viewer already has them."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 

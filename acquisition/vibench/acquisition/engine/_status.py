@@ -60,7 +60,7 @@ class ConnectionRole(StrEnum):
 
 
 VIEWER_PATIENCE_S = 0.5
-"""Time that an attended run at a limit of the rig continues without requests [s]."""
+"""Time for which an attended run at a limit of the rig continues without requests [s]."""
 LONGEST_PATIENCE_S = 10.0
 """Longest time without requests that an attended run can be granted [s]."""
 HUNG_FACTOR = 4.0
@@ -112,7 +112,7 @@ class ArmedPlan(FrozenModel):
     attendance: Supervision
     """Whether the run needs the presence of a viewer."""
     patience_s: float
-    """Time that the run continues without requests, if it needs a viewer [s]."""
+    """Time for which the run continues without requests, if it needs a viewer [s]."""
 
 
 class RunStatus(FrozenModel):
@@ -226,7 +226,7 @@ class EngineStatus(FrozenModel):
     levels: tuple[ChannelLevel, ...] = ()
     rows: tuple[RowStatus, ...] = ()
     rows_number: int = 0
-    """Number that changes with every change of a row; viewers need not fetch unchanged rows again."""
+    """Number that changes with every change in ``rows``; viewers need not fetch unchanged rows again."""
     overloads: int = 0
     """Number of sample ranges beyond a channel's full scale in this run."""
     lost_blocks: int = 0

@@ -66,7 +66,7 @@ class CampaignRequest(FrozenModel):
     longest_patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)] = (
         VIEWER_PATIENCE_S
     )
-    """Time that an attended drive far from all limits continues without requests [s]; see `patience_s`."""
+    """Time for which an attended drive far from all limits runs without requests [s]; see `patience_s`."""
 
 
 P = ParamSpec("P")
@@ -94,7 +94,7 @@ class Verb(Generic[A]):
     request: type[FrozenModel]
     answer: Answer[A]
     states: tuple[EngineState, ...]
-    """Engine states that permit the request; empty: allowed in every state, and never delayed."""
+    """Engine states that permit the request; if empty, it is allowed in every state and never delayed."""
     work_s: float
     """Longest time to compute the answer [s]; 0 if the answer is ready at once."""
 
@@ -254,7 +254,7 @@ class EngineVerbs:
 
     @verb("status", STATUS)
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the status of the engine, without its rows if ``known_rows`` is their current number."""
+        """Return the engine's status, without its ``rows`` if ``known_rows`` equals its ``rows_number``."""
         raise NotImplementedError
 
     @verb("beat", DONE)

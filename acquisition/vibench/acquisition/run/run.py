@@ -83,7 +83,7 @@ def _commands_of_a_step(measurement: Measurement) -> int:
 def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] | None:
     """Return the feedback controller of a measurement; None without feedback.
 
-    Raises ConfigurationError when the bench does not support feedback, before anything plays.
+    Raises ConfigurationError when the bench does not support feedback, before any signal is played.
     """
     if not isinstance(measurement.excitation, AbstractFeedback):
         return None

@@ -81,7 +81,7 @@ class UntilWatch(ClosedOnLeaving):
         return found if is_newer else begun
 
     def wait_until_ready(self, switch: StopSwitch) -> None:
-        """Wait until the process is ready or a stop is requested, before anything plays."""
+        """Wait until the process is ready or a stop is requested, before any signal is played."""
         give_up_s = monotonic() + _READY_S
         self._beside.do(lambda: self._greeting.append(self._read_answer()))
         while self._beside.is_busy and switch.request is None and monotonic() < give_up_s:
