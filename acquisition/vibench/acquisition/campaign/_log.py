@@ -307,7 +307,7 @@ class Notifier:
     folder: Path
     messengers: tuple[Messenger, ...]
     say: CampaignListener
-    """Function called with a clause on the result of each notice."""
+    """Function called with a clause that states the result of each notice."""
 
     def __call__(self, event: CampaignEvent) -> None:
         if event.kind not in TOLD_OF:

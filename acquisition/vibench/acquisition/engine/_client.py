@@ -119,7 +119,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Return a sentence on programs of other computers that use the same state folder, or empty text."""
+    """Return a sentence about other computers' programs that use the same state folder, or empty text."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return (

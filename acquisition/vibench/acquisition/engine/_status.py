@@ -133,7 +133,7 @@ class RunStatus(FrozenModel):
     amplitude_vpp: float
     frequency_hz: float | None
     plan: str = ""
-    """Text on the excitation: kind and highest level."""
+    """Description of the excitation: kind and highest level."""
     until: UntilNote | None = None
     """Present error bounds of the results, for a measurement with `until`."""
 

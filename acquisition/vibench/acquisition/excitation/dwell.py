@@ -28,7 +28,7 @@ class Dwell(FixedSine):
     settle_s: NonNegativeFloat = 3.0
     """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
-    """Time for which the settled motion is recorded [s]."""
+    """Recording time of the settled motion [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
     """Tones before the dwell, in the order played; if empty, the drive starts with the dwell."""
     lead_s: PositiveFloat = 0.5

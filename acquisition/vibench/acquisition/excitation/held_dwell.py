@@ -22,13 +22,13 @@ class HeldDwell(FixedSine, AbstractFeedback):
     settling: Settling = Settling()
     """Criteria by which the motion counts as settled before the recording."""
     duration_s: PositiveFloat
-    """Time for which the settled motion is recorded [s]."""
+    """Recording time of the settled motion [s]."""
     update_s: PositiveFloat = 1.0
     """Interval at which the level is measured, and corrected if needed, during the recording [s]."""
 
     @property
     def playing_s(self) -> float:
-        """Duration of the longest wait for settling and of the recording [s]."""
+        """Longest wait for settling plus recording time [s]."""
         return self.settling.longest_wait_s + self.duration_s
 
     @property

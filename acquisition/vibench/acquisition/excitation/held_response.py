@@ -33,19 +33,19 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     start_share: Share = 0.02
     """First setting at the first frequency, as a fraction of ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
-    """Longest wait for ``response_m`` at a frequency [s]; the step's note states if it was reached."""
+    """Longest wait for ``response_m`` at a frequency [s]; the step's note states whether it was reached."""
     glide_step_hz: PositiveFloat = 0.5
     """Largest frequency step while the tone moves between two frequencies of the list [Hz]."""
 
     @property
     def level_text(self) -> str:
-        """Text on the held response and the largest setting, for display."""
+        """Display text for the held response and the largest setting."""
         words = f"{self.response_of.value} motion of m0 held at {1e6 * self.response_m:g} µm"
         return f"{words}, at most {self.amplitude_vpp:g} Vpp"
 
     @property
     def playing_s(self) -> float:
-        """Duration of all steps, with the longest waits [s]."""
+        """Duration of all steps if each wait takes its longest time [s]."""
         passes = sum(1 for _ in self.passes())
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
         steps_s = len(self.rising_hz) * (self.longest_wait_s + self.record_s)

@@ -14,8 +14,8 @@ from .steps import Segment, Step, Tone
 class HeldSweep(MovingSine, AbstractFeedback):
     """A sweep whose amplitude setting is corrected after every step from the measured base motion.
 
-    A sweep does not wait. If the gain from the setting to the base motion changes within a few steps, the
-    level is wrong during these steps, and the recording notes it.
+    A sweep does not wait for the level to settle. If the gain from the setting to the base motion changes
+    within a few steps, the level is wrong during these steps, and the recording notes it.
     """
 
     kind: Literal["held_sweep"] = "held_sweep"
@@ -28,7 +28,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of the longest wait at the start and of the sweep [s]."""
+        """Longest wait at the start plus duration of the sweep [s]."""
         return self.settling.longest_wait_s + self.duration_s
 
     @property

@@ -20,12 +20,12 @@ class OddMultisine(PeriodicNoise):
     """An odd random-phase multisine with random detection lines.
 
     Even nonlinearities appear on the even lines, odd ones on the odd detection lines. The drive has no power
-    on either (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    on these lines (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
     """
 
     kind: Literal["odd_multisine"] = "odd_multisine"
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
-    """Number of waveforms; all have the same spectral lines, each with other phases."""
+    """Number of waveforms; all have the same spectral lines, each with different phases."""
     excited_lines: tuple[PositiveInt, ...] = ()
     """Harmonics of ``repetition_hz`` that are excited; if empty, they are chosen at random from the seed."""
     detection_lines: tuple[PositiveInt, ...] = ()

@@ -32,7 +32,7 @@ class BandNoise(AbstractExcitation):
         return self
 
     def level_at(self, frequency_hz: float) -> RmsSetting:
-        """Return how the level is specified: by one amplitude setting for the whole band."""
+        """Return the specification of the level: one amplitude setting for the whole band."""
         del frequency_hz
         return RmsSetting()
 
@@ -57,7 +57,7 @@ class PeriodicNoise(BandNoise):
     repetition_hz: PositiveFloat = 1.0
     """Repetition rate of the waveform, equal to the spacing of its spectral lines [Hz]."""
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
-    """Number of waveforms; all have the same spectral lines, each with other phases."""
+    """Number of waveforms; all have the same spectral lines, each with different phases."""
     periods: PositiveInt = 2
     """Number of periods recorded per realisation; two or more allow an estimate of the sensor noise."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS

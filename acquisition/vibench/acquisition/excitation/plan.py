@@ -165,7 +165,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def level_text(self) -> str:
-        """Text on the level of the drive or of the base, for display."""
+        """Display text for the level of the drive or of the base."""
         return f"{self.amplitude_vpp:g} Vpp"
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
@@ -300,7 +300,7 @@ class AbstractFeedback(AbstractExcitation):
 
     @property
     def level_text(self) -> str:
-        """Text on the held levels and the largest setting, for display."""
+        """Display text for the held levels and the largest setting."""
         most = super().level_text
         words = [level.text for level in self.held_levels]
         return f"base held at {', '.join(words)}, at most {most}" if words else most

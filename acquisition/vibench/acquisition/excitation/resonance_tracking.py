@@ -78,7 +78,7 @@ class ResonanceTracking(AbstractFeedback):
     flank_pairs: int = Field(default=3, ge=0, le=10)
     """Pairs of frequencies, one on each flank, to measure the mode's natural frequency and damping."""
     record_s: PositiveFloat = 1.0
-    """Time recorded at each resonance [s]."""
+    """Recording time at each resonance [s]."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:

@@ -1,4 +1,4 @@
-"""A stepped sine that measures when the motion has settled before it records each step."""
+"""A stepped sine that records each step once measurements show that the motion has settled."""
 
 from typing import ClassVar, Literal
 
@@ -36,7 +36,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of all steps with the longest waits, and of all searches [s]."""
+        """Duration of all steps and searches if each wait takes its longest time [s]."""
         passes = sum(1 for _ in self.passes())
         steps_s = len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)

@@ -62,7 +62,7 @@ class MovingSine(AbstractExcitation):
     duration_s: PositiveFloat
     """Duration of the sweep from ``start_hz`` to ``stop_hz`` [s]."""
     spacing: Spacing = Spacing.LINEAR
-    """Course of the frequency over time: linear or logarithmic."""
+    """Change of the frequency over time: linear or logarithmic."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]. The last step may be shorter."""
 

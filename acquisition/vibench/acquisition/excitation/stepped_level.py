@@ -31,7 +31,7 @@ class SteppedLevel(FixedSine):
     settle_s: NonNegativeFloat = 3.0
     """Waiting time at every level, for the transient to die out [s]."""
     record_s: PositiveFloat = 1.0
-    """Time recorded at every level [s]."""
+    """Recording time at every level [s]."""
 
     @model_validator(mode="after")
     def _has_levels(self) -> Self:

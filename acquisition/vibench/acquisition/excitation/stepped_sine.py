@@ -60,7 +60,7 @@ class FrequencySteps(AbstractExcitation):
     """Equally spaced frequencies; give either this or ``frequencies_hz``."""
     direction: Direction = Direction.UP
     record_s: PositiveFloat = 1.0
-    """Time recorded at every frequency [s]."""
+    """Recording time at every frequency [s]."""
 
     @model_validator(mode="after")
     def _one_rising_list(self) -> Self:

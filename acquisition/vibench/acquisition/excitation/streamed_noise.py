@@ -25,7 +25,7 @@ class StreamedNoise(BandNoise):
     settle_s: NonNegativeFloat = 3.0
     """Waiting time before the recording, for the transient to die out [s]."""
     duration_s: PositiveFloat
-    """Time for which the noise is recorded after settling [s]."""
+    """Recording time of the noise, after settling [s]."""
     seed: int = Field(default=1, ge=0)
     """Seed; the same seed gives the same noise on any machine with the same version of numpy."""
 

@@ -1,6 +1,6 @@
 """First day at a bench: questions, the resulting configuration, and a page that records the tests.
 
 `configured` asks `QUESTIONS` and writes a commented hardware configuration; `first_day` uses it to confirm
-wires, measure the noise floor, play a first 5 mVpp and check the bench; it returns the page. The caller
+wires, measure the noise floor, play a first 5 mVpp sine and check the bench; it returns the page. The caller
 supplies the answers (terminal, file or test). `vibench bench new` does all of this (docs/first-day.md).
 """

@@ -154,7 +154,7 @@ def _guess_type(answer: str) -> str:
 
 
 def _as_toml(number: str) -> str:
-    """Return a number as TOML, which does not allow .5 and 010; raises ValueError for other text."""
+    """Return a number in TOML's notation, which excludes .5 and 010; raises ValueError for other text."""
     value = float(number)
     try:
         tomllib.loads(f"number = {number}")
@@ -223,7 +223,7 @@ def _number(answer: str, key: str) -> str:
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Function that asks a question, given proposals and the template's value; an empty answer keeps it."""
+"""Function that asks a question with proposals and the template's value, which an empty answer keeps."""
 Refuse = Callable[[ConfigurationError], None]
 
 

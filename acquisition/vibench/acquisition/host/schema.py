@@ -30,7 +30,7 @@ Json = dict[str, Any]
 
 
 def _with_defaults(schema: Json) -> None:
-    """Make those keys optional that ``[defaults]`` and templates can supply."""
+    """Make optional the keys that ``[defaults]`` and templates can supply."""
     parts = schema["definitions"]
     kinds = [
         part["$ref"].rpartition("/")[2] for part in parts["Measurement"]["properties"]["excitation"]["oneOf"]
@@ -66,7 +66,7 @@ def _with_a_base(schema: Json) -> None:
 
 
 def _starts_from_another(part: Json) -> None:
-    """Make those keys optional that a named specimen supplies, and allow a stop on one side only."""
+    """Make optional the keys that a named specimen supplies, and allow a stop on one side only."""
     part["properties"]["model"] = _SPECIMEN
     part.pop("required", None)
     for side in part["properties"]["gap_m"]["anyOf"][1]["items"]:

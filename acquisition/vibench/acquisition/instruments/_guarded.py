@@ -69,7 +69,7 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 
 
 def missing_package(name: str) -> str | None:
-    """Return a sentence on the package to install for a name such as ``"branch_continuation"``.
+    """Return a sentence that names the package to install for a name such as ``"branch_continuation"``.
 
     Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration.
     """

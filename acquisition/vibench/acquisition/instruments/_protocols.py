@@ -107,7 +107,7 @@ Time = TypeVar("Time", float, Samples)
 
 
 class Spacing(StrEnum):
-    """Course of a sweep's frequency over time."""
+    """Change of a sweep's frequency over time."""
 
     LINEAR = "linear"
     """The frequency changes at a constant rate in hertz per second."""

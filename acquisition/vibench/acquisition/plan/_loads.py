@@ -45,12 +45,12 @@ Transfer: TypeAlias = Callable[[Floats], ComplexArray]
 
 @dataclass(frozen=True)
 class Load:
-    """Largest value of a quantity while a plan plays."""
+    """Largest peak and rms value of a quantity while a plan plays."""
 
     peak: float
     """Peak value of the quantity, in its SI unit."""
     rms: float
-    """Largest rms value of a steady part, in the SI unit of the quantity."""
+    """Largest rms value in any steady part of the plan, in the SI unit of the quantity."""
     cause: str
     """Part of the plan that causes the largest value: ``"at 150 Hz"``."""
 
@@ -183,7 +183,7 @@ class BaseMotion:
 
     amplitude_m: NDArray[np.float64]
     basis: str
-    """Text on how the amplitude is predicted: held level, linear model, or sine of equal rms value."""
+    """Basis of the predicted amplitude, as text: held level, linear model, or sine of equal rms value."""
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:

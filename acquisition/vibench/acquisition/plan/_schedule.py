@@ -213,7 +213,7 @@ CHECK_FREQUENCY_HZ = 160.0
 CHECK_FRACTION = 0.02
 """Amplitude of the bench check relative to the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Smallest setting of a check, to exceed hum [Vpp]; the check uses the plan's setting if that is lower."""
+"""Smallest setting of a check, above the hum [Vpp]; a plan's lower setting is used unchanged."""
 CHECK_QUIET_S = 0.1
 """Duration of the silence that a check measures before the first signal [s]."""
 CHECK_SETTLE_S = 0.2
@@ -226,7 +226,7 @@ CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
 
 @dataclass(frozen=True)
 class Phase:
-    """Part of a run with a single state and a single signal."""
+    """Part of a run, with one state and one signal."""
 
     state: RunState
     play: Play | None
@@ -322,7 +322,7 @@ def half_cosine(progress: float) -> float:
 
 
 class DriveSource(StrEnum):
-    """Source of the signal at the amplifier: generator, analogue output or real-time controller."""
+    """Source of the amplifier's input signal: generator, analogue output or real-time controller."""
 
     GENERATOR = "function generator"
     OUTPUT = "analogue output"
@@ -356,11 +356,11 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""Ratio of smallest to largest setting of an analogue output; the smallest equals some tens of counts."""
+"""Ratio of smallest to largest setting of an analogue output; the smallest spans some tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
-    """Return the smallest setting of a measurement's source, peak to peak [V]."""
+    """Return the smallest amplitude setting of a measurement's source, peak to peak [V]."""
     if rig.controller is not None and drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
         return LEAST_SHARE * 2 * rig.controller.limit_v
     output = rig.daq.output

@@ -78,12 +78,12 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values | None) -> tuple[float, ...]:
-    """Return the values of an axis: a range in ascending order, a list in the given order; or none."""
+    """Return an axis's values: a range in ascending order, a list in the given order; none if it is None."""
     return given.values if isinstance(given, Range) else given or ()
 
 
 MOST_POINTS = 10_000
-"""Largest number of points in one sweep; a larger number is taken for a mistake."""
+"""Largest number of points in one sweep; a larger number is treated as a mistake."""
 LONGEST_NAME = 64
 
 

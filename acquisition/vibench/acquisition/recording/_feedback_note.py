@@ -62,7 +62,7 @@ class LockResult(StrEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> "LockResult | None":
-        """Return the member for a value written by an older version."""
+        """Return the enum member for a value written by an older version."""
         return cls.LOST if value == "not met within the tries" else None
 
 
@@ -201,7 +201,7 @@ class ResonanceNote(AbstractNote):
     tries: int
     lock: LockResult
     periods: int = 0
-    """Drive periods of the search or of the phase-locked loop; 0 if the recording does not state them."""
+    """Number of drive periods of search or phase-locked loop; 0 if the recording does not state them."""
     mode_hz: SixFigures | None = None
     """Natural frequency; absent if the flanks do not determine it."""
     mode_u_hz: SixFigures | None = None
@@ -209,7 +209,7 @@ class ResonanceNote(AbstractNote):
     harmonic: int = 1
     """Harmonic of m0 whose phase is used: above 1 for a superharmonic resonance."""
     subharmonic: int = 1
-    """Drive periods in one period of m0: above 1 for a subharmonic resonance."""
+    """Number of drive periods in one period of m0: above 1 for a subharmonic resonance."""
     harmonic_m: SixFigures | None = None
     """Amplitude of the tracked harmonic or subharmonic [m]."""
 
@@ -347,7 +347,7 @@ class UntilNote(AbstractNote):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence on the bounds reached and requested, and on the remaining or recorded time."""
+        """Return a sentence with the bounds reached and requested, and the remaining or recorded time."""
         text = ", ".join(
             f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} (goal: {100 * wish:.2g} %)"
             for name, wish in self.wishes.items()

@@ -51,7 +51,7 @@ FIRST_CHOICE = "m0_"
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
-    """Add a labelled curve of a channel; its attribute ``default`` selects the curve that is shown first."""
+    """Add a labelled curve of a channel; an attribute ``default`` names the curve that is shown first."""
     if overview.low.size == 0:
         return
     view = file.require_group(layout.VIEW)
@@ -167,7 +167,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
 
 def location(part: Path, error: Exception) -> str:
-    """Return a sentence on where the committed samples are after a disk error, and what to do."""
+    """Return a sentence that states where the committed samples are after a disk error, and what to do."""
     try:
         is_there = part.exists()
     except OSError:  # the folder no longer responds

@@ -193,7 +193,7 @@ ATTRIBUTE_BYTES = 60_000
 
 
 def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> None:
-    """Attach scalars to a file, group or dataset."""
+    """Attach scalars as attributes to a file, group or dataset."""
     for name, value in values.items():
         if isinstance(value, str):
             raw = encode(value, len(value.encode()))

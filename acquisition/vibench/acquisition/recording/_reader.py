@@ -172,7 +172,7 @@ class RecordingDescription:
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
     bench_check: Mapping[str, Any]
-    """Last bench check before the recording (``checked``, ``verdict``, ``findings``, ...); or empty."""
+    """Last bench check before the recording (``checked``, ``verdict``, ``findings``, ...); empty if none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -448,7 +448,7 @@ def _read(handle: OpenRecording) -> Recording:
 
 
 def _require_channel(file: h5py.File, role: str, samples: int) -> None:
-    """Raise RecordingError unless the channel has ``samples``; only in a ``.part`` it may be longer."""
+    """Raise RecordingError unless the channel has ``samples`` samples; a ``.part`` may have more."""
     dataset = file.get(role)
     if (
         not isinstance(dataset, h5py.Dataset)
@@ -463,7 +463,7 @@ def _require_channel(file: h5py.File, role: str, samples: int) -> None:
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Return samples, state and reason of a ``.part``; without a running program: "interrupted"."""
+    """Return sample count, state and reason of a ``.part``; "interrupted" if no program is recording it."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):
