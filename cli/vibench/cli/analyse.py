@@ -193,7 +193,7 @@ def analyse(
 def _require_partners(
     specimen: str | None, free: list[Parameter] | None, *, fit: bool, hidden: bool, keep: bool
 ) -> None:
-    """Refuse an option that needs or excludes another one."""
+    """Refuse options that exclude each other, and options without another one that they need."""
     if fit and specimen is not None:
         raise InvalidRequest(
             "--fit and --specimen were given; give only one of them, to select the overlaid specimen"
@@ -222,7 +222,7 @@ def _print_findings(
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
-    """Write a further report for each channel that measures another motion."""
+    """Write a further report for each channel other than m0's."""
     from vibench.analysis.report import write_report
 
     for role, results in others.items():

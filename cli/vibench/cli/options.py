@@ -232,7 +232,7 @@ class SectionedCommand(TyperCommand):
 
 
 _WHOLE = 1000
-"""Width limit of a command's line in a list [characters]; no line is that long."""
+"""Width limit of a command's line in a list [characters], larger than any line."""
 
 
 class SectionedGroup(TyperGroup):

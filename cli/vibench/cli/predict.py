@@ -254,7 +254,7 @@ def _print_target(points: Sequence[ScenePrediction], error: float | None) -> Non
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return the share of starts that lead to the motion (5/8), "lost" if the start is forgotten, or ""."""
+    """Return the fraction of starts with this motion (5/8), "lost" for sensitive dependence, or ""."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
@@ -290,7 +290,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return a text on points that depend sensitively on initial conditions, and on their additional runs."""
+    """Return a text about points that depend sensitively on initial conditions, and their additional runs."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Text that a lock file may contain. Errors quote it, and any user may write to the file."""
+"""Allowed text of a lock file. Errors quote this text, and any user may write to the file."""
 
 
 class BenchLock:
@@ -244,7 +244,7 @@ class BenchKind(StrEnum):
 
 @dataclass(eq=False, repr=False)
 class Bench:
-    """The open instruments of a rig. Use it in a ``with`` block, or `close` it.
+    """A bench: the open instruments of a rig. Use it in a ``with`` block, or `close` it.
 
     Leaving the block silences generator and analogue output first, then closes everything. An error inside
     the block is raised again; errors that occur while leaving are added to it as notes.

@@ -312,7 +312,7 @@ class VerifiedRecording:
 
     @property
     def is_bad(self) -> bool:
-        """Whether the verdict on the file, or on a result saved in it, is one of `BAD`."""
+        """Whether the verdict on the file, or on a result saved in it, is listed in `BAD`."""
         return self.verdict in BAD or not BAD.isdisjoint(self.results.values())
 
 

@@ -102,7 +102,7 @@ class AfterFailure(StrEnum):
 
 
 class ChangedBench(StrEnum):
-    """What to do when a campaign is resumed on a bench that differs from the one at its start."""
+    """What to do when a campaign is resumed on a bench other than the one on which it was started."""
 
     REFUSE = "refuse"
     ACCEPT = "accept"
@@ -468,7 +468,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """Insert the measurements requested after a point, and mark the point as followed up, atomically."""
+        """In one transaction, insert the measurements requested after a point, and mark it as followed up."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))

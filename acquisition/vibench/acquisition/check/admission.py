@@ -26,7 +26,7 @@ from .loop import DRIVE_LEFT, LASTING, Lasting
 
 
 class CheckRule(StrEnum):
-    """Rule on the bench check that is required before measurements."""
+    """Rule for the bench check that is required before measurements."""
 
     FRESH = "fresh"
     """A check of the same configuration must have passed within the last ``check_valid_h`` hours."""
@@ -187,7 +187,7 @@ def require_fresh(
     clock: Clock = utc_now,
     switch: StopSwitch | None = None,
 ) -> CheckResult | None:
-    """Admit a bench by its last check or a new check, and return that check for the recordings.
+    """Admit a bench to measurements by its last or a new check; return this check for the recordings.
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
     rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is for the

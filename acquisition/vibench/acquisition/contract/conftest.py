@@ -107,7 +107,7 @@ def refusal() -> Iterator[None]:
 
 
 def measured_v(bench: Bench, duration_s: float) -> Samples:
-    """Return the voltage at the generator's terminal over ``duration_s`` [V], after settling."""
+    """Return samples of the generator's terminal voltage over ``duration_s`` [V], after settling."""
     count = int(duration_s * bench.digitizer.sample_rate_hz)
     bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
     row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)

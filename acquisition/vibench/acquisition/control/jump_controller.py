@@ -77,7 +77,7 @@ class _Return(Enum):
 
 
 class _Pace(Enum):
-    """Way in which the frequency moves along a branch to its end."""
+    """How the frequency moves along a branch to its end."""
 
     GLIDE = auto()
     STEP = auto()

@@ -1,4 +1,4 @@
-"""Equalised noise at the base: the gains from drive to base, line by line, determine the next drive."""
+"""Equalised noise at the base: the gain from drive to base at each spectral line sets the next drive."""
 
 from dataclasses import dataclass
 from math import log10, sqrt

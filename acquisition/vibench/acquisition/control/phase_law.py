@@ -12,8 +12,8 @@ from .settling_controller import SettledState
 _GAIN = 0.3
 """Fraction of the phase error that the loop corrects after each measurement (look)."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
-"""If a look leaves more than the fraction ``_SLOW`` of a phase error, the gain is multiplied by ``_GROWTH``,
-up to ``_LARGEST_GAIN``.
+"""If more than the fraction ``_SLOW`` of a phase error remains after a look (measurement), the gain is
+multiplied by ``_GROWTH``, up to ``_LARGEST_GAIN``.
 """
 _WIDER = np.linspace(-0.25, 0.25, 15)
 """Trial changes of ln(half-width) from one level to the next."""

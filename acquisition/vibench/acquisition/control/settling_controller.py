@@ -125,7 +125,7 @@ class SettlingController:
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel) -> float:
-        """Return the next generator setting [Vpp] for the base level, ignoring its uncertainty."""
+        """Return the next generator setting [Vpp] for the base level; treat ``measured`` as exact."""
         assert self.level is not None
         now_vpp = self.loop.setting.setting_vpp
         certain = MeasuredLevel(measured.amplitude, 0.0)

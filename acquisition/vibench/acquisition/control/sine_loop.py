@@ -327,7 +327,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Return response [m], ratio m0 / base and base acceleration [m/s2] from the newer periods."""
+    """Return response [m], ratio m0 / base and base acceleration [m/s2] from the newer half of periods."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

@@ -84,9 +84,9 @@ class Periods:
     """
 
     base: Phasors
-    """Base channel at the drive frequency, in the unit of the channel, shape (periods,)."""
+    """Base coefficients at the drive frequency, in the unit of the channel, shape (periods,)."""
     response: Phasors
-    """Orders 0 to 4 of the response channel, in the unit of the channel, shape (periods, 5)."""
+    """Response coefficients of orders 0 to 4, in the unit of the channel, shape (periods, 5)."""
 
     @property
     def count(self) -> int:
@@ -99,7 +99,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Splitter of samples into periods of ``drives`` drive periods; keeps the rest for the next block."""
+    """Splits samples into periods of ``drives`` drive periods; keeps the rest for the next block."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz

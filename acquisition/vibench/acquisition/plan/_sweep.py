@@ -74,7 +74,7 @@ class Range(FrozenModel):
 
 
 Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max_length=MOST_VALUES)] | Range
-"""Values of an axis in a file: a list, or a table with start, stop, and step or count."""
+"""Values of an axis in a file: a list, or a table with start, stop, and either step or count."""
 
 
 def values_of(given: Values | None) -> tuple[float, ...]:

@@ -65,7 +65,7 @@ class Committer:
         self._counters: dict[int, int] = {}
         self._written_samples = 0
         self.committed_samples = 0
-        """Samples per channel that would survive a power cut at this moment."""
+        """Number of samples per channel that would survive a power cut at this moment."""
         self._commit_due_s = time.monotonic() + interval_s
         self._thread = threading.Thread(target=self._run, name="recording committer", daemon=True)
         self._thread.start()

@@ -228,7 +228,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
 def _write_time(
     copy: h5py.File, samples: int, sample_rate_hz: float, digests: dict[str, str]
 ) -> h5py.Dataset:
-    """Write the time axis as sample numbers, which compress well, with the sample interval as factor."""
+    """Write the time axis as sample numbers, which compress well, with the sample interval as scale."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
     dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **packing(samples))
     digest = hashlib.sha256()

@@ -319,7 +319,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file; if so, later reads are compared with it."""
+        """Whether this process has checked the whole file; later reads are then compared with that check."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:

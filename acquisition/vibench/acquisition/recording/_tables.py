@@ -216,7 +216,7 @@ def _numbers(text: str) -> dict[str, Number]:
 
 
 class SegmentLabel(StrEnum):
-    """Labels of segments, by what is played or measured in them."""
+    """Labels of segments, named after what is played or measured in them."""
 
     REALISATION = "realisation"
     NOISE = "noise"

@@ -168,7 +168,7 @@ class RecordingWriter:
 
     @property
     def committed_samples(self) -> int:
-        """Samples per channel that would survive a power cut at this moment."""
+        """Number of samples per channel that would survive a power cut at this moment."""
         return self._committer.committed_samples
 
     def append(self, block: Block) -> None:

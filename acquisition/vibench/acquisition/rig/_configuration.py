@@ -55,7 +55,7 @@ _MEASURED = 0.55
 LARGEST_LEVEL_ERROR = 0.01
 """Largest allowed level error of a plan on a grid coarser than the default."""
 STEPS_PER_SAMPLE = 2
-"""Smallest number of time steps per sample on a coarse grid: the converter filter has a transition band."""
+"""Smallest number of time steps per sample on a coarse grid, for the converter filter's transition band."""
 
 
 class VirtualConfig(FrozenModel):

@@ -145,7 +145,7 @@ class KnobSheet(FrozenModel):
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Function that asks to confirm settings and returns the sheet; raises CheckFailed if a setting is wrong."""
+"""Function that has settings confirmed and returns the sheet; raises CheckFailed if a setting is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:

@@ -55,7 +55,7 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the run was completed as planned; ``known`` is a text on the bounds of the results."""
+        """Note that the run was completed as planned; ``known`` is a text with the bounds of the results."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 

@@ -185,7 +185,7 @@ class LimitMonitor:
             yield from integrated
 
     def _at_the_base(self, acceleration: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
-        """Yield motion of the base, and force on the table: of its mass and of the suspension."""
+        """Yield the motion of the base, and the force on the table: inertia force plus suspension force."""
         shaker, share, role = self._rig.shaker, self._limits, Role.BASE_ACCELERATION
         velocity, stroke, force = (
             shaker.limits.velocity_m_per_s,

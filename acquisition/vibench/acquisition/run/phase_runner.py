@@ -123,7 +123,7 @@ class SweepWatch:
 
 
 Sink: TypeAlias = list[Block] | SweepWatch
-"""Receiver of every block that is read."""
+"""Object to which every block that is read is appended."""
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """Longest total hold of a run [s], limited by the space in its recording."""

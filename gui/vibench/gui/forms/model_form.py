@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return the model's complaints by field, without those that follow from another complaint."""
+    """Return the model's error messages by field, without consequences of other errors."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()

@@ -62,7 +62,7 @@ def file_kind(path: Path) -> FileKind:
 
 
 class DisplayedResult:
-    """Result in widgets, which are disabled while it is outdated: its inputs differ from those wanted."""
+    """Result shown in widgets, which are disabled while its inputs differ from the present inputs."""
 
     def __init__(self, wanted: Callable[[], object], *widgets: QWidget) -> None:
         self.wanted, self.widgets = wanted, widgets
@@ -71,7 +71,7 @@ class DisplayedResult:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether a result of other inputs is shown."""
+        """Whether the result shown was computed from inputs other than the present ones."""
         return self.inputs is not None and self.inputs != self.wanted()
 
     def show(self, inputs: object) -> None:

@@ -1,4 +1,4 @@
-"""Actions of a plot, by key or context menu, which include saving it as a picture or as numbers."""
+"""Actions of a plot by key or context menu, such as saving it as a picture or as numbers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

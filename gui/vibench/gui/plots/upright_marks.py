@@ -24,7 +24,7 @@ class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         self.setZValue(_BEHIND)
 
     def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
-        """Let the painter draw in pixels; return visible rectangle, scale, and shift of values to columns."""
+        """Let the painter draw in pixels; return the visible rectangle, scale and shift to columns."""
         to_pixels = painter.transform()
         visible = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()

@@ -190,7 +190,7 @@ class HiddenMotionView(_RangePicture[HiddenViewRequest, HiddenView]):
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
 _WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Spacings of spectral lines that users can choose [Hz]; None: derived from the visible time range."""
+"""Line spacings that users can choose [Hz]; None derives the spacing from the visible time range."""
 _BAR_EM = 4
 """Width of the colour scale with its label, in font heights."""
 _SHOWN_DB = 80.0

@@ -109,7 +109,7 @@ class RecordingTimeHistories(PlotStack):
         self.show_range(middle_s - half_s, middle_s + half_s)
 
     def move(self, share: float) -> None:  # type: ignore[override] # moves the visible time range
-        """Move the visible range to later times, by ``share`` of its width."""
+        """Move the visible range to later times, by the fraction ``share`` of its width."""
         low_s, high_s = self.view_s
         step_s = share * (high_s - low_s)
         self.show_range(low_s + step_s, high_s + step_s)
