@@ -364,7 +364,7 @@ _NO_MEMORY = (
 
 
 NAME_SHOWN = 80
-"""Number of characters that are shown of a file name that is too long."""
+"""Number of characters shown of a file name that is too long."""
 
 
 def complain(error: BaseException) -> None:

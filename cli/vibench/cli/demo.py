@@ -37,7 +37,7 @@ LOOK_S = 1.0
 DRAWS = 8
 """Number of simulation runs per test: half of the default of `vibench analyse`, to save time."""
 PROCESSES = 2
-"""Number of analysis processes; the largest needed 0.7 GB."""
+"""Number of analysis processes; the largest process needed 0.7 GB."""
 
 
 class Analyst:

@@ -65,7 +65,7 @@ class RequestOptions(Generic[Request]):
     typed: Mapping[str, Any]
 
     def request(self, **others: object) -> Request:
-        """Return the request after setting other fields; raise InvalidRequest if a value is forbidden."""
+        """Return the request with further fields set; raise InvalidRequest if a value is forbidden."""
         return build_request(self.model, {**others, **self.typed})
 
 
@@ -101,7 +101,7 @@ def option(
     max: int | None = None,  # noqa: A002
     callback: Callable[..., None] | None = None,
 ) -> OptionInfo:
-    """Return an option that is not a model's field; set ``name`` if it is not the parameter's name."""
+    """Return an option that is not a model's field; set ``name`` if it differs from the parameter's name."""
     names = (name,) if name else ()
     made: OptionInfo = typer.Option(
         *names, metavar=metavar, help=text, rich_help_panel=panel, min=min, max=max, callback=callback

@@ -196,7 +196,7 @@ def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Seque
 
 
 def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bool) -> str:
-    """Return a paragraph on neighbouring points with one method; details are for the point of largest p.
+    """Return a paragraph about neighbouring points with one method; details are for the point of largest p.
 
     Each entry has frequency [Hz], plan and computing time [s]; the time is NaN if it includes the start of
     the process.

@@ -119,7 +119,7 @@ class BenchLock:
 
 
 def _instruments(rig: Rig) -> Iterator[str]:
-    """Yield one normalised name for each instrument, so that all spellings of the name share a lock."""
+    """Yield one normalised name for each instrument, so that all spellings of a name share one lock."""
     for resource in (rig.generator.resource, rig.controller.resource if rig.controller else ""):
         if resource:
             yield _plain(resource)
@@ -127,7 +127,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 
 def _plain(resource: str) -> str:
-    """Return a VISA name without its optional parts, and with its numbers in decimal."""
+    """Return a VISA name without its optional parts and with decimal numbers."""
     kind, *others = resource.upper().replace("::LOCALHOST::", "::127.0.0.1::").split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(

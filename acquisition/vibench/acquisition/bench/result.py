@@ -66,7 +66,7 @@ def finding_of(
     advice: str,
     uncertainty: float | None = None,
 ) -> Finding:
-    """Return the finding for a number; the finding contains the advice only if the verdict is not ok."""
+    """Return the finding for a measured number; it contains the advice only if the verdict is not ok."""
     spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
     return Finding(
         name=name,
@@ -133,7 +133,7 @@ class CheckResult(FrozenModel):
 
     @classmethod
     def of(cls, rig: Rig, report: BenchReport, checked: datetime) -> Self:
-        """Return the result for a report, with the name of the rig and the time of the check."""
+        """Return the result to be stored for a report, with the name of the rig and the time of the check."""
         return cls(
             rig=rig.name,
             rig_digest=rig_digest(rig),

@@ -18,7 +18,7 @@ MOVE_LONGEST_S = 120.0
 def rig_at(rig: Rig, measurement: Measurement) -> Rig:
     """Return the rig with the beam at the point that a measurement needs.
 
-    Raises ConfigurationError when the vibrometer of the rig cannot measure there.
+    Raises ConfigurationError when the vibrometer of the rig cannot measure at this point.
     """
     return rig if measurement.point is None else rig.with_beam_on(measurement.point.role)
 

@@ -23,7 +23,7 @@ class BenchIdentity(FrozenModel):
     rig: Rig
     instruments: dict[str, Instrument]
     knobs: dict[str, str]
-    """Confirmed manual settings (knobs), without the time and the person of the confirmation."""
+    """Confirmed manual settings (knobs), without time of confirmation and name of the operator."""
 
     @classmethod
     def of(cls, bench: Bench) -> Self:

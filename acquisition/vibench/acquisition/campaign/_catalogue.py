@@ -77,7 +77,7 @@ class CatalogueEntry:
     notes: str = ""
     recording_id: str = ""
     samples_id: str = ""
-    """Identifier of the samples, the same in copies; see `vibench.acquisition.recording.Recording`."""
+    """Identifier of the samples, identical in copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
     """State of the seal: value of `recording.SealState` after a quick check; empty if unknown."""
 
@@ -172,7 +172,7 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 5
-"""Version of the catalogue. A change of the fields increases it; catalogues of other versions are rebuilt."""
+"""Version of the catalogue; increase it when the fields change. Catalogues of other versions are rebuilt."""
 WAIT_S = 10.0
 """Longest wait for another program that writes the same catalogue [s]."""
 

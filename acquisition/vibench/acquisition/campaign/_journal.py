@@ -98,7 +98,7 @@ class AfterFailure(StrEnum):
 
     STOP = "stop"
     GO_ON = "go_on"
-    """Continue with the next measurement, unless an instrument is lost or the disk cannot be written."""
+    """Continue with the next measurement, unless an instrument is lost or the disk cannot be written to."""
 
 
 class ChangedBench(StrEnum):
@@ -121,7 +121,7 @@ class PointOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class PointResult:
-    """Result of one recording of a campaign, with the reason for it."""
+    """Result of one recording of a campaign, with the reason for this result."""
 
     name: str
     outcome: PointOutcome
@@ -264,7 +264,7 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def sentences(path: Path) -> Iterator[None]:
-    """Convert errors of the database, and invalid contents, to a RecordingError."""
+    """Convert database errors and invalid contents to a RecordingError."""
     try:
         yield
     except (ValueError, TypeError, LookupError) as error:  # invalid contents or missing columns
@@ -309,7 +309,7 @@ class JournalPoint:
     """Whether ``after`` was called for this point and the measurements it returned are in the journal."""
     begun_utc: str
     ended_utc: str
-    """Time of the end of the last attempt (UTC)."""
+    """End time of the last attempt (UTC)."""
     seal: str
     """Seal (checksums) of the recording; empty without a recording or a seal."""
 
@@ -408,7 +408,7 @@ class Journal(ClosedOnLeaving):
 
     @property
     def campaign(self) -> Campaign:
-        """The campaign's plan, as it was at the start of the campaign."""
+        """The campaign's plan at the start of the campaign."""
         with sentences(self.path):
             command = "SELECT value FROM campaign WHERE key = 'plan_json'"
             (plan,) = self._connection.execute(command).fetchone()

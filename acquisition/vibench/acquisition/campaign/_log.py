@@ -46,7 +46,7 @@ class CampaignEventKind(StrEnum):
     """The operator must move the beam to the next point of a scan."""
     BENCH_REOPENED = "bench_reopened"
     FURTHER = "further"
-    """The result of a point requested further measurements."""
+    """Further measurements were requested after the result of a point."""
     ENDED = "ended"
     NOTICE = "notice"
     """A notice to a person was sent, or could not be sent."""
@@ -106,9 +106,9 @@ class CampaignLog(ClosedOnLeaving):
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval between status lines while a point runs [s]; the lines take half a megabyte per night."""
+"""Interval between status lines while a point runs [s]; the lines add up to half a megabyte per night."""
 LEFT_ALONE_S = 1.0
-"""Longest wait on closing for the last lines to be written [s]."""
+"""Longest wait, when closing, until the last lines are written [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
@@ -301,7 +301,7 @@ class CommandMessenger:
 
 @dataclass(frozen=True)
 class Notifier:
-    """Sender of notices of faults, damaged recordings and the campaign's end; failures are only logged."""
+    """Sender of notices of faults, damaged recordings and the campaign's end; failures to send are logged."""
 
     campaign: str
     folder: Path

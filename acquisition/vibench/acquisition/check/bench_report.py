@@ -33,7 +33,7 @@ NOISE_SHARE = Bounds(1e-3, 2e-2)
 _MEDIAN_OF_NORMAL = 0.6745
 """Ratio of median magnitude to standard deviation of a normal variable."""
 _IN_MOMENTS = 0.2
-"""Noise counts as bursts if the rms estimated from the median is below this fraction of the total rms."""
+"""Fraction of the total rms; an rms estimated from the median below this fraction indicates bursts."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
@@ -104,7 +104,7 @@ class _BlockReader:
             self._bench.digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, like the check before a run; return the settled samples."""
+        """Play the sine without a ramp, as the check before a run does; return the settled samples."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)

@@ -19,7 +19,7 @@ _WINDOWS = 20
 
 @dataclass(frozen=True)
 class SineFit:
-    """Sine, fitted to samples by least squares."""
+    """Sine fitted to samples by least squares."""
 
     amplitude: float
     uncertainty: float

@@ -47,7 +47,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in with this name; refuse a name that no bench uses."""
+    """Return a bench for each kind of plug-in called ``name``; refuse a name that no bench uses."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"

@@ -36,7 +36,7 @@ class PhaseSamples:
 
 Result = TypeVar("Result")
 Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
-"""Generator that yields actions, is sent the samples of each phase, and returns a result."""
+"""Python generator that yields actions, is sent the samples of each phase, and returns a result."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
 """Empty samples that the controller receives after an action without a phase."""
@@ -61,7 +61,7 @@ _SURE = 2.0
 _GAIN = 0.8
 """Fraction of the base's level error [dB] that one correction removes; below 1, as the specimen is slow."""
 _BATCHES = 8
-"""Number of batches for the uncertainty of a mean; successive periods of chaos are not independent."""
+"""Number of batches for the uncertainty of a mean, because successive chaotic periods are correlated."""
 
 
 @dataclass(frozen=True)

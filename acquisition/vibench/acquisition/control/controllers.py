@@ -22,7 +22,7 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = {
     "held_noise": equalise_noise,
     "held_response": hold_response,
 }
-"""Function that returns the controller for a loop and a plan, by kind of excitation."""
+"""Functions that return the controller for a loop and a plan, keyed by kind of excitation."""
 
 
 def feedback_controller(

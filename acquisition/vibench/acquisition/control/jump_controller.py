@@ -66,7 +66,7 @@ def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> 
 
 
 _MOST_BRACKETS = 4
-"""Largest number of brackets (frequency intervals) per jump; leaving the branch early starts a new one."""
+"""Largest number of brackets (frequency intervals) per jump; a new one starts if the branch is left early."""
 
 
 class _Return(Enum):
@@ -239,7 +239,7 @@ class JumpLocator:
     def _find_departure(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward. Return index and state where the motion left the branch; None if it stayed."""
+        """Go forward. Return index and state where the motion left the branch; None if it did not."""
         for place in steps:
             found = yield from self._pass.settle_at(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):

@@ -53,7 +53,7 @@ class Equaliser:
 
     @property
     def target(self) -> Samples:
-        """Target density of the base: the spectrum, lowered where m0 would exceed its limit [(m/s2)2/Hz]."""
+        """Target density of the base: ``spectrum``, lowered where m0 would exceed its limit [(m/s2)2/Hz]."""
         if self._to_response is None or not self._plan.response_limits:
             return self._plan.density
         limit = density_at(self._plan.response_limits, self.frequency_hz)
@@ -98,7 +98,7 @@ class Equaliser:
         return densities
 
     def require_below_abort(self, densities: MeasuredDensities) -> None:
-        """Raise LimitExceeded when the density of base or m0 exceeds its abort limit at any spectral line."""
+        """Raise LimitExceeded when the spectral density of base or m0 exceeds its abort limit at any line."""
         most = 10 ** (self._plan.abort_db / 10)
         lines = [("base", "(m/s2)2/Hz", densities.base, self._plan.density)]
         if self._plan.response_limits:

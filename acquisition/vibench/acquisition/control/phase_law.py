@@ -18,7 +18,7 @@ multiplied by ``_GROWTH``, up to ``_LARGEST_GAIN``.
 _WIDER = np.linspace(-0.25, 0.25, 15)
 """Trial changes of ln(half-width) from one level to the next."""
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
-"""Trial changes of ln(half-width) for super- and subharmonics, whose first half-width is only rough."""
+"""Trial changes of ln(half-width) for super- and subharmonics, whose first half-width is only an estimate."""
 _SURE_RAD = radians(12.0)
 """Unexplained phase drift that weighs as much in the fit as a change of the half-width by the factor e."""
 _STEEPER = 0.5

@@ -274,7 +274,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
     """Return the uncertainty of the phase due to both sensors' phases and sensitivities [degrees].
 
     For a super- or subharmonic it includes the possible remaining change of the motion. A subharmonic settles
-    so slowly that its change per look is invisible, so at least the settling tolerance is included.
+    so slowly that its change per look is undetectable, so at least the settling tolerance is included.
     """
     if not plan.is_fundamental:
         remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0

@@ -56,7 +56,7 @@ class SettledState:
     """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Hold
     harmonics: tuple[complex, ...]
-    """Ratios of m0's displacement, at 1 to 4 times its repetition rate, to the base's at ``drive_hz``."""
+    """Displacements of m0 at 1 to 4 times its repetition rate, divided by the base's at ``drive_hz``."""
     drives: int = 1
     """Number of drive periods in one period of m0."""
 

@@ -220,7 +220,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up to the setting that the model predicts for ``level``; if None, to the plan's setting."""
+    """Ramp up to the setting that the model predicts for ``level``, or (if None) to the plan's setting."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 

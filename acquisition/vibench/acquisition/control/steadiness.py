@@ -206,7 +206,7 @@ _BLOCKS = 12
 _SIGNIFICANCE = 0.01 / 8
 """Significance level of each of eight tests, so that a stationary motion fails in 1 % of cases."""
 _NOISE_MARGIN = 1.5
-"""Factor by which the noise measured in silence is increased."""
+"""Safety factor on the noise measured in silence."""
 _SLOWEST = 0.9
 """Largest ratio of two successive changes in an extrapolation; the remaining change is then nine times the
 last change.

@@ -259,7 +259,7 @@ class AFG1022X(ScpiInstrument):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Write the edit memory, read the memory back, and compare both point by point."""
+        """Write the edit memory, read it back, and compare point by point."""
         points = codes.codes.size
         self.command(f"DATA:DEF EMEM,{points}")
         self.command("DATA:DATA EMEM,", codes.codes)

@@ -203,7 +203,7 @@ class NoGenerator:
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Return no settings, because none must be confirmed."""
+        """Return no settings, because none need confirmation."""
         return ()
 
     @property

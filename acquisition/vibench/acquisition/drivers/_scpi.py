@@ -99,7 +99,7 @@ class ScpiInstrument:
         return self._ask(message, _LONGEST_TEXT).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
-        """Return the reply to a query; after an empty reply (after ``*CLS``), repeat the query once."""
+        """Return the reply to a query; after an empty reply (as after ``*CLS``), repeat the query once."""
         return self.query(message) or self.query(message)
 
     def query_number(self, message: str) -> float:
@@ -251,7 +251,7 @@ def _block(reply: bytes) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Number:
-    """Numeric setting, sent as ``form``. A value read back outside the given tolerances is an error."""
+    """Numeric setting, sent in format ``form``. A value read back outside the tolerances is an error."""
 
     header: str
     """SCPI header of the setting; ``{c}`` stands for the channel."""
@@ -286,7 +286,7 @@ class Word:
         self._expect(owner, word)
 
     def insist(self, owner: ScpiInstrument, word: str) -> None:
-        """Set the word. Only the value read back counts: errors in the queue may be old and are ignored."""
+        """Change the setting. Only the value read back counts: queued errors may be old and are ignored."""
         owner.send(f"{self.header.format(c=owner.channel)} {word}")
         self._expect(owner, word)
 
@@ -306,4 +306,4 @@ def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> Setting
 
 
 SWITCH = {"ON": ("1", "ON"), "OFF": ("0", "OFF")}
-"""Command words of an on/off setting, and the replies it accepts."""
+"""Command words of an on/off setting, and the valid replies to its query for each word."""

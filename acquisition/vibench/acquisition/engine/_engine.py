@@ -254,7 +254,7 @@ def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
 
 Job = Callable[[], object]
 ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
-"""Causes of a stop that also ends the process, after the campaign."""
+"""Causes of a stop after which the process ends too, once the campaign has ended."""
 
 
 class JobQueue:

@@ -48,7 +48,7 @@ class SampleSlice:
 
 
 class SampleBuffer:
-    """The newest samples, with bounded memory: written by the run, read by any thread."""
+    """Buffer of the newest samples, with bounded memory: written by the run, read by any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -238,7 +238,7 @@ class RequestHandler:
         self._engine.switch.mark(text)
 
     def note_change(self, text: str) -> None:
-        """Write into the recording that the specimen has changed."""
+        """Note in the recording that the specimen has changed."""
         self._engine.published.messages.warn(text)
         self._engine.switch.note_change(text)
 

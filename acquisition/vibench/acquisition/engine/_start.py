@@ -122,7 +122,7 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
 
 
 PATIENCE_S = 1.0
-"""Longest wait for an answer of the engine, which usually takes milliseconds [s]."""
+"""Longest wait for an answer from the engine, which usually answers within milliseconds [s]."""
 
 
 class StopDelivery(StrEnum):

@@ -106,7 +106,7 @@ class ArmedPlan(FrozenModel):
     campaign: str
     folder: str
     lines: tuple[str, ...]
-    """Lines of text on signal, level, limits, duration and folder of the campaign."""
+    """Lines of text about signal, level, limits, duration and folder of the campaign."""
     expires_in_s: float
     """Time after which the engine disarms itself."""
     attendance: Supervision
@@ -196,7 +196,7 @@ class TwinStatus(FrozenModel):
     forecast_m: tuple[float, ...] = ()
     """Forecast of ``p_m`` from the newest sample on, as far as it is reliable [m]."""
     forecast_error_m: tuple[float, ...] = ()
-    """Error that 68 % of earlier forecasts did not exceed, for each time ahead [m]."""
+    """Error that 68 % of earlier forecasts did not exceed, for each lead time [m]."""
     stops_m: tuple[float, float] = (0.0, 0.0)
     """Positions of the lower and the upper stop of m1 [m]."""
     numbers: tuple[tuple[str, str], ...] = ()
@@ -208,7 +208,7 @@ class TwinStatus(FrozenModel):
     busy_share: float = 0.0
     """Processor time of the twin divided by the time since the run began."""
     missed_s: float = 0.0
-    """Duration of motion that the twin was too slow to track [s]; it is recorded nevertheless."""
+    """Duration of motion that the twin was too slow to track [s]; the recording contains it anyway."""
     behind_s: float = 0.0
     """Delay of the twin behind the newest sample, at its last report [s]."""
 

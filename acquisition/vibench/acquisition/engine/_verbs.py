@@ -107,7 +107,7 @@ class Verb(Generic[A]):
 ARMING_S = 300.0
 """Longest time for arming [s]. Checking 100 sweeps takes seconds, or a minute on a busy computer."""
 VERBS: dict[str, Verb[Any]] = {}
-"""All verbs, by the word in the message."""
+"""All verbs, keyed by their word in the message."""
 
 
 def verb(

@@ -1,4 +1,4 @@
-"""Settings of feedback: criteria for settled motion, levels of the base to be held, and jumps."""
+"""Settings of feedback: criteria for settled motion and for jumps, and base levels to be held."""
 
 from math import pi
 from typing import Annotated, Self

@@ -31,7 +31,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     most_change: float = Field(default=1.25, gt=1, le=4)
     """Largest factor by which one correction changes the amplitude setting."""
     start_share: Share = 0.02
-    """First setting at the first frequency, as a fraction of ``amplitude_vpp``."""
+    """Initial setting at the first frequency, as a fraction of ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
     """Longest wait for ``response_m`` at a frequency [s]; the step's note states whether it was reached."""
     glide_step_hz: PositiveFloat = 0.5

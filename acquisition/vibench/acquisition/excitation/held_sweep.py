@@ -22,7 +22,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
     base_level: BaseLevel
     """Level of the base that feedback holds."""
     average_s: PositiveFloat = 0.5
-    """Averaging time of the level, to reduce random errors [s]; a lasting change is followed sooner."""
+    """Averaging time of the level, to reduce random errors [s]; a lasting change is tracked faster."""
     settling: Settling = Settling()
     """Criteria by which the motion counts as settled before the sweep."""
 

@@ -142,7 +142,7 @@ class SineSweep(MovingSine):
 
     kind: Literal["sine_sweep"] = "sine_sweep"
     hold: Hold = Hold.ACCELERATION
-    """Quantity that stays about constant; ``amplitude_vpp`` is the setting at the highest frequency."""
+    """Base quantity that stays about constant; ``amplitude_vpp`` is the setting at the highest frequency."""
     settle_s: NonNegativeFloat = 3.0
     """Waiting time near ``start_hz`` before the sweep, for the transient to die out [s]."""
     swept_by: SweptBy = SweptBy.COMPUTER

@@ -49,7 +49,7 @@ class FrequencyGrid(FrozenModel):
 
 
 class FrequencySteps(AbstractExcitation):
-    """A list of frequencies, their order, and the time recorded at each; every step is a separate segment."""
+    """A list of frequencies, their order, and a recording time for each; each step is a separate segment."""
 
     family: ClassVar[Family] = Family.STEPPED
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)

@@ -16,7 +16,7 @@ class Tone:
 
     frequency_hz: float
     level: float = 1.0
-    """Fraction of the amplitude setting: above 0, and at most 1 except in a lead-in."""
+    """Level as a fraction of the amplitude setting: above 0, and at most 1 except in a lead-in."""
 
 
 @dataclass(frozen=True)

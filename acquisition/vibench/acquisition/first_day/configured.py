@@ -40,7 +40,7 @@ class Question:
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
     choices: Callable[[InstrumentList], tuple[str, ...]] = lambda _: ()
-    """Function that returns the names of the instruments found, as possible answers."""
+    """Function that returns possible answers: the names of the instruments found."""
 
 
 def _converters(seen: InstrumentList) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ QUESTIONS = (
 
 
 def questions_for(text: str) -> tuple[Question, ...]:
-    """Return the questions for a template, including questions on each further sensor."""
+    """Return the questions for a template, including questions about each further sensor."""
     roles = tomllib.loads(text).get("sensors", {})
     others = [
         Question(key, words.format(role.replace("_", " ")))
@@ -119,7 +119,7 @@ def value_in(text: str, key: str) -> str:
 
 
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
-    """Return the template with a value replaced by an answer, and a note on its source.
+    """Return the template with a value replaced by an answer, and with a note on the answer's source.
 
     Raises ConfigurationError when the type of the answer is wrong (such as text for a number), or the
     template has no table for the key.
@@ -228,7 +228,7 @@ Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer, where the question cannot be repeated (as in a script)."""
+    """Raise the error of an answer; used where the question cannot be repeated (as in a script)."""
     raise error
 
 

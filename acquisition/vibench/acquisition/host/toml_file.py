@@ -83,8 +83,8 @@ Place = tuple[str | int, ...]
 def complaints(error: ValidationError, content: object, model: type[BaseModel], within: Place = ()) -> str:
     """Return one clause for each fault, one for all missing keys, and one for all unknown keys.
 
-    The ``content`` of the file distinguishes keys from the type names that pydantic adds to paths. Faults
-    outside the path ``within`` are left out.
+    The ``content`` of the file serves to distinguish keys from the type names that pydantic adds to paths.
+    Faults outside the path ``within`` are left out.
     """
     details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     unknown = [each["loc"] for each in details if each["type"] == "extra_forbidden"]
@@ -114,7 +114,7 @@ def _similar_key(place: Place, model: type[BaseModel]) -> str:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Yield the models in the type of a field."""
+    """Yield the models that the type of a field contains."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for each in get_args(annotation):

@@ -199,7 +199,7 @@ class PlugInGuard:
 
 
 def _convert(hint: Any, value: Any) -> Any:
-    """Return a value converted to ``hint`` (data classes by field); raises TypeError or ValueError."""
+    """Return a value converted to type ``hint`` (data classes by field); raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
         return _convert_field(name, hint, value)

@@ -29,7 +29,7 @@ class Identity:
     reply: str
     """The instrument's whole reply, unchanged."""
     origin: str = ""
-    """``"simulated"`` or ``"imported"`` if the instrument reports such samples; otherwise empty."""
+    """Origin of the samples, if the instrument reports ``"simulated"`` or ``"imported"``; otherwise empty."""
 
 
 class Knob(FrozenModel):
@@ -300,7 +300,7 @@ class AnalogOutput(Protocol):
 
 
 class RealTimeController(Protocol):
-    """Instrument with its own feedback loop, which drives the amplifier instead of the generator."""
+    """Instrument with its own feedback loop that drives the amplifier in place of the generator."""
 
     @property
     def identity(self) -> Identity:
@@ -313,7 +313,7 @@ class RealTimeController(Protocol):
 def read_block(digitizer: Digitizer, samples: int) -> Block:
     """Return the next ``samples`` of every channel of a ``digitizer`` that is sampling.
 
-    An empty block is refused, because its caller would wait for samples forever. Raises InstrumentError when
+    An empty block is refused, because the caller would wait for samples forever. Raises InstrumentError when
     the block is empty, has a wrong number of channels, an overload of an unknown channel, or volts that are
     not finite. Also raises the errors of `Digitizer.read`.
     """

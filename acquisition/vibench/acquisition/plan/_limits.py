@@ -122,7 +122,7 @@ class LimitCheck:
 
     @property
     def forbids(self) -> bool:
-        """Whether the plan must not be played because of this check."""
+        """Whether this check forbids playing the plan."""
         return not self.is_kept and self.consequence is Consequence.REFUSED
 
     @property

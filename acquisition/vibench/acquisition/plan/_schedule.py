@@ -118,7 +118,7 @@ class Measurement(FrozenModel):
     name: Name
     excitation: Excitation
     ramp_s: PositiveFloat = Field(default=1.0, le=60)
-    """Duration of the half-cosine ramp from silence to full amplitude, and of the ramp back [s]."""
+    """Duration of the half-cosine ramp from silence to full amplitude, and of the ramp down [s]."""
     ramp_step_s: PositiveFloat = 0.05
     """Duration of one step of a ramp, which is a staircase of amplitude settings [s]."""
     repeats: PositiveInt = Field(default=1, le=1000)

@@ -88,7 +88,7 @@ LONGEST_NAME = 64
 
 
 class SweepAxis(StrEnum):
-    """Axes of a sweep, by the names used in ``order``."""
+    """Axes of a sweep, named as in ``order``."""
 
     # The axes are in the usual order of nesting, from the outermost (slowest) to the innermost.
 

@@ -30,11 +30,11 @@ class Until(FrozenModel):
     resonance_hz: Wish | None = None
     """Required uncertainty of the frequency of every resonance under noise excitation: ``"0.1 %"``."""
     transmissibility: Wish | None = None
-    """Required bound on the transmissibility at every resonance found in noise: ``"2 %"``."""
+    """Required error bound of the transmissibility at every resonance found in noise: ``"2 %"``."""
     response_i: Wish | None = None
-    """Required bound on Response I of a dwell or of each step: ``"1 %"``."""
+    """Required error bound of Response I of a dwell or of each step: ``"1 %"``."""
     response_ii: Wish | None = None
-    """Required bound on Response II of a dwell or of each step: ``"1 %"``."""
+    """Required error bound of Response II of a dwell or of each step: ``"1 %"``."""
     shortest_s: PositiveFloat = SHORTEST_S
     """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; at most the planned
     time."""

@@ -225,7 +225,7 @@ class NoiseNote(AbstractNote):
     asked_rms: SixFigures
     """Requested rms acceleration in the band at full level, with notches [m/s2]."""
     within: SixFigures
-    """Fraction of the spectral lines that are within the plan's tolerance of this realisation's level."""
+    """Fraction of the spectral lines that are within the plan's tolerance of this realisation's target."""
     worst_db: SixFigures
     worst_hz: SixFigures
     notched: SixFigures

@@ -264,7 +264,7 @@ class RecordingHeader:
                 raise RecordingError(f"{name} is a JSON {type(parsed).__name__}; it must be an object.")
 
     def configuration(self) -> dict[str, str]:
-        """Return the texts of the group ``/configuration``, all JSON."""
+        """Return the texts of the group ``/configuration``, all as JSON."""
         instruments = {name: asdict(identity) for name, identity in self.instruments.items()}
         return {
             "plan_json": self.plan_json,

@@ -29,7 +29,7 @@ PART_SUFFIX = ".part"
 TMP_SUFFIX = ".tmp"
 
 CHUNK_SAMPLES = 51_200
-"""Samples in one compressed chunk: one second at the rig's usual rate, 200 kB."""
+"""Number of samples in one compressed chunk: one second at the rig's usual rate, 200 kB."""
 DEFLATE_LEVEL = 1
 """Compression level. A higher level makes files 4 % smaller, but writing takes a third longer."""
 

@@ -248,7 +248,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
         return values
 
     def read_counts(self, role: str, start: int = 0, stop: int | None = None) -> Counts:
-        """Return the converter's counts without scaling, int32."""
+        """Return the converter's counts without scaling, as int32."""
         self.channel(role)
         begin, end = self._range(start, stop)
         try:

@@ -26,7 +26,7 @@ AXES = "axes_json"
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
-"""Any value of JSON: a number, text or boolean, or a list or object of these."""
+"""Any JSON value: a number, text or boolean, or a list or object of these."""
 
 
 @dataclass(frozen=True)

@@ -492,7 +492,7 @@ def remember(seal: str, states: ChannelStates) -> None:
 
 
 def forget_checks() -> None:
-    """Forget all checks, so that files are checked again at the next reading."""
+    """Forget all checks, so that files are checked again when they are next read."""
     _KNOWN.clear()
 
 

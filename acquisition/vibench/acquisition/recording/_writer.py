@@ -36,7 +36,7 @@ COUNT_TOLERANCE = 0.01
 
 
 class CountScale:
-    """Converter of blocks of volts to counts."""
+    """Converts blocks of volts to counts."""
 
     def __init__(self, channels: Sequence[ChannelHeader]) -> None:
         self._roles = [channel.role for channel in channels]
@@ -76,7 +76,7 @@ class CountScale:
 
 
 RESERVED = 8
-"""Number of reserved file descriptors: for the recording, its copy, folder and disk checks, the journal."""
+"""Number of reserved file descriptors: for recording and copy, folder and disk checks, and journal."""
 
 
 class DescriptorReserve:
@@ -216,7 +216,7 @@ class RecordingWriter:
         self._committer.put(self._journal.end_segment(self.samples - 1))
 
     def finish(self, state: RecordingState, reason: str = "") -> Path:
-        """End the recording and turn it into ``NAME.h5``; calling again changes nothing.
+        """End the recording and turn it into ``NAME.h5``; a second call changes nothing.
 
         Raises RecordingError when the disk has failed. Samples committed before are kept in ``NAME.h5`` or
         ``NAME.h5.part``; the message says which.

@@ -36,7 +36,7 @@ from ._sensors import (
 TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
 """Metadata key of the token in a gRPC call."""
 TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
-"""Environment variable for the token; a command line would be visible to other users."""
+"""Environment variable for the token; on a command line, other users could see it."""
 
 
 def token_from_env() -> str:
@@ -203,7 +203,7 @@ class GeneratorConfig(FrozenModel):
         return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
     def terminal_factor(self) -> float:
-        """Return the terminal voltage per displayed volt: 2 for a load setting of 50 ohm and no load."""
+        """Return the terminal voltage per displayed volt: 2 for a load setting of 50 ohm without a load."""
         return self.connected_ohm / (self.connected_ohm + SOURCE_OHM) / self.shown_fraction
 
 
@@ -254,7 +254,7 @@ class ShakerConfig(FrozenModel):
     serial: str = ""
     moving_mass_kg: PositiveFloat
     fixture_mass_kg: NonNegativeFloat
-    """All rigid masses on the table except the specimen [kg]."""
+    """Total rigid mass on the table, without the specimen [kg]."""
     suspension_stiffness_n_per_m: PositiveFloat
     suspension_damping_ns_per_m: PositiveFloat
     force_constant_n_per_a: PositiveFloat
@@ -338,7 +338,7 @@ class SpecimenConfig(SpecimenTable):
     """The specimen on the shaker: a named specimen, and values that differ from it."""
 
     amplitude_limit_m: Sourced
-    """Largest displacement of a mass that does not damage the springs [m]."""
+    """Largest displacement of any mass without damage to the springs [m]."""
 
 
 class LoopInput(StrEnum):

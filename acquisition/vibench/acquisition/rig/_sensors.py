@@ -225,7 +225,7 @@ class Role(StrEnum):
 
     @property
     def place(self) -> str:
-        """Place that the channel measures: ``"base"``, ``"m0"``."""
+        """Place at which the channel measures: ``"base"``, ``"m0"``."""
         return self.value.partition("_")[0]
 
     @property

@@ -13,10 +13,10 @@ from .stream_drive import StreamDrive
 
 
 class Drive(Protocol):
-    """Player of consecutive phases, while the run reads samples.
+    """Plays consecutive phases while the run reads samples.
 
     A drive never waits. It yields how long to read until its next action, because the samples read are the
-    only clock. Coming phases are announced, because some drives write samples in advance.
+    only clock. Phases are announced beforehand, because some drives write samples in advance.
     """
 
     @property
@@ -44,7 +44,7 @@ class Drive(Protocol):
         """Whether the drive plays a signal that must be ramped down."""
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Prepare the drive; the first of ``coming`` starts at the digitizer's first sample."""
+        """Prepare the drive; the first phase of ``coming`` starts at the digitizer's first sample."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
         """Announce the phases that follow all previous ones; they start after `pause_s`."""

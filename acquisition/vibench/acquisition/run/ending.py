@@ -83,7 +83,7 @@ class Ending:
             leaving.callback(self._note_failure, guard.silence)
 
     def _note_failure(self, step: Callable[[], object]) -> None:
-        """Do a step; note its failure, and raise it."""
+        """Carry out a step; note an error, and raise it again."""
         try:
             step()
         except AcquisitionError as failure:

@@ -160,7 +160,7 @@ class GeneratorDrive:
         self._is_on = False
 
     def silence(self) -> None:
-        """Ramp down as fast as the generator takes commands; in any case, then turn the output off.
+        """Ramp down as fast as the generator takes commands; then turn the output off in any case.
 
         Used when the run ends without sampling, or if a drive signal is still measured after switching off.
         The ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output

@@ -98,7 +98,7 @@ class GlideWatch:
 
     @property
     def more_cycles(self) -> float:
-        """Cycles of the recorded drive beyond the plan; 0 if the converter's delay can explain them."""
+        """Number of cycles of the drive beyond the plan; 0 if the converter's delay can explain them."""
         if self._first is None:
             return 0.0
         delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._first[1])
@@ -106,7 +106,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Comparison of a sweep made by the generator with its planned course, block by block."""
+    """Compares a sweep made by the generator with the planned sweep, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide
@@ -130,7 +130,7 @@ HOLD_LONGEST_S = HOLD_ROOM_S
 
 
 LATEST = 0.5
-"""Delay of a stepped sweep's command above which it is logged, as a fraction of the step."""
+"""Delay above which a stepped sweep's command is logged as late, as a fraction of the step."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
@@ -231,7 +231,7 @@ class PhaseRunner:
             self.glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _drive_checks(self, phase: Phase) -> Sink | None:
-        """Return a consumer of the phase's blocks that checks the drive against the plan, or None."""
+        """Return an object that checks the drive in the phase's blocks against the plan, or None."""
         if not self._may_glide(phase):
             return None
         return SweepWatch(self.glide, phase.play) if isinstance(phase.play, Sweep) else []

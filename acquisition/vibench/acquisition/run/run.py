@@ -45,7 +45,7 @@ from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, check_figure
 from .until import UntilWatch
 
 ROOM = 1.25
-"""Smallest ratio of a sweep's step duration to the time of its commands; above 1 (command times vary)."""
+"""Smallest ratio of a sweep's step duration to the time of its commands; above 1, as command times vary."""
 _MOST_COMMANDS = 2
 """Largest number of commands for one change of tone: amplitude and frequency."""
 
@@ -390,7 +390,7 @@ class Run(ClosedOnLeaving):
         return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
-        """Return the duration of the ramp of a stop [s]."""
+        """Return the duration of the ramp for a stop [s]."""
         planned_s = self._measurement.ramp_s
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 

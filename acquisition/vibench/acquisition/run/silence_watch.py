@@ -23,7 +23,7 @@ from .acquisition_loop import BLOCK_S
 from .drive import Drive
 
 DRIVE_TOLERANCE = 0.15
-"""Relative tolerance of the measured drive; a wrong load setting would change it by a factor of 2."""
+"""Relative tolerance of the measured drive; a wrong load setting would change the drive by a factor of 2."""
 BASE_FACTOR = 10 ** (3 / 20)
 """Factor by which the measured base acceleration may differ from the model: 3 dB."""
 WRONG_LOAD = 2.0

@@ -36,7 +36,7 @@ class _Stretch:
 
 
 class OutputSynthesizer:
-    """Converter of a run's phases to samples from -1 to 1, on demand and in order.
+    """Converts a run's phases to samples from -1 to 1, on demand and in order.
 
     The level is an envelope: a half cosine over a ramp, otherwise constant. A tone continues without a phase
     step when its frequency changes. Phases of the run end at the samples nearest to the sums of all
@@ -156,7 +156,7 @@ class StreamDrive:
         self._read_s = 0.0
         self._written = 0
         self._sounds_until = 0
-        """Number of the sample after the last one that is not zero."""
+        """Number of the sample after the last nonzero sample."""
         self._is_playing = False
         self.setting_vpp = 0.0
         """Present amplitude, as the equivalent amplitude setting of a generator [Vpp]."""

@@ -37,7 +37,7 @@ from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, Stop
 
 SILENT_REASON = "a stop request in the state folder"
 Press = Callable[[StopLevel, str], None]
-"""Function that carries out a stop of a level, for a reason."""
+"""Function that carries out a stop, given its level and its reason."""
 
 
 def engines_folder() -> Path:

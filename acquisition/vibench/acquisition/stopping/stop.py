@@ -81,7 +81,7 @@ class StopRequest:
 
     @classmethod
     def of(cls, cause: Cause, reason: str) -> "StopRequest":
-        """Return a request with the level of its cause."""
+        """Return a stop request with the level that belongs to its cause."""
         return cls(cause, LEVELS[cause], reason)
 
 
@@ -96,7 +96,7 @@ class StopSwitch:
         self._requests: dict[StopLevel, StopRequest] = {}
         self._holding = False
         self.refusal_to_hold: Callable[[], str] = str
-        """Function that returns why the run cannot be held now; empty if it can be held, or nothing runs."""
+        """Function that returns the reason why the run cannot be held; empty if it can, or nothing runs."""
         self._marks: deque[str] = deque()
         self._changes: deque[str] = deque()
 

@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 
 def find_measurement(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Return the campaign's measurement that records the file ``name``; None if there is none."""
+    """Return the campaign's measurement that is recorded as ``name``; None if there is none."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)

@@ -95,9 +95,9 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show complaints at their fields, inner models included; return all complaints with field names.
+        """Show errors at their fields, inner models included; return all errors with field names.
 
-        A complaint about several fields together is shown with the name of the field changed last.
+        An error that concerns several fields together is shown with the name of the field changed last.
         """
         sentences: list[str] = []
         for name, row in self._rows.items():
@@ -187,7 +187,7 @@ class GroupEditor:
 
     @property
     def complaint(self) -> str:
-        """First complaint about a field of the inner form; empty if all fields can be read."""
+        """First error in a field of the inner form; empty if all fields can be read."""
         return next(filter(None, (editor.complaint for editor in self.form.editors.values())), "")
 
     def content(self) -> Any:
@@ -202,7 +202,7 @@ class GroupEditor:
         self.form.show_content(values)
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show complaints at the fields of the inner form."""
+        """Show errors at the fields of the inner form."""
         return self.form.complain(complaints)
 
     def set_starting_values(
@@ -266,7 +266,7 @@ class OptionalGroupEditor(GroupEditor):
 
     @property
     def complaint(self) -> str:
-        """First complaint about a field of the inner model; empty if the model is absent."""
+        """First error in a field of the inner model; empty if the model is absent."""
         return super().complaint if self._there.isChecked() else ""
 
     def content(self) -> Any:
@@ -321,7 +321,7 @@ def _after_kind(editor: Editor, loc: Loc) -> Loc:
 
 
 def _sentence(text: str, facts: FieldFacts) -> str:
-    """Return a complaint of the model in words for the form."""
+    """Return an error of the model in words for the form."""
     unit = f" in {facts.shown_unit}" if facts.unit else ""
     if text == "Field required":
         return f"the field is empty; type a value{unit}"
@@ -333,7 +333,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class ValidatedForm(QWidget, Generic[Model]):
-    """Form of a model, with the model's complaints and warnings below the fields."""
+    """Form of a model, with the model's errors and warnings below the fields."""
 
     changed = Signal()
 
@@ -358,7 +358,7 @@ class ValidatedForm(QWidget, Generic[Model]):
 
     @property
     def complaint(self) -> str:
-        """All complaints about the content, as one text."""
+        """All errors in the content, as one text."""
         return self._complaint.text()
 
     def show_value(self, value: Model) -> None:

@@ -45,7 +45,7 @@ _QUANTITY = re.compile(
 _LEAST_DIGITS = 3
 _LONG_WORD = re.compile(r"[^\s\u200b]{25,}")
 _BREAK = "\u200b"
-"""Zero-width space; Qt can break a long word there."""
+"""Zero-width space, at which Qt can break a long word."""
 _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 

@@ -200,7 +200,7 @@ def whole_check(path: Path) -> VerifiedRecording:
 
 
 def facts_text(recording: Recording, found: VerifiedRecording | None) -> str:
-    """Return a line about a recording; ``found`` is the result of `whole_check`, None until it is known."""
+    """Return a line about a recording; ``found`` is the result of `whole_check`, or None before the check."""
     parts = [
         f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,

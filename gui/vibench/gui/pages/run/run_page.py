@@ -255,7 +255,7 @@ class ArmCard(QGroupBox):
         self._armed: tuple[str, ...] = ()
         """Description of the armed plan; empty if nothing is armed."""
         self._read: tuple[str, ...] = ()
-        """Description that the user has scrolled to its end, and therefore may have read."""
+        """Description that the user has scrolled to the end, and therefore may have read."""
 
     @property
     def is_read(self) -> bool:

@@ -188,7 +188,7 @@ class PredictionPlot(Plot):
 
 
 _FLOOR = 1e-5
-"""Ratio to the strongest spectral line below which a line is only rounding error."""
+"""Ratio to the strongest spectral line below which a line counts as rounding error."""
 _LEAST_HZ = 1.0
 """Lower end of the displayed spectrum [Hz]; shakers do not move at lower frequencies."""
 _LEAST_LINES = 9
