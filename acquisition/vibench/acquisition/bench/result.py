@@ -1,4 +1,4 @@
-"""Stored result of a bench check: its findings, its time, and the configuration that was checked."""
+"""Stored result of a bench check: findings, time, and the configuration that was checked."""
 
 import hashlib
 import json

@@ -62,7 +62,7 @@ LOOK_EVERY_S = 1.0
 
 @dataclass
 class Attempts:
-    """Measures points on a bench, with as many attempts as the policy allows."""
+    """Measurement of points on a bench, with as many attempts as the policy allows."""
 
     bench: Bench
     journal: Journal

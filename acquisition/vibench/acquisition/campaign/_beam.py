@@ -24,7 +24,7 @@ def rig_at(rig: Rig, measurement: Measurement) -> Rig:
 
 
 class BeamMover:
-    """Moves the beam between recordings at different points, while the generator is off."""
+    """Movement of the beam between recordings at different points, while the generator is off."""
 
     def __init__(self, command: CommandMessenger | None, switch: StopSwitch, say: CampaignListener) -> None:
         """``command`` moves the beam of a real rig; without a command, the operator moves it."""

@@ -1,6 +1,6 @@
 """Catalogue of all recordings in a folder and its subfolders; unchanged files are not reopened.
 
-The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. If it is deleted, it
+The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. A deleted catalogue
 is created again.
 """
 

@@ -75,7 +75,7 @@ LOG_SUFFIX = ".log.jsonl"
 class CampaignLog(ClosedOnLeaving):
     """Writer of events to the log file; each line is flushed before the next step.
 
-    If a line cannot be written (full disk), the campaign continues, because it needs only the journal.
+    If a line cannot be written (full disk), the campaign continues, because only its journal is essential.
     """
 
     def __init__(self, path: Path) -> None:

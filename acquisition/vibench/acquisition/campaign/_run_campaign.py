@@ -61,7 +61,7 @@ from ._opening import make_folder, open_journal, planned_recordings, require_all
 
 @dataclass
 class CampaignRunner:
-    """Measures the points of a campaign, and further points that are requested after a result."""
+    """Measurement of the points of a campaign, and of further points that are requested after a result."""
 
     journal: Journal
     folder: Path

@@ -191,7 +191,7 @@ def require_fresh(
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
     rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is for the
-    recordings; another thread can stop the new check by ``switch``.
+    recordings; another thread can stop the new check with ``switch``.
 
     Raises CheckFailed when the last check is missing, too old, failed or made for another configuration (then
     nothing was played), or when the new check fails. Raises InstrumentError when an instrument fails.

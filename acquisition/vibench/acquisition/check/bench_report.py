@@ -48,7 +48,7 @@ def bench_report(
     """Check a bench before measurements and return the findings; the generator is silent afterwards.
 
     All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
-    ``bench`` must not be sampling; ``folder`` is for the recordings; another thread can stop the check by
+    ``bench`` must not be sampling; ``folder`` is for the recordings; another thread can stop the check with
     ``switch``, within a block of samples. By default, ``amplitude_vpp`` [V] is at most 2 % of the amplitude
     limit, and too small for contact.
 

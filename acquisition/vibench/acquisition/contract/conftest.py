@@ -93,7 +93,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
 
 @pytest.fixture
 def bench(rig: Rig) -> Iterator[Bench]:
-    """Open the bench again for each test. Its manual settings (knobs) count as confirmed by the user."""
+    """Open the bench again for each test. Its manual settings (knobs) are taken as confirmed by the user."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
 

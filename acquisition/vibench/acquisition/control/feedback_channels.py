@@ -113,7 +113,7 @@ _REMEMBERED_S = 0.1
 
 
 class BridgedRows:
-    """Fills drop-outs in a stream of samples; holds back samples in which a drop-out may begin."""
+    """Filter that bridges drop-outs in a stream of samples; it holds back samples in which one may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz

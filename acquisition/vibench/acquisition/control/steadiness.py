@@ -99,7 +99,7 @@ class Periods:
 
 
 class Stroboscope:
-    """Splits samples into periods of ``drives`` drive periods; keeps the rest for the next block."""
+    """Splitter of samples into periods of ``drives`` drive periods; keeps the rest for the next block."""
 
     def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz

@@ -219,7 +219,7 @@ _MOST_COERCED = 2.0
 class DaqmxDigitizer:
     """A `Digitizer` on NI-DAQmx, on this computer or behind a gRPC device server.
 
-    `open` creates it and reserves the device. All settings are checked there, not at the start of a run.
+    `open` creates it and reserves the device. All settings are checked by `open`, not at the start of a run.
     """
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:

@@ -20,7 +20,7 @@ class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: the mode's backbone.
 
     At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. At the first
-    level, the resonance is searched in settled motion. Then a phase-locked loop, which acts every ten
+    level, the resonance is searched for in settled motion. Then a phase-locked loop, which acts every ten
     periods, follows the resonance from level to level; if it loses the resonance, the search is repeated.
     Other modes shift the phase a little. While the motion is linear, measurements on both flanks give the
     natural frequency and the damping without this shift.

@@ -186,7 +186,7 @@ class Committer:
 
 
 class TableWriter:
-    """Encodes the rows of one table as writes to their reserved offsets in the file."""
+    """Encoder of the rows of one table as writes to their reserved offsets in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places

@@ -31,7 +31,7 @@ MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
 """Margin added to the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""Additional length for pauses during a run [s]; its disk space is reserved only when samples arrive."""
+"""Additional length for pauses during a run [s]; disk space for it is reserved only as samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
 """Declared length of a recording without a planned end [s]; disk space is reserved as samples arrive."""

@@ -139,8 +139,8 @@ class OutputConfig(FrozenModel):
     """Name of the output on the device: ``"ao0"``."""
     plays: OutputUse = OutputUse.STREAMS
     device: str | None = None
-    """Device name of the output's module, if it differs from the converter's. Both must be able to share a
-    start trigger, as modules in one chassis can."""
+    """Device name of the output's module, if it differs from the converter's. Both devices must be able to
+    share a start trigger, as modules in one chassis can."""
     limit_v: PositiveFloat = Field(le=10.0)
     """Largest allowed magnitude of the output voltage [V]."""
     sample_rate_hz: PositiveFloat

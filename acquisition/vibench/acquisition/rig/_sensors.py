@@ -125,9 +125,9 @@ class SensorConfig(FrozenModel):
     full_scale_v: PositiveFloat
     """Largest output voltage of the sensor, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
-    """Upper -3 dB frequency, first order [Hz]; if absent, it is far above the measured band."""
+    """Upper -3 dB frequency, first order [Hz]; absent if far above the measured band."""
     resonance_hz: PositiveFloat | None = None
-    """Mounted resonance frequency [Hz]; if absent, it is far above the measured band."""
+    """Mounted resonance frequency [Hz]; absent if far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
     """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects the phase."""
     iepe: Literal["yes", "no"] = "no"

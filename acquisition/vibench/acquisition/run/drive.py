@@ -13,7 +13,7 @@ from .stream_drive import StreamDrive
 
 
 class Drive(Protocol):
-    """Plays consecutive phases while the run reads samples.
+    """Player of consecutive phases while the run reads samples.
 
     A drive never waits. It yields how long to read until its next action, because the samples read are the
     only clock. Phases are announced beforehand, because some drives write samples in advance.

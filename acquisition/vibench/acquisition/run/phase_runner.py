@@ -106,7 +106,7 @@ class GlideWatch:
 
 
 class SweepWatch:
-    """Compares a sweep made by the generator with the planned sweep, block by block."""
+    """Comparison of a sweep made by the generator with the planned sweep, block by block."""
 
     def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
         self._glide = glide

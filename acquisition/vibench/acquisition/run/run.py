@@ -154,7 +154,7 @@ class Run(ClosedOnLeaving):
     """Run of one measurement: iterate over it to play, check and record, block by block.
 
     `RunState` shows the diagram of the states. However the run ends (plan done, cancelled, limit,
-    failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards.
+    failed instrument, full disk, Ctrl-C, abandoned iterator), the generator is silent afterwards.
     The recording is finished and states the reason. Use a ``with`` statement, so that an abandoned
     run ends at once::
 

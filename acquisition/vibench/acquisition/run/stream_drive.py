@@ -36,7 +36,7 @@ class _Stretch:
 
 
 class OutputSynthesizer:
-    """Converts a run's phases to samples from -1 to 1, on demand and in order.
+    """Converter of a run's phases to samples from -1 to 1, on demand and in order.
 
     The level is an envelope: a half cosine over a ramp, otherwise constant. A tone continues without a phase
     step when its frequency changes. Phases of the run end at the samples nearest to the sums of all

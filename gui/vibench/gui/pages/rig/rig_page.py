@@ -271,7 +271,7 @@ class RigPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens hardware configurations; while a bench is open, it shows a message instead."""
+        """Function that opens a hardware configuration or, while a bench is open, shows a message."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:
