@@ -223,7 +223,7 @@ class _AimedDigitizer:
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block of samples."""
+        """Roles of the channels, in the row order of a block of samples."""
         return tuple(self._names.get(each, each) for each in self._digitizer.roles)
 
     def read(self, samples: int) -> Block:
@@ -263,7 +263,7 @@ class Bench:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Recorded channels, in the order of the rows of a block."""
+        """Recorded channels, in the row order of a block."""
         return channels_of(self.rig)
 
     @property

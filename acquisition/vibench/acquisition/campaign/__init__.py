@@ -1,10 +1,10 @@
 """Run many measurements unattended: journal, attempts, reconnecting, notices, catalogue of a folder.
 
-The state of every point is committed to an SQLite journal before and after each step, so a campaign that was
-killed resumes at its first unfinished point. Each attempt at a point is recorded in a separate file
-(``NAME.h5``, ``NAME.2.h5``). Notices can be sent by a command or by mail. `estimate_campaign` estimates time
-and disk space; `list_recordings` lists a folder's recordings. The package runs in the calling program,
-without an engine process. See docs/campaigns.md and docs/decisions/0014-chains-of-points.md.
+The state of every point is committed to an SQLite journal before and after each step, so a killed campaign
+resumes at its first unfinished point. Each attempt at a point is recorded in a separate file (``NAME.h5``,
+``NAME.2.h5``). Notices can be sent by a command or by mail. `estimate_campaign` estimates time and disk
+space; `list_recordings` lists a folder's recordings. The package runs in the calling program, without an
+engine process. See docs/campaigns.md and docs/decisions/0014-chains-of-points.md.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

@@ -76,7 +76,7 @@ class MeasuredLevel:
         return Hold.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Hold.OUTSIDE
 
     def correction(self, level: BaseLevel, target: float) -> float:
-        """Return the factor for the generator setting; 1 if the level error is small or may be random."""
+        """Return the factor for the amplitude setting; 1 if the level error is small or may be random."""
         if self.amplitude <= 0.0:
             return 1.0
         dead = max(_DEAD_SHARE * level.tolerance, _SURE * self.uncertainty / target)

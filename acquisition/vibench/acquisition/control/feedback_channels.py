@@ -64,8 +64,8 @@ class FeedbackChannels:
     ) -> complex:
         """Return the ratio of m0's displacement to the base's; zero if the base does not move.
 
-        Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental,
-        and ``harmonic`` times the phase of the base is subtracted from the phase of that harmonic.
+        Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental.
+        From the phase of that harmonic, ``harmonic`` times the phase of the base is subtracted.
         """
         if not np.any(base):
             return 0j

@@ -154,7 +154,7 @@ class SineLoop:
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
-        """Change frequency and setting of the drive from the next phase on."""
+        """Change frequency and amplitude setting of the drive from the next phase on."""
         if frequency_hz != self.setting.frequency_hz:
             self._scope = Stroboscope(frequency_hz, self.channels.sample_rate_hz, self.drives)
             self._rows.skip()
@@ -178,7 +178,7 @@ class SineLoop:
         self._notes.append(note)
 
     def ramp_up(self) -> Controller[None]:
-        """Ramp the drive up to its present setting."""
+        """Ramp the drive up to its present amplitude setting."""
         yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
@@ -244,7 +244,7 @@ def glide(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz:
 
 
 def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Change the frequency. If a base level is held, scale the setting as the rig's model predicts."""
+    """Change the frequency. If a base level is held, scale the amplitude setting by the rig's model."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
         setting_vpp *= _bare_vpp(loop, level, frequency_hz)
@@ -277,7 +277,7 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
 
 
 def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
-    """Return the setting for the level at a frequency, assuming a bare table [Vpp]."""
+    """Return the amplitude setting for the base level at a frequency, assuming a bare table [Vpp]."""
     return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz, OnTable.NOTHING)
 
 

@@ -228,7 +228,7 @@ class DaqmxDigitizer:
         self._config = config
         self._channels = channels
         self.roles = tuple(channel.role.value for channel in channels)
-        """Roles of the channels, in the order of the rows of a block."""
+        """Roles of the channels, in the row order of a block."""
         self._resources = ExitStack()
         self._task: Task | None = None
         self._reader: AnalogUnscaledReader | AnalogMultiChannelReader | None = None

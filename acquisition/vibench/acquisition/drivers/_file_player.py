@@ -29,7 +29,7 @@ class FilePlayer:
         self.sample_rate_hz = recording.sample_rate_hz
         """Sample rate of the replayed recording [1/s]."""
         self.roles = tuple(channel.role.value for channel in channels)
-        """Roles of the channels, in the order of the rows of a block."""
+        """Roles of the channels, in the row order of a block."""
         self._next_sample = 0
         self._is_running = False
         self._is_open = True

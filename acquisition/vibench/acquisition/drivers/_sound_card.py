@@ -117,7 +117,7 @@ class SoundCardDigitizer:
         self.sample_rate_hz = float(card.stream.samplerate)
         """Sample rate that PortAudio reports [1/s]."""
         self.roles = tuple(channel.role.value for channel in channels)
-        """Roles of the channels, in the order of the rows of a block."""
+        """Roles of the channels, in the row order of a block."""
         self.volts_per_count = (None,) * len(channels)
         """None for each channel, because PortAudio returns fractions of full scale, not converter counts."""
         self._full_scale_v = float(rig.daq.options["input_full_scale_v"])

@@ -37,5 +37,5 @@ class HeldDwell(FixedSine, AbstractFeedback):
         return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step: the recording at the largest setting, without the wait before it."""
+        """Yield one step: the recording at the largest amplitude setting, without the wait before it."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)

@@ -82,7 +82,7 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """Display text for the held rms level and the largest setting."""
+        """Display text for the held rms level and the largest amplitude setting."""
         return f"base held at {self.rms_m_per_s2:.3g} m/s² rms, at most {self.amplitude_vpp:g} Vpp"
 
     @property

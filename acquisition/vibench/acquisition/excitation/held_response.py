@@ -39,7 +39,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
 
     @property
     def level_text(self) -> str:
-        """Display text for the held response and the largest setting."""
+        """Display text for the held response and the largest amplitude setting."""
         words = f"{self.response_of.value} motion of m0 held at {1e6 * self.response_m:g} µm"
         return f"{words}, at most {self.amplitude_vpp:g} Vpp"
 

@@ -37,7 +37,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
         return self.segment_with(f"measured {self.base_level.quantity}")
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step for every ``step_s``, all in the same segment and at the largest setting."""
+        """Yield one step for every ``step_s``, all in one segment and at the largest amplitude setting."""
         segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, segment)

@@ -300,7 +300,7 @@ class AbstractFeedback(AbstractExcitation):
 
     @property
     def level_text(self) -> str:
-        """Display text for the held levels and the largest setting."""
+        """Display text for the held levels and the largest amplitude setting."""
         most = super().level_text
         words = [level.text for level in self.held_levels]
         return f"base held at {', '.join(words)}, at most {most}" if words else most

@@ -13,7 +13,7 @@ from .plan import AbstractFeedback, Family, FrequencyHz
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor by which one change alters the setting; large, because a level has only 150 loop periods."""
+"""Largest factor per change of the amplitude setting; large, because a level has only 150 loop periods."""
 
 
 class ResonanceTracking(AbstractFeedback):
@@ -146,12 +146,12 @@ class ResonanceTracking(AbstractFeedback):
         )
 
     def steps(self) -> Iterator[Step]:
-        """Yield one step per level, at the first frequency of the search and the largest setting."""
+        """Yield one step per level, at the search's first frequency and the largest amplitude setting."""
         for number in range(len(self.accelerations_m_per_s2)):
             yield Step(Tone(self.start_hz), 0.0, self.record_s, self.segment(number, self.start_hz))
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield steps of 1 Hz or less over the range of the search, at the largest setting."""
+        """Yield steps of 1 Hz or less over the range of the search, at the largest amplitude setting."""
         count = int(self.high_hz - self.low_hz) + 2
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)

@@ -225,7 +225,7 @@ class Digitizer(Protocol):
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Roles of the channels, in the order of the rows of a block."""
+        """Roles of the channels, in the row order of a block."""
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:

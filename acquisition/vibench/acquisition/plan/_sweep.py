@@ -118,9 +118,9 @@ class _Place:
 class Sweep(FrozenModel):
     """All combinations of values on the given axes; each is a measurement based on ``measurement``.
 
-    A point is named after the sweep and its values: ``line-0p5vpp-up-205hz``. With
-    ``continue_from_previous`` the points along that axis form a chain. Each is a dwell that starts by playing
-    all earlier points, so that the specimen stays on its branch, even if a point is repeated days later.
+    A point is named after the sweep and its values: ``line-0p5vpp-up-205hz``. With ``continue_from_previous``
+    the points along that axis form a chain. Each is a dwell that starts by playing all earlier points. The
+    specimen thus stays on its branch, even if a point is repeated days later.
     """
 
     name: Name

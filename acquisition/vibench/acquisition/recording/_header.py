@@ -224,7 +224,7 @@ class RecordingHeader:
     """Data written before the first sample."""
 
     channels: tuple[ChannelHeader, ...]
-    """Recorded channels, in the order of the rows of a block."""
+    """Recorded channels, in the row order of a block."""
     sample_rate_hz: float
     """Actual sample rate of the hardware [samples/s]."""
     expected_samples: int | None

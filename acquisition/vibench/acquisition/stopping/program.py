@@ -183,7 +183,7 @@ class Program(BaseModel):
 
     @property
     def place(self) -> Place:
-        """Place of the program: here, or another container or computer that shares the state folder."""
+        """Where the program runs: here, or in another container or computer that shares the state folder."""
         return place_of(self.process_start)
 
     @property
