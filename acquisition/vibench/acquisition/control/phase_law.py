@@ -48,7 +48,7 @@ class TrackedPlace:
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """Estimate of the mode; None if the loop never locked; the next level then starts with a search."""
+    """Estimate of the mode. None if the loop never locked; the next level then starts with a search."""
 
 
 class PhaseLaw:

@@ -87,7 +87,7 @@ class FilePlayer:
         return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
 
     def start(self) -> None:
-        """Start to return samples, from the recording's first sample."""
+        """Start returning samples, from the recording's first sample."""
         if not self._is_open or self._is_running:
             raise InstrumentError(
                 "the recording is closed, or already playing; open the bench again, or stop playing"

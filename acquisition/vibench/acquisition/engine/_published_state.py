@@ -112,7 +112,7 @@ class Messages:
         return tuple(self._kept)
 
     def info(self, what: str) -> None:
-        """Add a message that requires no action of the operator."""
+        """Add a message that requires no action by the operator."""
         self._add(MessageKind.INFO, what, "", "", "")
 
     def warn(self, what: str, done: str = "", next_step: str = "") -> None:

@@ -30,7 +30,7 @@ class RangeSpacing(StrEnum):
 
 
 class Range(FrozenModel):
-    """Values from ``start`` to ``stop``, given by their distance ``step`` or their number ``count``."""
+    """Values from ``start`` to ``stop``, given by their spacing ``step`` or their number ``count``."""
 
     start: PositiveFloat
     stop: PositiveFloat

@@ -290,7 +290,7 @@ class Stability(StrEnum):
 
 
 class BranchStabilityNote(AbstractNote):
-    """Stability of one motion of a branch from small perturbations."""
+    """Stability of one motion of a branch, determined with small perturbations."""
 
     kind: Literal["branch_stability"] = "branch_stability"
     point: int

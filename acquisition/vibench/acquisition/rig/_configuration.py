@@ -47,7 +47,7 @@ def token_from_env() -> str:
 USUAL_GRID_RATE_HZ = 102_400.0
 """Default number of computed time steps per second on the virtual rig (its grid)."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Smallest number of time steps per second, at which the base motion at `WATCHED_HZ` is 0.8 % too small."""
+"""Smallest number of time steps per second; with it, the base motion at `WATCHED_HZ` is 0.8 % too small."""
 WATCHED_HZ = 500.0
 """Frequency at which a grid's error is judged: highest specimen resonance and end of the paper's range."""
 _MEASURED = 0.55

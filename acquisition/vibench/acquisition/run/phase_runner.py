@@ -62,7 +62,7 @@ class GlideWatch:
     ) -> None:
         """Add the recorded ``blocks`` of one step of the sweep.
 
-        ``course`` returns the planned cycles since the step's start, if its frequency is not constant.
+        If the step's frequency is not constant, ``course`` returns the planned cycles since its start.
         """
         if not blocks:
             return

@@ -268,7 +268,7 @@ class ArmCard(QGroupBox):
         return self._read == self._armed
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
-        """Show the possible commands; ``reason`` says why the test cannot be armed, empty if it can."""
+        """Show the possible commands; ``reason`` says why the test cannot be armed (empty if it can)."""
         state = EngineState.CLOSED if status is None else status.state
         armed = None if status is None else status.armed
         is_armed = state is EngineState.ARMED and armed is not None
