@@ -112,7 +112,7 @@ class Modes(Tabular):
     modes: tuple[Mode, ...]
 
 
-def test_parts_with_scalar_values_become_columns_of_a_dataset():
+def test_nested_results_with_scalar_values_become_columns_of_a_dataset():
     first, second = Mode(95.0, "first", 0.5, (1.0, 2.0)), Mode(266.0, "second", None, (3.0, 4.0))
     data = Modes((first, second)).to_xarray()
     np.testing.assert_array_equal(data["modes_frequency_hz"], [95.0, 266.0])

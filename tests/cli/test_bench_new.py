@@ -194,7 +194,7 @@ def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
     assert "two per cent" not in page
 
 
-def test_an_instrument_that_is_the_only_one_found_is_the_default_answer(tmp_path):
+def test_the_only_instrument_found_is_the_default_answer(tmp_path):
     only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"

@@ -70,14 +70,14 @@ def test_a_lack_of_address_space_is_reported_before_libraries_are_loaded(tmp_pat
     )
 
 
-def test_a_stop_that_lacks_memory_advises_to_switch_the_amplifier_off(tmp_path):
+def test_a_stop_command_without_enough_memory_advises_switching_the_amplifier_off(tmp_path):
     ended = run_limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
     assert ended.returncode == 1
     assert ended.stderr.endswith(f"{SWITCH_OFF}.\n")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_is_refused_if_address_space_is_lacking(vibench_here, tmp_path, monkeypatch, name):
+def test_every_command_is_refused_if_address_space_is_too_small(vibench_here, tmp_path, monkeypatch, name):
     monkeypatch.setattr(resource, "getrlimit", lambda _: (100_000_000, resource.RLIM_INFINITY))
     ended = vibench_here(name, cwd=tmp_path)
     assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
@@ -109,7 +109,7 @@ def test_a_wrapped_memory_error_is_reported(vibench_here, tmp_path, monkeypatch,
 
 
 @pytest.mark.thorough
-def test_a_bench_check_accepts_a_missing_folder(vibench, tmp_path):
+def test_a_bench_check_accepts_a_missing_recording_folder_and_does_not_create_it(vibench, tmp_path):
     ended = vibench("bench", "check", "--out", "later/on", cwd=tmp_path)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert not (tmp_path / "later").exists()

@@ -66,7 +66,7 @@ def test_ode45_conserves_impact_energy_and_long_runge_kutta_steps_do_not():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("method", [ode45(1e-6, 1e-9), runge_kutta(5e-5)])
-def test_textbook_exponents_without_contact_are_the_slowest_decay(method):
+def test_textbook_exponents_without_contact_equal_the_slowest_decay_rate(method):
     specimen = gong2025(damping_time_s=2e-4, contact="linear")
     rates = specimen.damping_ratios * 2.0 * np.pi * specimen.natural_frequencies_hz
     found = textbook_exponents(specimen, [Harmonic(130.0, 1e-6)], method, 0.5, 0.3)

@@ -170,7 +170,7 @@ def test_a_sampled_sine_gives_the_same_motion_as_the_sine_under_any_contact_law(
 
 @pytest.mark.parametrize("contact", ["power:29", "power:47", "power:201"])
 @pytest.mark.parametrize("accuracy", list(Accuracy))
-def test_an_integration_step_into_a_steep_power_law_is_rejected(contact, accuracy):
+def test_an_integration_step_that_goes_too_deep_into_a_steep_power_law_is_rejected(contact, accuracy):
     for drive in (Harmonic(260.0, 5e-6), Harmonic(430.0, 50e-6), Harmonic(210.0, 1e-3)):
         run = integrate(paper(contact), drive, 1.0, accuracy, sample_rate_hz=1e4)
         assert run.outcome is Outcome.REACHED_END

@@ -135,13 +135,13 @@ class TestLeaving:
             assert output_of(virtual) == b"0\n"
 
     @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
-    def test_an_error_with_an_open_bench_silences_the_output_and_propagates(self, laboratory, virtual, error):
+    def test_an_exception_silences_an_open_bench_and_propagates(self, laboratory, virtual, error):
         with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
             raise error
         assert caught.value is error
         assert output_of(virtual) == b"0\n"
 
-    def test_a_dead_daq_server_silences_the_bench_and_the_failed_close_is_noted(self, laboratory, virtual):
+    def test_a_bench_whose_daq_server_died_is_silenced_and_its_failed_close_noted(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
             read_after_faults(laboratory, virtual.faults.lose_daq_server)
         assert str(caught.value).startswith("reading samples 0 to 511")
@@ -178,7 +178,7 @@ class TestCalibration:
         bench.close()
 
     @pytest.mark.parametrize(("age_days", "is_valid"), [(-1, False), (0, True), (730, True), (731, False)])
-    def test_a_calibration_is_valid_for_the_days_configured_in_the_rig(self, rig, age_days, is_valid):
+    def test_a_calibration_is_valid_for_the_number_of_days_stated_in_the_rig(self, rig, age_days, is_valid):
         today = rig.vibrometer.calibrated + timedelta(days=age_days)
         assert calibrations(rig, today)[0].is_valid is is_valid
 

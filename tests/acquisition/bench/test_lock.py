@@ -130,7 +130,7 @@ def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path,
     assert aim.read_text() == "kept"
 
 
-def test_only_the_process_number_in_a_lock_file_is_shown(shared, monkeypatch):
+def test_no_text_of_a_lock_file_except_its_process_number_is_shown(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():
@@ -140,6 +140,6 @@ def test_only_the_process_number_in_a_lock_file_is_shown(shared, monkeypatch):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="systemd's")
-def test_lock_files_have_the_sticky_mode_that_protects_them_from_cleaning(shared):
+def test_lock_files_have_the_sticky_bit_that_protects_them_from_cleanup(shared):
     with closing(BenchLock.of(RIG)):
         assert all(path.stat().st_mode & 0o1777 == 0o1666 for path in shared.iterdir())

@@ -65,7 +65,7 @@ def test_the_catalogue_lists_recordings_in_subfolders_with_plan_time_and_size(fo
     assert dwell.started_utc < sweep.started_utc
 
 
-def test_a_tracked_resonance_is_listed_with_the_range_of_its_search():
+def test_a_tracked_resonance_is_listed_with_its_search_range():
     plan = ResonanceTracking(
         amplitude_vpp=1, start_hz=262, low_hz=240, high_hz=290, accelerations_m_per_s2=(0.3,)
     )
@@ -93,7 +93,7 @@ def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
-def test_the_verdict_on_a_recording_states_its_end_and_any_overload(bench, folder):
+def test_the_verdict_on_a_recording_states_how_it_ended_and_any_overload(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 

@@ -50,7 +50,7 @@ def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     assert "pausing for 12 s before two" in told
 
 
-def test_cooling_pauses_count_in_the_duration_of_plan_and_estimate(rig, tmp_path):
+def test_cooling_pauses_are_part_of_the_planned_and_the_estimated_duration(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three", rest_s=REST_S), campaign("one", "two", "three")
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
@@ -107,7 +107,7 @@ def test_a_campaign_killed_in_a_cooling_pause_continues_at_the_next_point(bench,
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 
-def test_a_repeated_measurement_also_waits_for_the_cooling_pause(bench, tmp_path):
+def test_a_cooling_pause_also_precedes_a_repeated_measurement(bench, tmp_path):
     fault = fail_one_read(bench, DataLost("a hole"))
     point_results = run_campaign(
         bench, campaign("one", rest_s=REST_S, attempts=2), tmp_path, on_progress=fault

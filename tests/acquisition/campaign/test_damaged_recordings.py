@@ -335,7 +335,7 @@ def test_verifying_an_emptied_folder_reports_missing_recordings(folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
-def test_undecodable_names_and_circular_links_do_not_break_a_listing(folder):
+def test_undecodable_file_names_and_circular_links_do_not_prevent_a_listing(folder):
     shutil.copy(folder / "two.h5", os.fsdecode(os.fsencode(folder) + b"/\xff.h5"))
     (folder / "circle.h5").symlink_to("circle.h5")
     listed = {each.path: each.is_bad for each in list_recordings(folder) if "/" not in each.path}
@@ -355,7 +355,7 @@ def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(benc
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
 
 
-def test_a_campaign_without_journal_needs_consent_to_recordings_of_another_bench(new_bench, rig, folder):
+def test_without_a_journal_recordings_of_another_bench_are_kept_only_with_consent(new_bench, rig, folder):
     other = new_bench(rig.model_copy(update={"name": "another bench"}))
     with pytest.raises(CheckFailed, match=r"name was .* and is now 'another bench'"):
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)

@@ -105,7 +105,7 @@ def test_reading_a_journal_while_it_is_written_leaves_no_extra_files(journal, tm
     assert [path.name for path in tmp_path.iterdir()] == ["c.campaign.sqlite"]
 
 
-def test_a_journal_without_commit_counts_as_not_started(tmp_path):
+def test_a_campaign_whose_journal_is_empty_counts_as_not_started(tmp_path):
     path = tmp_path / "c.campaign.sqlite"
     path.touch()
     assert not journal_exists(path)
@@ -139,7 +139,7 @@ def open_and_close(path):
 @pytest.mark.parametrize(
     "use", [open_and_close, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
 )
-def test_a_refused_journal_or_catalogue_file_is_closed(connections, tmp_path, use):
+def test_a_journal_or_catalogue_file_is_closed_after_it_was_refused(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
     path.write_text("no database " * 100)
     with pytest.raises(RecordingError) as caught:

@@ -70,7 +70,7 @@ def outcomes(point_results):
 ALL = [(f"dwell-{name}", PointOutcome.RECORDED) for name in PLACES]
 
 
-def test_each_recording_contains_its_own_mass_and_scan_point(kept, tmp_path):
+def test_each_recording_of_a_scan_states_its_point_and_contains_the_motion_of_its_mass(kept, tmp_path):
     world = kept._power._virtual.world
     world.keep_truth()
     velocities = {}

@@ -115,7 +115,7 @@ class TestAnotherBench:
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
-    def test_a_changed_bench_once_accepted_needs_no_second_acceptance(self, begun, new_bench, rig):
+    def test_a_changed_bench_must_be_accepted_only_once(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": with_other_serial(bench.identities["generator"])}
         point_results = run_campaign(
@@ -222,7 +222,7 @@ class TestWatching:
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
-    def test_a_notification_command_receives_faults_and_the_end_and_may_fail(self, bench, tmp_path):
+    def test_a_notification_command_is_run_at_faults_and_at_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (

@@ -62,7 +62,7 @@ def test_a_real_bench_without_a_check_is_not_armed(real, tmp_path):
         (1.0, Verdict.FAIL, "did not pass: amplifier gain is 13 dB, expected 10 dB within 1 dB"),
     ],
 )
-def test_an_old_or_failed_check_does_not_arm_a_real_bench(real, tmp_path, age_h, verdict, said):
+def test_a_real_bench_whose_check_failed_or_is_old_is_not_armed(real, tmp_path, age_h, verdict, said):
     bench, _ = real
     store_result(bench.rig, age_h, verdict)
     with pytest.raises(CheckFailed, match=said):
@@ -115,7 +115,7 @@ def test_a_failed_new_check_is_stored_and_does_not_arm_the_bench(real, tmp_path)
         require_fresh(bench, tmp_path)
 
 
-def test_a_check_after_which_the_drive_continues_does_not_report_silence(real, tmp_path):
+def test_a_check_after_which_the_drive_stays_on_warns_about_the_output(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
     with pytest.raises(
@@ -140,7 +140,7 @@ def test_a_virtual_bench_is_checked_once_automatically(rig, state_folder, tmp_pa
         assert bench.last_check == first
 
 
-def test_changes_since_the_last_check_are_reported_in_decibels_and_days(real, tmp_path):
+def test_a_gain_change_since_the_last_check_is_reported_in_decibels_with_its_age_in_days(real, tmp_path):
     bench, virtual = real
     check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
     virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)

@@ -201,7 +201,7 @@ def test_the_bench_report_is_a_table_and_round_trips_through_json(check_rig, rig
         report["nonsense"]
 
 
-def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_path):
+def test_a_bench_with_an_analogue_output_for_sines_is_checked_through_that_output(tmp_path):
     rig = load_rig("virtual_rig_streaming")
     with open_bench(rig) as bench:
         report = bench_report(bench, tmp_path)
@@ -222,7 +222,7 @@ def test_a_bench_with_an_output_for_sines_is_checked_through_that_output(tmp_pat
         (np.nan, Verdict.FAIL),
     ],
 )
-def test_a_deviation_is_classified_by_its_bounds(deviation, verdict):
+def test_the_verdict_on_a_deviation_follows_from_its_bounds(deviation, verdict):
     assert Bounds(1.0, 3.0).verdict(deviation) is verdict
 
 

@@ -33,7 +33,7 @@ def check(rig):
     return check
 
 
-def test_a_decaying_signal_of_the_previous_run_passes_the_check(check):
+def test_a_signal_of_the_previous_run_that_decays_in_time_passes_the_check(check):
     tail = sine(0.5, 5120)
     tail[100:] = 0.0
     figures = check(tail)

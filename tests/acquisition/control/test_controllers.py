@@ -5,7 +5,7 @@ from vibench.acquisition.excitation.kinds import EXCITATION_KINDS
 from vibench.acquisition.instruments import PlugInKind, plug_in_names
 
 
-def test_only_the_feedback_kinds_of_excitation_have_a_controller_and_all_of_them_do():
+def test_exactly_the_excitations_with_feedback_have_a_controller():
     of_packages = plug_in_names(PlugInKind.FEEDBACK)
     with_feedback = {word for word, kind in EXCITATION_KINDS.items() if kind.is_feedback}
     assert {*CONTROLLERS, *of_packages} == with_feedback

@@ -71,7 +71,7 @@ def test_jumps_up_and_down_are_bracketed_around_the_folds(sweep_bench):
         assert low - 0.3 <= fold <= high + 0.3
 
 
-def test_every_step_records_pass_branch_and_direction(sweep_bench):
+def test_every_recorded_step_states_its_pass_its_branch_and_its_direction(sweep_bench):
     steps = [numbers for label, numbers, *_ in sweep_bench.segments if label == "step"]
     assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]
     assert [each["pass"] for each in steps] == [1] * 9 + [2] * 9
@@ -227,7 +227,7 @@ def test_an_unsettled_motion_gives_no_resonance(
     assert (found["motion"], found["lock"], found["frequency_hz"]) == ("unsettled", "not met", None)
 
 
-def test_a_plan_without_a_base_level_plays_a_constant_generator_voltage(new_control_bench):
+def test_a_plan_that_holds_no_base_level_plays_a_constant_generator_voltage(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
     bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))

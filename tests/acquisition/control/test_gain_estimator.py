@@ -23,7 +23,7 @@ def tracked_levels(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
     return np.array(achieved), estimator
 
 
-def test_a_constant_gain_is_exact_from_the_second_step():
+def test_the_level_is_exact_from_the_second_step_if_the_gain_is_constant():
     achieved, estimator = tracked_levels(lambda time_s: 0.6)
     assert achieved[0] == pytest.approx(0.6)
     np.testing.assert_allclose(achieved[1:], 1.0, rtol=1e-12)
@@ -35,13 +35,13 @@ def test_a_steady_trend_of_the_gain_is_extrapolated():
     np.testing.assert_allclose(achieved[5:], 1.0, atol=1e-9)
 
 
-def test_random_errors_of_the_gain_are_averaged():
+def test_random_errors_of_the_measured_gain_are_averaged():
     achieved, _ = tracked_levels(lambda time_s: 1.0, steps=600, noise=0.05)
     # The memory holds six values with 5 % noise: about 2 % remains, rarely more after a linear fit.
     assert np.std(achieved[10:]) < 0.035
 
 
-def test_a_gain_jump_decays_within_the_memory():
+def test_a_level_error_after_a_jump_of_the_gain_decays_within_the_memory_of_the_estimator():
     achieved, estimator = tracked_levels(lambda time_s: 1.0 if time_s < 3 else 1.5)
     after = achieved[30:]
     assert np.all(np.abs(after[8:] - 1) < 0.01)

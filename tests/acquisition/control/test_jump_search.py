@@ -25,7 +25,7 @@ def search_jump(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=
 
 
 @given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))
-def test_the_bracket_contains_the_jump_with_the_requested_width(jump_hz, resolution_hz, height):
+def test_a_bracket_contains_its_jump_and_is_no_wider_than_requested(jump_hz, resolution_hz, height):
     for ends in ((100.0, 110.0), (110.0, 100.0)):
         jump, asked = search_jump(jump_hz, resolution_hz, *ends, height)
         low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))
@@ -41,7 +41,7 @@ def test_a_narrow_enough_bracket_needs_no_measurement():
 
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
-def test_two_points_are_on_one_branch_if_they_differ_by_under_half_the_jump_factor_in_db(response, expected):
+def test_two_points_that_differ_by_less_than_half_the_jump_factor_in_db_are_on_one_branch(response, expected):
     assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 
@@ -49,7 +49,7 @@ def test_two_points_are_on_one_branch_if_they_differ_by_under_half_the_jump_fact
     ("response", "expected"),
     [(3.6, JumpSide.BEFORE), (4.1, JumpSide.BEFORE), (5.0, JumpSide.AFTER), (1.6, JumpSide.AFTER)],
 )
-def test_a_response_on_a_third_branch_counts_as_after_the_jump(response, expected):
+def test_a_point_on_a_third_branch_counts_as_being_after_the_jump(response, expected):
     assert side(SettledPoint(177, response), SettledPoint(175, 3.6), SettledPoint(180, 5.4)) is expected
 
 

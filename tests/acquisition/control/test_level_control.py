@@ -25,7 +25,7 @@ def test_level_control_converges_whenever_the_level_is_reachable(gain, start_vpp
     assert MeasuredLevel(gain * setting_vpp, 0.0).hold_state(10.0, 0.025) is Hold.WITHIN
 
 
-def test_level_control_stays_between_the_minimum_and_the_planned_voltage(rig):
+def test_level_control_stays_between_the_smallest_and_the_largest_planned_voltage(rig):
     plan = HeldDwell(amplitude_vpp=5.0, frequency_hz=110.0, duration_s=1.0, base_level=LEVEL)
     measurement = Measurement(name="held", excitation=plan, ramp_s=0.2)
     loop = SineLoop(feedback_channels_of(channels_of(rig), 5120.0), rig, measurement)
@@ -38,7 +38,7 @@ def test_an_insignificant_level_error_does_not_change_the_generator_voltage():
     assert MeasuredLevel(9.5, 0.1).correction(LEVEL, 10.0) > 1.0
 
 
-def test_the_level_uncertainty_matches_repetitions_with_correlated_periods():
+def test_the_level_uncertainty_matches_the_scatter_of_repetitions_with_correlated_periods():
     random = np.random.default_rng(3)
     means, stated = [], []
     for _ in range(200):

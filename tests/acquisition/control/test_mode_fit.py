@@ -31,7 +31,7 @@ def test_frequency_and_damping_do_not_depend_on_sensor_phase(natural_hz, damping
 
 
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
-def test_the_stated_mode_uncertainty_matches_repetitions(natural_hz, damping):
+def test_the_stated_mode_uncertainty_matches_the_scatter_of_repetitions(natural_hz, damping):
     random = np.random.default_rng(2)
     frequency_hz, answers = response_points(natural_hz, damping)
     found = []

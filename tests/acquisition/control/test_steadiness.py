@@ -75,7 +75,7 @@ def test_stationary_chaos_is_called_aperiodic_in_95_percent_of_runs():
     assert Steadiness.PERIODIC not in verdicts
 
 
-def test_growing_or_drifting_chaos_is_unsettled():
+def test_chaos_that_still_grows_or_drifts_is_unsettled():
     growing = np.linspace(0.5, 1.5, 400)
     for seed in range(10):
         for motion in (0.4 * growing * chaos(400, seed), 0.4 * chaos(400, seed) + 0.6 * growing):
@@ -96,7 +96,7 @@ def test_channel_noise_is_not_reported_as_chaos():
     assert found.noise == pytest.approx(0.05, rel=0.01)
 
 
-def test_the_uncertainty_of_the_scatter_covers_repeated_measurements():
+def test_the_stated_uncertainty_of_a_scatter_covers_its_variation_between_measurements():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)
@@ -120,7 +120,7 @@ def test_the_period_of_a_motion_is_counted_in_drive_periods(drives, share, perio
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])
-def test_a_motion_with_a_non_repeating_order_is_aperiodic(kept):
+def test_a_motion_whose_component_at_one_order_does_not_repeat_is_aperiodic(kept):
     """The order keeps its statistics but does not repeat, with and without a constant part."""
     random = np.random.default_rng(3)
     moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))

@@ -23,7 +23,7 @@ def observe(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3, drives=1):
 
 
 @pytest.mark.parametrize("ppm", [-40.0, 0.0, 17.0])
-def test_the_drive_frequency_is_measured_by_the_converter_clock(ppm):
+def test_the_drive_frequency_is_measured_relative_to_the_converter_clock(ppm):
     scope = observe(np.sin, ppm)
     assert scope.clock.frequency_hz == pytest.approx(NEAR_HZ * (1 + 1e-6 * ppm), rel=1e-9)
 
@@ -54,7 +54,7 @@ def test_a_subharmonic_alternates_from_one_drive_period_to_the_next():
 
 
 @pytest.mark.parametrize("drives", [2, 3])
-def test_a_motion_that_repeats_after_several_drive_periods_gives_one_row_each_time(drives):
+def test_a_motion_that_repeats_after_several_drive_periods_gives_one_row_per_repetition(drives):
     motion = observe(lambda a: np.sin(a - 1) + 0.1 * np.sin(a / drives), drives=drives)
     periods = motion.periods()
     assert periods.count == int(12 * 0.2 * NEAR_HZ / drives)

@@ -38,7 +38,7 @@ def largest_peak_v(states):
 
 
 class TestOpening:
-    def test_the_output_is_first_switched_off_and_an_empty_identity_queried_again(self, plugged):
+    def test_the_output_is_switched_off_first_and_an_empty_identity_is_queried_again(self, plugged):
         generator = AFG1022X.open(plugged.config)
         assert plugged.log.messages[0] == "OUTP1:STAT OFF"
         assert plugged.log.messages.count("*IDN?") == 2
@@ -133,7 +133,7 @@ class TestPlaying:
         volts = (held / 8191.5 - 1) * generator.panel_vpp / 2
         assert np.max(np.abs(volts - 0.25 * (values - values.mean()))) < 0.5 / 16383 + 0.5e-4
 
-    def test_a_waveform_with_newline_bytes_passes_a_socket(self, plugged):
+    def test_a_waveform_with_newline_bytes_is_transferred_intact_through_a_socket(self, plugged):
         with ScpiSocket(plugged.instrument) as socket:
             config = plugged.config.model_copy(update={"resource": socket.resource_name})
             generator = AFG1022X.open(config)
@@ -294,7 +294,7 @@ class TestFaults:
         assert plugged.instrument.settings(1).frequency_hz == 262.0
 
     @pytest.mark.parametrize("act", [lambda generator: generator.set_amplitude(0.2), AFG1022X.close])
-    def test_a_lost_generator_advises_the_operator_and_can_be_stopped_later(self, plugged, playing, act):
+    def test_losing_a_generator_gives_advice_and_it_can_be_stopped_later(self, plugged, playing, act):
         plugged.usb.pull_cable()
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*Turn the amplifier"):
             act(playing)

@@ -83,7 +83,7 @@ class TestReading:
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
 
-    def test_the_reported_rate_is_the_rate_of_the_hardware(self, rig, open_digitizer):
+    def test_the_reported_sample_rate_is_that_used_by_the_hardware(self, rig, open_digitizer):
         digitizer = open_digitizer(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
 
@@ -94,7 +94,7 @@ class TestReading:
         row = np.concatenate([digitizer.read(samples).volts[0] for samples in (7, 512, 1, 1000, 1000)])
         assert np.max(np.abs(row - sine_fit(row, 100.0))) < A_LOST_SAMPLE_V / 10
 
-    def test_a_read_of_several_pieces_is_complete(self, rig, virtual, open_digitizer):
+    def test_a_read_made_in_several_pieces_is_complete(self, rig, virtual, open_digitizer):
         digitizer = open_digitizer(with_daq(rig, buffer_s=0.2))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
         digitizer.start()

@@ -153,7 +153,7 @@ def test_an_output_in_use_is_reported_as_busy_to_a_second_program(digitizer, out
         open_output(digitizer)
 
 
-def test_the_output_is_freed_if_it_would_change_the_requested_rate(digitizer):
+def test_the_output_is_refused_and_released_if_it_would_change_the_requested_rate(digitizer):
     # The USB-6211 divides 20 MHz by an integer, which cannot give 12 345.6 Hz.
     with pytest.raises(SettingRefused, match=r"daq\.output\.sample_rate_hz"):
         DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_345.6}), digitizer)
@@ -176,7 +176,7 @@ def test_an_unsupported_setting_is_refused_with_a_readable_message(digitizer, ph
     open_output(digitizer).close()  # no device stays reserved
 
 
-def test_a_lost_server_reports_that_the_output_may_still_play(digitizer, output, virtual):
+def test_the_error_for_a_lost_server_warns_that_the_output_may_still_play(digitizer, output, virtual):
     output.write(np.full(6400, 1.0))
     output.arm()
     digitizer.start()

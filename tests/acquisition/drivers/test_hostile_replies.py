@@ -137,7 +137,7 @@ def test_a_wrong_number_of_samples_raises_an_error(rig, monkeypatch, sent, annou
             bench.digitizer.read(64)
 
 
-def test_a_failed_call_with_a_success_code_raises_an_error(rig):
+def test_a_call_that_fails_with_a_success_code_raises_an_error(rig):
     with VirtualRig(rig) as virtual:
         virtual.faults.fail_daq("StartTask", 0)
         connected = rig.daq.model_copy(update={"server": virtual.daq_address})

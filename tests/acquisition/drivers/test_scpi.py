@@ -143,7 +143,7 @@ def test_a_malformed_block_raises_an_error(reply):
         port(instrument).query_codes("DATA?")
 
 
-def test_the_required_pause_follows_the_command_and_not_its_error_query():
+def test_the_required_pause_is_made_after_the_command_and_not_after_its_error_query():
     pauses = []
     instrument = Instrument()
     port(instrument, settle_s=0.1, pause=pauses.append).command("FREQ 1")

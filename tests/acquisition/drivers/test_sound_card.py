@@ -72,7 +72,7 @@ def test_a_bench_with_a_sound_card_passes_its_check(card_bench, tmp_path):
     ],
     ids=lambda each: each.kind,
 )
-def test_a_sound_card_records_its_output_without_gaps(card_bench, tmp_path, excitation):
+def test_a_sound_card_records_the_signal_of_its_output_without_gaps(card_bench, tmp_path, excitation):
     plan = Measurement(name="card", excitation=excitation, ramp_s=0.5, ramp_step_s=0.05)
     path = run_measurement(card_bench(), plan, tmp_path / "card.h5").path
     with open_recording(path) as recording:

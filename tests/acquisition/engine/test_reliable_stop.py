@@ -145,7 +145,7 @@ class TestConnectionsWithoutToken:
             now = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
             assert now <= before + WAITING_MOST + VIEWERS_MOST
 
-    def test_declared_message_sizes_reserve_no_memory(self, process):
+    def test_the_declared_size_of_a_message_reserves_no_memory(self, process):
         process.client.status()
         before = resident_bytes(process.pid)
         with connections(process.address, 150, HEAD.pack(MAGIC, 32_000_000, 64_000_000) + bytes(8000)):
@@ -154,7 +154,7 @@ class TestConnectionsWithoutToken:
             assert resident_bytes(process.pid) - before < 20e6
 
     @pytest.mark.thorough
-    def test_a_slow_connection_has_one_deadline_for_its_message(self, process):
+    def test_a_slow_connection_has_a_single_deadline_for_its_whole_message(self, process):
         at = process.address
         with socket.create_connection((at.host, at.port)) as slow:
             slow.sendall(HEAD.pack(MAGIC, 900, 0))

@@ -57,7 +57,7 @@ def test_the_voltage_needed_for_a_held_base_level_is_checked_against_its_limit(p
     assert check.is_kept
 
 
-def test_a_held_sweep_has_the_frequencies_of_an_open_loop_sweep():
+def test_a_sweep_at_a_held_level_has_the_frequencies_of_an_open_loop_sweep():
     shape = {"amplitude_vpp": 1.0, "start_hz": 150, "stop_hz": 350, "duration_s": 20}
     held = HeldSweep(**shape, base_level=BaseLevel(displacement_m=1e-6))
     played = [step.play.frequency_hz for step in held.steps()]

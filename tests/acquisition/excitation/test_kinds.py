@@ -118,7 +118,7 @@ def test_each_kind_declares_a_generator_voltage_or_a_held_base_acceleration(kind
     assert by_kind[kind].level_at(250.0) == level
 
 
-def test_a_settled_sine_without_a_base_level_plays_a_constant_voltage():
+def test_a_settled_sine_that_holds_no_base_level_plays_a_constant_voltage():
     plain = SettledSine(amplitude_vpp=1, frequencies_hz=(200, 210))
     assert plain.level_at(200.0) == RelativeSetting(1.0)
     assert not list(plain.held_accelerations())
@@ -141,7 +141,7 @@ def test_the_description_of_a_plan_names_its_held_level(kind, said):
 @pytest.mark.parametrize(
     "kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine", "held_response"]
 )
-def test_sweeps_reach_frequencies_from_the_requested_side(kind):
+def test_sweeps_approach_their_frequencies_from_the_requested_side(kind):
     for direction, approach in ((Direction.UP, Approach.UP), (Direction.DOWN, Approach.DOWN)):
         turned = by_kind[kind].turned(direction)
         assert turned.approach is approach
@@ -159,7 +159,7 @@ def test_level_steps_follow_the_requested_direction():
     assert [step.play.level for step in falling.steps()] == [1.0, 0.75, 0.5]
 
 
-def test_only_a_dwell_has_a_lead_in_of_tones():
+def test_only_a_dwell_can_begin_with_lead_in_tones():
     assert [kind for kind, each in by_kind.items() if each.led(WAY, 0.5) is not None] == ["dwell"]
     led, tone = by_kind["dwell"].led(WAY, 0.25)
     assert (led.lead_in, led.lead_in_s) == (WAY, 0.25)

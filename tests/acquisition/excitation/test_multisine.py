@@ -111,7 +111,7 @@ def test_a_band_includes_harmonics_at_its_edges(start, width, repetition_hz):
     assert noise.lines[-1] == start + width
 
 
-def test_spectrum_of_held_samples_matches_a_finely_sampled_staircase():
+def test_the_spectrum_of_held_samples_matches_that_of_a_finely_sampled_staircase():
     (values,) = flat_periods(BAND, 1, seed=2)
     picture = np.repeat(values, OVERSAMPLING)
     fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)
@@ -124,7 +124,7 @@ def test_spectrum_of_held_samples_matches_a_finely_sampled_staircase():
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32), first=st.integers(1, 100), count=st.integers(2, 300))
-def test_no_value_of_a_multisine_exceeds_the_range(seed, first, count):
+def test_no_value_of_a_multisine_exceeds_full_scale(seed, first, count):
     for values in flat_periods(np.arange(first, first + count), 2, seed):
         assert np.max(np.abs(values)) <= 1.0
 

@@ -138,7 +138,7 @@ def test_noise_excites_exactly_the_lines_of_its_band():
     np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))
 
 
-def test_noise_of_1_v_peak_to_peak_has_an_rms_of_half_a_volt_over_the_crest_factor():
+def test_noise_of_1_v_peak_to_peak_has_an_rms_of_half_a_volt_divided_by_its_crest_factor():
     shown = WhiteNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(16384)
     assert shown.rms_v == pytest.approx(0.5 / shown.crest_factor, rel=1e-3)
     assert 0.11 < shown.rms_v < 0.17
@@ -266,13 +266,13 @@ class TestStreamedNoise:
         ]
         np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-13)
 
-    def test_the_rms_of_streamed_noise_is_the_range_over_the_crest_factor(self):
+    def test_the_rms_of_streamed_noise_is_full_scale_divided_by_the_crest_factor(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
         # 2 B T independent values: the relative standard deviation of the rms is 1 / sqrt(4 B T).
         spread = 1 / np.sqrt(4 * 750 * 400_000 / self.RATE)
         assert np.sqrt(np.mean(samples**2)) == pytest.approx(1 / 4.5, rel=5 * spread)
 
-    def test_the_power_of_streamed_noise_is_in_the_band(self):
+    def test_streamed_noise_has_almost_no_power_outside_its_band(self):
         samples = self.PLAN.source.samples(0, 2**18, self.RATE)
         power = np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2
         frequency_hz = np.fft.rfftfreq(len(samples), 1 / self.RATE)

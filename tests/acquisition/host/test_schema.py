@@ -183,7 +183,7 @@ def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
         ("mapping", 'source = "1"', 'sauce = "1"'),
     ],
 )
-def test_the_schema_finds_the_errors_that_loading_refuses(kind, old, new, tmp_path):
+def test_the_schema_finds_the_errors_for_which_loading_refuses_a_file(kind, old, new, tmp_path):
     named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper", "map": "map"}
     right = (
         MAPPING

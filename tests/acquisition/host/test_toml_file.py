@@ -149,7 +149,7 @@ DWELL = 'excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260,
         (('"m"', '"m"\ncolour = 1'), "colour is not a known key: check its spelling"),
     ],
 )
-def test_an_unknown_key_is_refused_with_only_the_similar_known_key_as_a_hint(tmp_path, change, told):
+def test_the_error_for_an_unknown_key_names_a_known_key_only_if_it_is_similar(tmp_path, change, told):
     text = f'name = "c"\n[[measurements]]\nname = "m"\n{DWELL}\n'
     said = refusal(load_campaign, tmp_path / "campaign.toml", text.replace(*change))
     assert re.search(told, said)

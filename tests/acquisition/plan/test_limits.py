@@ -33,7 +33,7 @@ def plan(excitation, **fields):
     return Measurement(name="plan", excitation=excitation, **fields)
 
 
-def test_predicted_loads_of_a_sine_are_amplitude_times_transfer_function(rig):
+def test_the_predicted_loads_of_a_sine_are_its_amplitude_times_the_transfer_functions(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=0.1, frequency_hz=260, duration_s=1), rig)
     for quantity in BaseQuantity:
         expected = 0.05 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
@@ -80,7 +80,7 @@ def test_predicted_peaks_of_a_waveform_match_time_integration(rig):
     assert loads[BaseQuantity.CURRENT].peak == pytest.approx(np.max(np.abs(last[:, 2])), rel=0.02)
 
 
-def test_streamed_noise_reaches_exactly_the_terminal_range(rig):
+def test_the_predicted_peak_of_streamed_noise_is_half_its_peak_to_peak_voltage(rig):
     noise = StreamedNoise(amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=800, duration_s=1)
     volts = predicted_loads(noise, rig)[BaseQuantity.AMPLIFIER_VOLTAGE]
     assert volts.peak == pytest.approx(rig.generator.terminal_factor() * rig.amplifier.gain, rel=2e-3)

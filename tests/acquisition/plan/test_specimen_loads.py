@@ -59,7 +59,7 @@ def test_motion_during_ramps_stays_within_the_prediction(rig, frequency_hz, leve
 
 
 @pytest.mark.parametrize("kind", [WhiteNoise, StreamedNoise])
-def test_noise_loads_follow_the_free_or_stuck_linear_response(rig, kind):
+def test_predicted_noise_loads_follow_the_linear_response_with_free_or_stuck_masses(rig, kind):
     band = {"band_start_hz": 50.0, "band_stop_hz": 600.0}
     more = {"duration_s": 1.0} if kind is StreamedNoise else {"repetition_hz": 1.0, "realisations": 1}
     weak, strong = (kind(amplitude_vpp=level, **band, **more) for level in (0.02, 10.0))

@@ -39,7 +39,7 @@ class TestOrder:
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
         assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
 
-    def test_each_excitation_combines_the_template_with_its_own_values(self):
+    def test_each_excitation_of_a_sweep_combines_the_common_values_with_its_own(self):
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
             excitations=[SWEEP, {"kind": "stepped_sine", "frequencies_hz": [200, 210]}],

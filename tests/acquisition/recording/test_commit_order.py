@@ -184,7 +184,7 @@ def require_truth(recording, truth):
         assert (recording.reason, recording.samples) == ("done", BLOCKS * BLOCK)
 
 
-def test_no_structure_of_the_file_is_written_after_the_start(traced):
+def test_no_hdf5_structure_of_the_file_is_written_after_the_start(traced):
     places, empty, trace, _ = traced
     first_place = min(places.n_valid, places.state, places.reason)
     assert min(each[0] for each in trace if each is not None) >= first_place

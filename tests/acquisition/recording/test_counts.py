@@ -25,7 +25,7 @@ def test_24_bit_counts_round_trip_through_volts(step, zero, counts):
 
 
 @given(volts=st.lists(st.floats(-9.99, 9.99), min_size=1, max_size=50))
-def test_volts_without_a_known_converter_step_are_stored_to_half_a_fine_step(volts):
+def test_volts_without_a_known_converter_step_are_stored_to_within_half_a_fine_step(volts):
     counts = scale(None).counts(np.array([volts]))
     fine_step = 5.0 * 2**-30
     assert np.abs(counts * fine_step - volts).max() <= 0.5 * fine_step

@@ -80,7 +80,7 @@ def test_a_feedback_note_of_an_older_recording_round_trips(kind, text, form):
     assert len(text) <= TEXT_WIDTH, "it is not cut in the file"
 
 
-def test_the_text_of_a_feedback_note_is_parsed_to_values():
+def test_the_text_of_a_feedback_note_is_parsed_into_values():
     assert read("achieved", STEP).segment is SegmentLabel.STEP
     assert read("achieved", STEP).level is Hold.WITHIN
     assert read("settled", SETTLED).motion is Steadiness.UNSETTLED

@@ -47,7 +47,7 @@ def test_h5py_alone_reads_the_overview_with_scale_and_axis(sample_file):
         assert file["overview"].attrs["samples_per_bin"] == BIN_SAMPLES
 
 
-def test_an_overview_curve_is_nan_in_lost_bins(tmp_path, make_header, make_block):
+def test_an_overview_curve_is_nan_in_bins_whose_samples_were_lost(tmp_path, make_header, make_block):
     _, before = make_block(0, BIN_SAMPLES)
     _, after = make_block(3 * BIN_SAMPLES + 5, 1000)
     with create_recording(tmp_path / "a.h5", make_header()) as writer:

@@ -33,7 +33,7 @@ def test_a_recording_contains_all_metadata_known_at_its_start(path, make_channel
         assert recording.origin == "simulated"
 
 
-def test_a_missing_converter_step_or_sensitivity_is_read_as_missing(tmp_path, make_header, make_channel):
+def test_an_unstated_converter_step_or_sensitivity_is_read_as_missing(tmp_path, make_header, make_channel):
     bare = make_channel("m0_velocity", volts_per_count=None, sensitivity=None, long_name="velocity of m0")
     with create_recording(tmp_path / "b.h5", make_header(channels=(bare,))):
         pass

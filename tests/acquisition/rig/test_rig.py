@@ -49,7 +49,7 @@ def edited_config(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -
         ("sample_rate_hz = 51200\n# L", "sample_rate_hz = 0\n# L", r"output\.sample_rate_hz = 0: .*0"),
     ],
 )
-def test_a_wrong_configuration_is_refused_with_the_name_of_its_key(tmp_path, old, new, said):
+def test_a_wrong_configuration_is_refused_with_the_name_of_the_wrong_key(tmp_path, old, new, said):
     streaming = CONFIGS / "virtual_rig_streaming.toml"
     shipped = VIRTUAL if old in VIRTUAL.read_text(encoding="utf-8") else streaming
     with pytest.raises(ConfigurationError, match=said) as failure:

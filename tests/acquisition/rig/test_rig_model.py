@@ -19,7 +19,7 @@ def with_shaker(**changes):
     return RigModel(changed(RIG, shaker=changes), OnTable.NOTHING)
 
 
-def test_a_direct_coupled_amplifier_holds_the_table_at_its_static_deflection():
+def test_a_constant_voltage_through_a_direct_coupled_amplifier_deflects_the_table_statically():
     model = with_amplifier(low_cut_hz=0.0)
     shaker, gain = RIG.shaker, RIG.amplifier.gain
     current = gain / shaker.coil_resistance_ohm
@@ -42,7 +42,7 @@ def test_the_amplifier_gain_is_3_db_down_at_its_band_edges():
     assert middle == pytest.approx(RIG.amplifier.gain, rel=1e-4)
 
 
-def test_force_over_acceleration_tends_to_the_suspended_mass():
+def test_force_over_acceleration_tends_to_the_suspended_mass_at_high_frequency():
     frequency_hz = 5000.0
     force = MODEL.transfer(BaseQuantity.FORCE, frequency_hz)
     acceleration = MODEL.transfer(BaseQuantity.ACCELERATION, frequency_hz)

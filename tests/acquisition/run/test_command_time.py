@@ -91,7 +91,7 @@ def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, late
     assert cycles(segment_drive(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
 
 
-def test_a_ramp_is_extended_to_the_time_of_its_commands(bench, tmp_path):
+def test_a_ramp_is_extended_to_the_time_that_its_commands_take(bench, tmp_path):
     bench.world.latency_s = 0.25
     with run_of(bench, dwell(), tmp_path) as run:
         most = [bench.digitizer.waiting_samples / RATE for _ in run]

@@ -96,7 +96,7 @@ def test_the_bench_check_plays_one_burst_that_ends_by_itself(guarded, monkeypatc
     assert report.verdict is Verdict.OK
 
 
-def test_bursts_are_whole_periods_with_short_gaps(guarded, tmp_path):
+def test_bursts_contain_whole_periods_and_are_separated_by_short_gaps(guarded, tmp_path):
     _, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         deque(run, maxlen=0)

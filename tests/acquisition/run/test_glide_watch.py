@@ -50,7 +50,7 @@ def test_three_whole_cycles_lost_by_a_late_drive_are_detected():
 
 
 @pytest.mark.parametrize("spacing", list(Spacing))
-def test_the_cycles_lost_by_a_late_start_of_a_sweep_are_counted_at_its_end(spacing):
+def test_the_cycles_lost_because_a_sweep_started_late_are_counted_at_its_end(spacing):
     sweep, late_s = Sweep(90.0, 530.0, 3.0, spacing), 0.02
     time_s = np.arange(round(3.0 * RATE)) / RATE
     watch = GlideWatch(CHANNELS, RATE)

@@ -138,7 +138,7 @@ def test_an_overload_error_names_the_exceeded_range(rig):
 
 
 @pytest.mark.parametrize("ending", OnChange)
-def test_a_changed_specimen_ends_a_run_only_if_the_plan_says_so(rig, ending):
+def test_a_changed_specimen_ends_a_run_only_if_the_plan_requires_it(rig, ending):
     monitor, quiet = monitor_of(rig, on_changed_specimen=ending), np.zeros((4, BLOCK))
     monitor.require_safe(Block(0, quiet))
     monitor.note_change("The specimen is not what it was.", BLOCK)
@@ -163,7 +163,7 @@ def test_a_flagged_overload_does_not_count_as_an_exceeded_amplitude_limit(rig):
         monitor.require_safe(Block(first, volts, overloads))
 
 
-def test_a_gap_restarts_the_integration(rig):
+def test_a_gap_in_the_samples_restarts_the_integration(rig):
     monitor = monitor_of(only_limit(rig, "stroke_m"))
     blocks = sine_blocks(rig, 12.0, base_acceleration=20.0)
     watch(monitor, blocks[:20])

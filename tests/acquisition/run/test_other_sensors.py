@@ -266,7 +266,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     assert kinds[0] == kinds[1]
 
 
-def test_a_force_response_of_a_sine_is_refused(tmp_path):
+def test_an_analysis_of_a_force_response_to_a_sine_is_refused(tmp_path):
     path = record(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}
     with pytest.raises(UnusableData, match="base_force has results only for noise"):

@@ -109,7 +109,7 @@ def played(new_bench, rig, tmp_path_factory):
 
 
 class TestCompleteRuns:
-    def test_a_run_passes_all_states_in_order(self, bench, tmp_path):
+    def test_a_run_goes_through_all_states_in_order(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         assert run.state is RunState.IDLE
         seen = [progress.state for progress in run]
@@ -147,7 +147,7 @@ class TestCompleteRuns:
         np.testing.assert_allclose(begins, np.round(np.arange(10) * 0.02 * RATE), atol=1)
         assert stairs[0] == (0, pytest.approx(quiet))
 
-    def test_the_output_is_turned_on_at_the_quiet_amplitude_only(self, played):
+    def test_the_output_is_turned_on_only_at_a_quiet_amplitude(self, played):
         amplitude = None
         at_start = []
         for name, value, _ in played.world.calls:

@@ -102,7 +102,7 @@ def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
-def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_silent(laboratory, tmp_path):
+def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_in_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     pause = when_recording(lambda: advance(virtual, 1.0))
     with bench_on(connected) as bench:

@@ -79,7 +79,7 @@ def undecodable_name(folder):
 @pytest.mark.parametrize(
     "litter", [binary_announcement, pipe, subfolder, circular_link, non_numeric_name, undecodable_name]
 )
-def test_foreign_files_do_not_hide_announcements(litter):
+def test_other_files_in_the_folder_do_not_hide_announcements(litter):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         litter(engines_folder())
@@ -189,7 +189,7 @@ def state_of_other_user(monkeypatch):
         os.seteuid(0)
 
 
-def test_a_user_can_stop_a_program_of_root_in_their_folder(state_of_other_user):
+def test_a_user_can_stop_a_program_that_root_runs_with_the_state_folder_of_this_user(state_of_other_user):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         os.seteuid(NOBODY)
@@ -259,7 +259,7 @@ def test_a_program_is_refused_without_leftovers_if_the_state_folder_is_full(own_
     assert [each.name for each in own_state.rglob("*") if each.is_file()] == []
 
 
-def test_an_announced_program_that_opened_a_bench_leaves_the_folder_empty():
+def test_the_announcement_of_a_program_that_opened_a_bench_is_removed_at_its_end():
     with stop_on_signal(StopSwitch(), "dwell"):
         note_open_bench("lab")
         assert [each.rigs for each in announced_programs(Program) if "lab" in each.rigs]

@@ -158,7 +158,7 @@ def test_verdicts_from_poincare_points_match_the_simulated_specimen(frequency_hz
 
 
 @pytest.mark.thorough
-def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
+def test_chaotic_motion_with_impacts_is_found_in_windows_of_five_seconds():
     """At least 60 % of the windows of the paper's dwell are chaotic in every realisation."""
     window, skipped, count = 1300, 300, 36
     points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + count * window)[skipped:, :2]
@@ -211,7 +211,7 @@ def known_exponent(name):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["duffing", pytest.param("henon", marks=pytest.mark.slow), "stops"])
-def test_the_exponent_estimated_from_points_is_a_lower_bound(name):
+def test_the_exponent_estimated_from_poincare_points_is_a_lower_bound(name):
     """Estimates for the Duffing oscillator were 83.9 and, in more noise, 66.3 per second; 142.5 is true."""
     points, exponent = known_exponent(name)
     points = points / (np.sqrt(2) * points.std(axis=0))

@@ -125,7 +125,7 @@ CASES = [(kind, FAULTS[n % 3], ROWS[(3 * n + n // 8) % 4]) for n, kind in enumer
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize(("kind", "fault", "row"), CASES)
-def test_the_end_of_a_record_without_new_values_is_left_out(tmp_path, kind, fault, row):
+def test_held_repeated_or_zero_values_at_the_end_of_a_record_are_left_out(tmp_path, kind, fault, row):
     seed = [KINDS.index(kind), len(fault), 9 if row is None else row]
     rng = np.random.default_rng(seed)
     values, samples = dwell(rng), int(rng.integers(150, 9000))
@@ -151,7 +151,7 @@ def test_values_held_within_a_record_are_counted_as_lost(tmp_path, fault, row):
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 @pytest.mark.parametrize("plan", [SINE, HITS], ids=["dwell", "hits"])
 @pytest.mark.parametrize("kind", ["csv", "h5", "wav 16 bit"])
-def test_sound_records_are_kept_whole(tmp_path, kind, plan, noise):
+def test_intact_records_are_kept_whole(tmp_path, kind, plan, noise):
     """Exactly periodic sines, the zeros around noise-free hits, and coarse counts are no fault."""
     values = (dwell if plan is SINE else hits)(np.random.default_rng(5), noise)
     values = np.vstack((values, np.full(values.shape[1], 0.21)))  # such as a temperature

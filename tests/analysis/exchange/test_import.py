@@ -197,7 +197,7 @@ def test_wav_samples_are_fractions_of_full_scale(tmp_path, dtype, full):
     np.testing.assert_allclose(values, np.stack((10 * exact, -exact)), rtol=0, atol=1e-8)
 
 
-def test_wav_of_24_bits_keeps_every_bit(tmp_path):
+def test_a_wav_file_of_24_bits_keeps_every_bit(tmp_path):
     counts = np.random.default_rng(2).integers(-(2**22), 2**22, SAMPLES, dtype=np.int32)
     with wave.open(str(tmp_path / "a.wav"), "wb") as file:
         file.setparams((1, 3, int(RATE_HZ), 0, "NONE", ""))
@@ -225,7 +225,7 @@ def test_wav_samples_with_more_bits_than_the_file_states_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("shape", [(SAMPLES,), (SAMPLES, 2), (2, SAMPLES)])
-def test_hdf5_chunks_that_were_never_written_are_lost_samples(tmp_path, shape):
+def test_hdf5_chunks_that_were_never_written_are_imported_as_lost_samples(tmp_path, shape):
     axis = int(np.argmax(shape))
     with h5py.File(tmp_path / "a.h5", "w") as file:
         chunk = tuple(size if size < SAMPLES else 1000 for size in shape)
@@ -239,7 +239,7 @@ def test_hdf5_chunks_that_were_never_written_are_lost_samples(tmp_path, shape):
     assert [(each.first_sample, each.last_sample) for each in recording.gaps] == [(20_000, 24_999)]
 
 
-def test_samples_near_a_stated_full_scale_are_overloads(tmp_path):
+def test_samples_near_a_stated_full_scale_count_as_overloads(tmp_path):
     wanted = 0.1 * signals()[:1]
     wanted[0, 100:103] = 0.96
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -110,7 +110,7 @@ def test_missing_rows_of_an_hdf5_file_with_float32_times_are_counted(tmp_path, s
         np.testing.assert_array_equal(np.flatnonzero(~np.isnan(recording.read("m0_velocity"))), places)
 
 
-def test_a_sampling_rate_inferred_from_many_missing_rows_must_be_confirmed(tmp_path):
+def test_a_sampling_rate_inferred_from_times_with_many_missing_rows_must_be_confirmed(tmp_path):
     """Rounded times at another sampling rate with missing rows have the same intervals."""
     places = kept_rows("single", 0.2, np.random.default_rng(4))
     path = csv_file(tmp_path / "mine.csv", *formatted_times(places, 10_000.0, "0.1 ms")[:1], places, 10_000.0)

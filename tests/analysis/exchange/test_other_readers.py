@@ -31,7 +31,7 @@ def with_result(known_file, tmp_path_factory):
     return path
 
 
-def test_xarray_opens_named_scaled_dimensioned_variables(with_result, known_values):
+def test_variables_opened_by_xarray_have_names_scales_and_dimensions(with_result, known_values):
     xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
     pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
     with xarray.open_dataset(with_result, engine="h5netcdf") as data:

@@ -41,7 +41,7 @@ def ranges(parts):
     return [(each.start, each.stop) for each in parts]
 
 
-def test_realisations_placed_in_an_import_alternate_with_settling_times():
+def test_the_realisations_of_an_imported_plan_alternate_with_settling_times():
     parts = place_parts(mapping_of(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]

@@ -135,7 +135,7 @@ def test_contradictory_units_and_scales_in_a_heading_are_refused(tmp_path, head,
 
 
 @pytest.mark.parametrize("line", ["XINCR 2.0E-4", "Acquisition frequency [Hz]: 5000", "recorded at 5000 Hz"])
-def test_a_rate_in_a_heading_line_of_another_form_is_compared(tmp_path, line):
+def test_a_sampling_rate_in_a_heading_line_of_another_form_is_compared_with_the_mapping(tmp_path, line):
     with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping 5120"):
         read_import(text(tmp_path / "a.csv", f"{line}\nu\ta\tv", signal(TIMES), "\t"))
 
@@ -154,7 +154,7 @@ def test_different_start_times_of_labview_columns_align_the_channels(tmp_path):
     is_right(read_import(text(tmp_path / "a.txt", head.replace(";", "\t"), columns, "\t")), lost=LATE)
 
 
-def test_comments_and_fortran_numbers_are_read_and_a_stated_rate_is_compared(tmp_path):
+def test_comments_and_fortran_numbers_are_read_and_a_stated_rate_is_compared_with_the_mapping(tmp_path):
     cells = [[f"{each:.9E}".replace("E", "D") for each in row] for row in (TIMES, *signal(TIMES))]
     cells[0][2000] = f"# marker\n{cells[0][2000]}"
     is_right(read_import(text(tmp_path / "a.txt", "t u a v", cells, " ")))
@@ -202,7 +202,7 @@ def test_units_and_rates_stored_beside_matlab_matrices_are_used(tmp_path):
         ({"delays": np.array([0.0, 0.0, 0.0025])}, "several different values of delays"),
     ],
 )
-def test_facts_named_after_a_channel_apply_to_that_channel(tmp_path, suffix, facts, said):
+def test_units_scales_and_times_named_after_a_channel_apply_to_that_channel(tmp_path, suffix, facts, said):
     columns = dict(zip("uav", signal(TIMES), strict=True))
     is_unit = not said
     columns["a"] = columns["a"] / G if is_unit else columns["a"]

@@ -50,7 +50,7 @@ def test_uninformative_statistics_leave_the_bounds_as_wide_as_the_prior(cases):
     assert np.median(wide) > 0.85 * 2.0
 
 
-def test_statistics_that_no_parameter_can_produce_are_not_called_a_fit(cases):
+def test_no_fit_is_reported_for_statistics_that_no_parameters_can_produce(cases):
     assert sum(not each.fits for _, each in cases) <= 3
     runs = Linear(5)
     off = np.linalg.svd(runs.gain[:2])[2][-1]  # a direction that no parameter produces
@@ -85,7 +85,7 @@ def test_an_unchanged_parameter_box_is_not_sampled_again():
     assert np.all(np.diff(bounds, axis=0) > 0.8 * 2.0 * 0.95)
 
 
-def test_statistics_of_parameters_outside_their_range_are_not_called_a_fit():
+def test_no_fit_is_reported_for_statistics_of_parameters_outside_their_range():
     """The bounds of c1 had zero width, at the end of the range."""
     for seed in range(8):
         runs = Linear(seed)

@@ -57,7 +57,7 @@ def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(noisy_dwell):
     assert "exponent" in told[Hidden.EXPONENT].not_determined
 
 
-def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dwell):
+def test_simulated_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dwell):
     """Converter noise in the recorded voltage once drove the simulated table: 30 standard deviations off."""
     rng, runs = np.random.default_rng(3), 14
     with open_recording(noisy_dwell.path) as recording:

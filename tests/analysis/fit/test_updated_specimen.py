@@ -147,7 +147,7 @@ def lowered_dwells(folder, levels_m):
         yield synthetic.write_recording(folder, plan, motion, velocity, [part], name=f"dwell{number}")
 
 
-def test_collisions_that_persist_at_lower_levels_give_no_upper_bound_of_the_gap(tmp_path):
+def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_of_the_gap(tmp_path):
     """The gap was given as (5.1 to 15.4) um instead of 45."""
     paths = list(lowered_dwells(tmp_path, [8e-6, 4e-6, 2e-6, 1.5e-6, 0.5e-6]))
     (found,) = update_model(analyse_files(paths, "lowered", Simulation.LEFT_OUT)).values
@@ -170,7 +170,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
         bracketed_gap(dwells[:1], gong2025())
 
 
-def test_the_lag_of_a_swept_response_is_predicted_by_its_rate():
+def test_the_lag_of_a_swept_response_is_predicted_from_the_sweep_rate():
     """The predicted lag matches the simulated sweep; the steady response has a larger error."""
     rate, free, at_hz = 10.0, gong2025(contact="linear"), np.array([252.0, 257.0, 262.0, 272.0, 280.0])
     motion = synthetic.chirp(8.0, 225.0, 305.0, 1e-6)
@@ -195,7 +195,7 @@ def test_the_gap_is_not_fitted_without_a_sweep_and_a_reason_is_given(campaign):
         update_model(CampaignResults("sweep", campaign.sweeps, ()))  # of another specimen than the bench says
 
 
-def test_missing_data_for_a_fit_give_a_one_sentence_error(campaign):
+def test_a_fit_to_missing_data_gives_a_one_sentence_error(campaign):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep goes from"):

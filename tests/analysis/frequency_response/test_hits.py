@@ -96,7 +96,7 @@ def test_the_damping_of_an_exponential_window_is_subtracted(tmp_path, seed):
 
 
 @pytest.mark.parametrize("seed", [5, 6])
-def test_a_free_body_has_narrow_bounds_that_hold(tmp_path, seed):
+def test_the_bounds_for_the_modes_of_a_free_body_hold_and_are_narrow(tmp_path, seed):
     """The step of the velocity once gave chi² = 0.02, and bounds up to six times wider."""
     found = analyse(import_hits(tmp_path, *hammering(6, seed, noise=1e-4, free_kg=2.0))).response
     for each, (frequency_hz, damping, _) in zip(found.resonances, MODES, strict=True):

@@ -33,7 +33,7 @@ def test_the_estimated_scatter_of_each_line_matches_its_noise(sizes, freedom):
     assert np.median(np.std(ratios, axis=0)) < 0.25
 
 
-def test_lines_without_a_value_do_not_affect_other_lines():
+def test_spectral_lines_without_a_value_do_not_affect_other_lines():
     true, own = estimated_sd(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
     value = RESPONSE.copy()
     value[40], own[90] = np.nan, np.inf
@@ -42,7 +42,7 @@ def test_lines_without_a_value_do_not_affect_other_lines():
     assert np.nanmax(found / true) < 2.0
 
 
-def test_scatter_is_zero_without_noise_and_unchanged_with_many_averages():
+def test_the_estimated_scatter_is_zero_without_noise_and_unchanged_with_many_averages():
     none = np.zeros(RESPONSE.size)
     np.testing.assert_array_equal(steady_relative_sd(none, RESPONSE, POWER, 2), none)
     own = np.random.default_rng(5).random(RESPONSE.size)

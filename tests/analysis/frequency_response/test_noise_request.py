@@ -56,7 +56,7 @@ def test_the_requested_resolution_is_the_noise_bandwidth_of_a_line(streamed_file
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("averages", [4.0, 25.0])
-def test_the_requested_averages_are_reached_and_hardly_exceeded(streamed_file, averages):
+def test_the_requested_number_of_averages_is_reached_and_hardly_exceeded(streamed_file, averages):
     found = response(streamed_file(), averages=averages).frequency_response
     assert averages <= found.n_eff < 1.25 * averages
 

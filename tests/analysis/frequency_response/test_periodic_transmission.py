@@ -62,7 +62,7 @@ def test_periodic_lines_are_exact_for_any_clock_ratio_and_period(offset_ppm, per
     assert result.repetitions[0].period_samples == pytest.approx(true_period, rel=1e-10)
 
 
-def test_the_measured_repetition_period_scatters_as_stated():
+def test_the_scatter_of_the_measured_repetition_period_is_as_stated():
     from vibench.analysis.frequency_response.periodic import measured_repetition
 
     rng = np.random.default_rng(2)
@@ -144,7 +144,7 @@ def test_the_linear_gain_of_a_cubic_nonlinearity_matches_the_closed_form(sigma):
     assert np.mean(result.distortion_variance) > 1e-6
 
 
-def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
+def test_noise_on_the_base_does_not_bias_the_estimate_that_uses_the_drive_as_reference():
     rng = np.random.default_rng(7)
     orders = np.arange(5, 105)
     sums = PeriodicSums(RATE, RATE / 512)

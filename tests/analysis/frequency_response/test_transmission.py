@@ -94,7 +94,7 @@ def test_independent_noise_exceeds_the_coherence_limit_at_5_percent_of_lines():
     assert mean / lines == pytest.approx(1 / 32, rel=0.03)
 
 
-def test_noise_on_drive_or_response_biases_h1_or_h2_as_the_formula_states():
+def test_noise_on_the_drive_biases_h1_and_noise_on_the_response_biases_h2_by_the_known_factor():
     clean = noise(6, 400_000)
     x, y = clean + 0.3 * noise(7, 400_000), clean + 0.31 * noise(8, 400_000)
     how = {"segment_samples": 256}

@@ -35,7 +35,7 @@ def test_level_meters_hold_a_peak_for_a_limited_time():
     assert level.verdict is LevelVerdict.GOOD
 
 
-def test_a_channel_is_quiet_after_three_seconds_and_not_before():
+def test_a_channel_is_called_quiet_only_after_three_seconds_at_a_low_level():
     meters = LevelMeters(np.array([5.0]), RATE)
     verdicts = [meters.add(block([0.04]))[0].verdict for _ in range(31)]
     assert verdicts[:29] == [LevelVerdict.GOOD] * 29

@@ -52,7 +52,7 @@ def test_a_phase_portrait_has_a_poincare_section(view):
     assert np.allclose(view.section.displacement_m, 3 * A0, rtol=5e-3)
 
 
-def test_the_transmission_at_the_drive_is_the_ratio_of_displacements(view):
+def test_the_transmission_at_the_drive_frequency_is_the_ratio_of_displacements(view):
     found = view.frequency_response()
     line = int(np.argmin(np.abs(found.frequency_hz - 260.0)))
     assert found.magnitude[line] == pytest.approx(3.0, rel=0.01)

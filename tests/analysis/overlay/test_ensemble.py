@@ -58,7 +58,7 @@ def test_correct_phases_exceed_the_limit_in_1_percent_of_cases_on_the_whole_circ
 
 
 @pytest.mark.parametrize("middle", [0.0, 3.1, -3.1])
-def test_a_phase_shift_is_found_across_half_a_turn_and_told_in_degrees(middle):
+def test_a_phase_shift_is_found_across_180_degrees_and_reported_in_degrees(middle):
     drawn = middle + 0.02 * np.random.default_rng(3).standard_normal((8, 1))
     late = np.angle(np.exp(1j * (middle + np.radians([20.0]))))
     found = PhaseCurve("phase", FREQUENCY_HZ[:1], late, np.angle(np.exp(1j * drawn)))

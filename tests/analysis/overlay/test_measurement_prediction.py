@@ -16,7 +16,7 @@ QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.t
 RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
 
 
-def test_collision_bands_extend_half_way_to_the_next_point():
+def test_collision_bands_extend_halfway_to_the_next_point():
     frequency_hz = np.array([10.0, 20.0, 30.0, 40.0, 50.0])
     inside = np.array([True, False, True, True, False])
     assert bands_of(frequency_hz, inside) == ((10.0, 15.0), (25.0, 45.0))
@@ -26,7 +26,7 @@ def test_without_colliding_points_there_is_no_collision_band():
     assert bands_of(np.array([10.0, 20.0]), np.array([False, False])) == ()
 
 
-def test_the_amplitude_of_a_dwell_is_the_stroke_of_its_plan():
+def test_the_predicted_base_amplitude_of_a_dwell_is_the_predicted_stroke_of_its_plan():
     measurement = QUICK["dwell"]
     base = base_motion(measurement.excitation, RIG, np.array([260.0]))
     assert base.amplitude_m[0] == pytest.approx(

@@ -43,7 +43,7 @@ def test_similarity_depends_on_the_argument_of_the_logarithm():
 
 
 @given(st.floats(0.01, 0.5), st.floats(0.01, 0.5), st.integers(0, 100))
-def test_a_wider_threshold_never_finds_fewer_similar_points(first, second, seed):
+def test_a_larger_threshold_never_finds_fewer_similar_points(first, second, seed):
     rng = np.random.default_rng(seed)
     reference, model = curve(rng.lognormal(size=60)), curve(rng.lognormal(size=60))
     narrow, wide = sorted((first, second))

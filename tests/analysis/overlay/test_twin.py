@@ -73,7 +73,7 @@ def test_the_twin_agrees_with_weak_noise_on_every_line(recordings):
 
 
 @pytest.mark.parametrize(("name", "late_samples"), [("noise", 0.5), ("dwell", 20.0)])
-def test_the_phase_shows_that_a_channel_is_late(recordings, name, late_samples):
+def test_the_phase_shows_that_a_channel_is_delayed(recordings, name, late_samples):
     """20 samples at 260 Hz and 25.6 kS/s are 73 degrees; magnitudes do not change."""
     with open_recording(recordings / f"{name}.h5") as recording:
         analysis = analyse(recording)

@@ -42,7 +42,7 @@ def test_a_model_that_is_named_twice_is_simulated_once():
     assert SimulationRequest(step_hz=50.0).points == 24
 
 
-def test_the_result_that_grows_point_by_point_ends_as_the_linear_transmission():
+def test_a_result_computed_point_by_point_ends_as_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)

@@ -235,7 +235,7 @@ def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(tmp_path, 
 
 
 @pytest.mark.thorough
-def test_a_part_of_a_recording_is_bridged_like_the_whole(tmp_path):
+def test_drop_outs_in_a_part_of_a_recording_are_bridged_as_in_the_whole(tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measure(RIG, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)

@@ -41,7 +41,7 @@ def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 
 
-def test_the_accuracy_page_lists_every_accuracy_level_of_every_motion(benchmark, page_of):
+def test_the_accuracy_page_lists_every_accuracy_level_for_every_motion(benchmark, page_of):
     page = page_of(benchmark)
     for each in benchmark.motions:
         assert each.motion.name in page

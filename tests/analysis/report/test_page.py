@@ -23,7 +23,7 @@ def card(name, text="words"):
 
 
 @pytest.mark.parametrize("number", [0, 1, MOST_OPEN_CARDS, MOST_OPEN_CARDS + 1, 60])
-def test_every_result_card_has_a_table_row_and_the_cards_are_folded_if_there_are_many(number, tmp_path):
+def test_every_result_card_has_a_table_row_and_many_cards_are_folded(number, tmp_path):
     page = Read(page_text(tmp_path, tuple(card(f"c{each}", "result " * 20) for each in range(number))))
     rows = page.visible.split("figure and remarks")[1].split("Individual results")[0]
     assert rows.count("cannot tell") == number

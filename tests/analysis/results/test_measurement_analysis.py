@@ -130,7 +130,7 @@ def test_a_faultless_recording_passes_its_checks(dwell_file):
     assert verdict(found, "Drive frequency") is Verdict.PASSED
 
 
-def test_a_drive_at_another_frequency_than_the_plan_is_reported():
+def test_a_drive_at_a_frequency_that_was_not_planned_is_reported():
     planned_hz = np.array([100.0, 200.0, 300.0])
     assert frequency_check(np.array([100.005, 299.99]), planned_hz).verdict is Verdict.PASSED
     told = frequency_check(np.array([100.0, 260.0]), planned_hz)
@@ -220,7 +220,7 @@ def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_n
     assert "days" not in found.text
 
 
-def test_a_channel_level_states_peak_and_rms(dwell_file, dwell_motions):
+def test_the_level_of_a_channel_states_its_peak_and_its_rms(dwell_file, dwell_motions):
     found = analyse(dwell_file("weak"))
     velocity = dwell_motions["weak"][1]
     level = found.facts.level("m0_velocity")

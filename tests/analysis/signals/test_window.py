@@ -9,7 +9,7 @@ from vibench.analysis.signals.window import Window, taper
 
 @pytest.mark.parametrize("window", Window)
 @pytest.mark.parametrize("samples", [1, 2, 7, 64, 1001])
-def test_a_window_is_the_periodic_form_of_scipy(window, samples):
+def test_a_window_equals_the_periodic_window_of_scipy(window, samples):
     expected = get_window(window.value, samples, fftbins=True)
     assert taper(window, samples) == pytest.approx(expected, abs=1e-13)
     assert taper(window.value, samples).dtype == np.float64

@@ -169,14 +169,14 @@ def impacts_and_collisions(number, monkeypatch, seed=5):
     return np.interp(impacts_s, found.time_s, found.frequency_hz), said
 
 
-def test_impacts_in_a_single_interval_are_not_called_free_of_collisions(monkeypatch):
+def test_a_sweep_with_impacts_in_a_single_interval_is_not_called_free_of_collisions(monkeypatch):
     """Eight impacts at 111 Hz were once reported as "the masses did not collide"."""
     impacts_hz, said = impacts_and_collisions(26, monkeypatch, seed=6)
     assert any(low <= impacts_hz[0] + 0.5 and impacts_hz[0] - 0.5 <= high for high, low in said.too_fast_hz)
 
 
 @pytest.mark.parametrize(("number", "least_hz"), [(10, 560.0), (4, 0.0)])
-def test_bounds_of_an_end_include_the_ringing_after_the_last_impact(number, least_hz, monkeypatch):
+def test_bounds_of_the_end_of_collisions_include_ringing_after_the_last_impact(number, least_hz, monkeypatch):
     """Sweep 10 once collided up to 761 Hz instead of 593 Hz; sweep 4 had a second region, 207 to 186 Hz."""
     impacts_hz, said = impacts_and_collisions(number, monkeypatch)
     (region,) = said.regions
@@ -184,7 +184,7 @@ def test_bounds_of_an_end_include_the_ringing_after_the_last_impact(number, leas
 
 
 @pytest.mark.parametrize("number", [29, 44])
-def test_bounds_of_a_beginning_include_periodic_impacts(number, monkeypatch):
+def test_bounds_of_the_beginning_of_collisions_include_periodic_impacts(number, monkeypatch):
     """Starts of 76.0 and 235.0 Hz were once reported within 1.7 Hz; the true ones were 71.2 and 225.4 Hz."""
     impacts_hz, said = impacts_and_collisions(number, monkeypatch)
     start = said.regions[0].start
@@ -243,7 +243,7 @@ def test_steady_responses_are_stated_only_where_the_linear_run_matches(damping_t
     assert np.isfinite(outcome.steady_over_swept) == is_stated
 
 
-def test_the_steady_range_follows_from_the_linear_specimen():
+def test_the_largest_steady_response_follows_from_the_linear_specimen():
     """A sweep at 20 Hz/s has a largest response of 22.104; steady sines have 22.815."""
     outcome = simulate_and_analyse(FastSweep(gong2025(), 200.0, 300.0, 5.0, 1e-7, 1), "linear", gong2025())
     steady = float(np.max(np.abs(linear(np.linspace(200.0, 300.0, 5001)))))

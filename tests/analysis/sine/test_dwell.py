@@ -98,7 +98,7 @@ def test_peaks_of_a_dwell_spectrum_are_displacement_amplitudes():
     assert high.decibel == pytest.approx(20 * np.log10(0.02), abs=0.05)
 
 
-def test_the_stated_bias_and_scatter_by_noise_match_repeated_dwells():
+def test_the_stated_bias_and_scatter_due_to_noise_match_repeated_dwells():
     found = [
         dwell_response(*dwell(1.6, {1: 1e-7}, noise=1e-6, seed=seed), RATE, near_hz=260, window_s=1)
         for seed in range(40)
@@ -147,7 +147,7 @@ def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_gives_two()
         np.testing.assert_allclose(sorted(x[:2]), exact, atol=1e-8)
 
 
-def test_the_noise_drive_level_is_the_rms_in_the_band():
+def test_the_level_of_a_noise_drive_is_its_rms_in_the_band():
     rng = np.random.default_rng(3)
     base = 2.0 * rng.standard_normal(200_000)
     level = noise_drive_level(spectral_density(base, RATE, segment_samples=4096), low_hz=100, high_hz=1000)

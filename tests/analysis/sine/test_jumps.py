@@ -54,7 +54,7 @@ def test_a_steep_resonance_and_noise_are_not_jumps():
 @pytest.mark.parametrize("step_hz", [0.2, 0.4, 0.6, 1.1, 3.0])
 @pytest.mark.parametrize("ratio", [0.003, 0.017, 0.06])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
-def test_a_resonance_with_few_intervals_is_not_a_jump(step_hz, ratio, noise):
+def test_a_resonance_sampled_by_few_intervals_is_not_a_jump(step_hz, ratio, noise):
     frequency_hz = np.arange(220.0, 310.0, step_hz)
     r = frequency_hz / 266
     resonance = np.abs((1 + 2j * ratio * r) / (1 - r**2 + 2j * ratio * r))

@@ -73,7 +73,7 @@ def test_bounds_include_noise_larger_than_the_drive(tmp_path):
     assert covers(first, linear(180.0)), first.sentence
 
 
-def test_the_remainder_of_a_periodic_motion_is_noise(tmp_path):
+def test_the_part_of_a_periodic_motion_that_does_not_repeat_counts_as_noise(tmp_path):
     """The part of a linear motion that does not repeat (5 %) counts as noise.
 
     With the noise before the drive alone, Response I was 0.863 +- 0.027; 0.738 is true.
@@ -115,7 +115,7 @@ def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
 
 
 @pytest.mark.thorough
-def test_large_noise_is_not_determined_without_a_silent_part(tmp_path):
+def test_large_noise_is_not_determined_in_a_recording_without_a_silent_part(tmp_path):
     """The recording has no bench check, so it has no part without drive."""
     path, rig = tmp_path / "weak.h5", simulated_with(amplifier_noise_v=0.02)
     record(path, dwell(180.0), rig, ramp_s=0.5, bench_check="recently passed")

@@ -44,7 +44,7 @@ def stated_value(result, name):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_slow_beat_is_not_called_periodic_and_its_bound_covers_later_records(dwell, seed):
+def test_a_slow_beat_is_not_called_periodic_and_its_bounds_cover_later_records(dwell, seed):
     """A beat of 30 % at 260.2 Hz was once periodic, with Response I 6.373591 +- 0.000023."""
     rng = np.random.default_rng(seed)
     beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))

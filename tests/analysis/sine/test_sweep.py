@@ -191,7 +191,7 @@ def test_the_stated_uncertainty_of_an_order_is_its_scatter():
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_a_swept_linear_motion_has_equal_responses_and_its_exact_envelope(direction):
+def test_responses_i_and_ii_of_a_swept_linear_motion_are_equal_and_its_envelope_is_exact(direction):
     """The motion is x = 3 exp(-0.5 i) U at every frequency."""
     ends = (150.0, 350.0) if direction == "up" else (350.0, 150.0)
     time, phase = sweep(20, *ends)

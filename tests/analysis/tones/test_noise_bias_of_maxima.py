@@ -34,7 +34,7 @@ def test_zero_noise_gives_no_bias_and_bias_scales_with_the_unit():
     )
 
 
-def test_fewer_independent_values_raise_a_maximum_less():
+def test_noise_with_fewer_independent_values_raises_a_maximum_less():
     assert noise_lift(np.zeros(5000), 1.0, 50).bias < noise_lift(np.zeros(5000), 1.0, 5000).bias
 
 

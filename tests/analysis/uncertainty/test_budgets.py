@@ -214,7 +214,7 @@ def test_the_bound_of_the_largest_value_in_chaos_covers_other_windows():
 )
 @example(sd=5e-324, value=5e-324, maxima=np.array([5e-324, *np.zeros(49)]))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, maxima, request):
+def test_a_standard_uncertainty_is_finite_and_not_negative_or_is_not_stated(sd, value, maxima, request):
     """This holds for any values, also without noise and for a constant signal."""
     weak = request.getfixturevalue("weak")
     assert 0.0 <= sd_of_largest(maxima) < np.inf
@@ -278,7 +278,7 @@ def test_a_colliding_sweep_reports_the_scatter_of_its_draws(sweep_file):
         assert Cause.CHANCE in budget.not_stated
 
 
-def test_the_uncertainty_of_steps_without_collisions_is_noise_only(stepped_file):
+def test_the_random_error_of_steps_without_collisions_is_negligible_and_noise_is_stated_once(stepped_file):
     (steps,) = analyse_files([stepped_file], "steps", Simulation.LEFT_OUT).results
     first, second = budgets_of(steps)
     assert [each.quantity.partition(",")[0] for each in (first, second)] == [

@@ -30,14 +30,14 @@ def reachable_uncertainty(time_s):
 
 
 @pytest.mark.thorough
-def test_the_time_to_reach_a_target_is_the_inverse_of_the_expected_uncertainty():
+def test_the_predicted_time_to_reach_a_target_inverts_the_expected_uncertainty_over_time():
     for time_s in (20.0, 80.0, 320.0):
         found_s = time_to_wishes_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         assert found_s == pytest.approx(time_s, rel=1e-6)
 
 
 @pytest.mark.thorough
-def test_the_predicted_end_of_a_recording_is_at_an_analysis_or_at_its_longest_time():
+def test_a_recording_is_predicted_to_end_at_one_of_its_analyses_or_at_its_longest_time():
     times_s = [
         expected_recorded_s(plan(NOISE, Until(resonance_hz=reachable_uncertainty(time_s))), RIG)
         for time_s in (1.0, 12.0, 1000.0)

@@ -181,7 +181,7 @@ def test_the_played_signal_moves_the_base_as_the_transfer_function_states():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("begin", "ratio"), [("rest", 0.42), ("above", 2.79)])
-def test_the_branch_with_stops_depends_on_the_side_from_which_it_starts(begin, ratio):
+def test_a_branch_with_stops_depends_on_the_side_from_which_it_starts(begin, ratio):
     branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)
     at = np.argmin(np.abs(branch.frequencies_hz - 97.5))
     assert branch.response_ii[at, 0] == pytest.approx(ratio, rel=0.02)

@@ -107,7 +107,7 @@ def test_unit_changes_ignore_closed_plots(qtbot):
     assert raised == []
 
 
-def test_an_axis_that_shows_nothing_has_no_label(plot, qapp):
+def test_an_axis_without_a_quantity_has_no_label(plot, qapp):
     bare = Plot("bare", LOG_FREQUENCY, PlotAxis("x"), LIGHT)
     bare.across.show_nothing()
     bare.resize(600, 200)
@@ -117,7 +117,7 @@ def test_an_axis_that_shows_nothing_has_no_label(plot, qapp):
     bare.close()
 
 
-def test_the_first_grid_matches_the_ticks(plot, qapp):
+def test_the_grid_matches_the_ticks_when_it_is_first_drawn(plot, qapp):
     for top in (1.0, 7.0):
         plot.setXRange(0.0, top, padding=0)
         plot.setYRange(0.0, top, padding=0)

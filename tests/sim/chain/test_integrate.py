@@ -96,7 +96,7 @@ def test_sixty_four_strongly_driven_cells_stay_finite():
     assert run.impacts.per_cell.sum() == run.impacts.count
 
 
-def test_a_chain_run_with_too_many_impacts_reports_them_and_keeps_its_results():
+def test_a_chain_run_ended_by_too_many_impacts_reports_this_and_keeps_its_results():
     run = integrate_chain(chain_of(gong2025(), 2), HARD, 2.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.impacts.count == 2 * (20 + 100)

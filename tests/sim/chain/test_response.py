@@ -73,7 +73,7 @@ def test_largest_values_of_a_long_run_of_unequal_cells_match_dense_samples(conta
     assert np.all(response.largest_m < sampled * (1.0 + 2e-3))
 
 
-def test_both_chain_responses_without_contact_are_the_transmissibility():
+def test_both_chain_responses_without_contact_equal_the_transmissibility():
     chain, drive = chain_of(gong2025(contact="linear"), 4), Harmonic(266.0, 1e-6)
     response = chain_response(chain, drive, duration_s=20.0, window_s=0.5)
     moved = chain_transmissibility(chain, drive.frequency_hz)[0]

@@ -51,7 +51,7 @@ def test_perturbations_match_an_independent_integrator(spring):
     np.testing.assert_allclose(transition(structure, spring, motion), state.reshape(2, 2), atol=5e-6)
 
 
-def test_the_transition_over_a_mirrored_period_is_the_square_of_that_over_half_a_period():
+def test_the_transition_matrix_of_a_mirrored_motion_is_that_of_half_a_period_squared():
     structure, spring = oscillator(), PowerSpring(0.5, ((5, 0.4),))
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
     half = transition(structure, spring, motion, math.pi)

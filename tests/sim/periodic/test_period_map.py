@@ -34,7 +34,7 @@ def test_the_derivative_of_the_period_map_matches_differences(contact, shape):
     assert np.abs(by_differences(mapping, state, DRIVE) - exact).max() < 1e-6 * np.abs(exact).max()
 
 
-def test_the_map_derivative_over_two_periods_is_the_product_of_single_periods():
+def test_the_derivative_of_the_map_over_two_periods_is_the_product_of_the_single_derivatives():
     mapping = PeriodMap(gong2025())
     state = integrate(gong2025(), DRIVE, 20 / DRIVE.frequency_hz).final_state
     between = mapping.image(state, DRIVE)

@@ -61,7 +61,7 @@ def test_shooting_finds_an_orbit_from_a_distant_state():
     np.testing.assert_allclose(again.state / known.state, 1.0, atol=1e-6)
 
 
-def test_the_slopes_of_the_period_map_match_a_linear_flow():
+def test_the_derivative_of_the_period_map_matches_that_of_a_linear_flow():
     specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6)
     mapping = PeriodMap(specimen)
     scales = state_scales(specimen, drive)

@@ -29,7 +29,7 @@ def test_the_linear_relative_displacement_stays_within_its_bound(frequency_hz, p
     assert np.abs(p).max() <= motion.largest_p_m * (1.0 + 1e-12)
 
 
-def test_the_linear_relative_displacement_reaches_its_bound_if_all_parts_are_in_phase():
+def test_the_linear_relative_displacement_reaches_its_bound_if_modes_and_drive_are_in_phase():
     """Undamped modes and the drive come into phase within 40 s and reach 97 % of the bound."""
     free = linear_motion(gong2025(damping_time_s=0.0, contact="linear"), Harmonic(1.0, 1e-30), (0.0,) * 6)
     assert free.largest_p_m < 1e-25

@@ -210,7 +210,7 @@ def test_the_stated_error_of_a_mean_over_two_motions_holds_and_is_not_too_large(
 
 
 @pytest.mark.parametrize(("between", "within", "adds_windows"), [(0.0, 0.1, True), (0.1, 1e-3, False)])
-def test_windows_are_added_while_responses_scatter_within_a_start(between, within, adds_windows):
+def test_windows_are_added_while_responses_from_one_initial_state_scatter(between, within, adds_windows):
     random = np.random.default_rng(6)
     starts = [
         Start(None, [np.full(4, middle + within * random.standard_normal()) for _ in range(2)], None, 0)

@@ -101,7 +101,7 @@ def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
-def test_runs_that_are_still_chaotic_at_their_end_count_as_possibly_an_unknown_motion():
+def test_runs_still_chaotic_at_their_end_raise_the_bound_on_the_share_of_unknown_motions():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
     ).ensemble

@@ -35,7 +35,7 @@ def test_joint_share_intervals_cover_the_true_shares_in_95_percent(shares):
     assert held / len(drawn) > 0.93
 
 
-def test_share_intervals_allow_unfinished_runs_to_reach_any_motion():
+def test_share_intervals_allow_for_unfinished_runs_that_reach_any_motion():
     settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
     alone = wilson_share(6, 16)
     assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)
@@ -59,7 +59,7 @@ def test_chaos_without_escape_has_only_a_lower_bound_of_lifetime():
     assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
 
 
-def test_share_intervals_allow_unfinished_runs_to_change_their_motion():
+def test_share_intervals_allow_for_unfinished_runs_that_change_their_motion():
     one, other = shares_of([Count(4, is_final=False), Count(4, is_final=False)])
     assert (one.low, one.high) == (other.low, other.high) == (0.0, 1.0)
     settled, *open_ones = shares_of([Count(8, is_final=True), *2 * [Count(4, is_final=False)]])

@@ -8,13 +8,13 @@ from vibench.sim import Harmonic, Specimen, base_response, base_transmissibility
 FREQUENCY_HZ = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
 
 
-def test_free_response_is_the_transmissibility():
+def test_the_response_of_the_free_masses_is_the_transmissibility():
     answer, truth = base_response(gong2025(), FREQUENCY_HZ), base_transmissibility(gong2025(), FREQUENCY_HZ)
     np.testing.assert_array_equal(answer.free_x, truth[:, 0])
     np.testing.assert_array_equal(answer.free_p, truth[:, 3])
 
 
-def test_the_stuck_response_equals_that_of_the_joined_masses():
+def test_the_response_of_the_stuck_masses_equals_that_of_joined_masses():
     """A spring a million times stiffer between m1 and m2 prevents relative displacement."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses

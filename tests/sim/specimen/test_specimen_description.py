@@ -224,7 +224,7 @@ DAMPERS = "dampings_ns_per_m = [0.474821, 0.0165809, 0.240926]"
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-def test_a_mass_whose_change_alters_a_spring_constant_gives_a_warning(tmp_path, index):
+def test_a_changed_mass_that_alters_a_spring_constant_gives_a_warning(tmp_path, index):
     masses = [5.8e-3, 2.1e-3, 2.0e-3]
     masses[index] *= 1.5
     own = f'name = "mine"\nmodel = "gong2025"\nmasses_kg = {masses}\n'
@@ -241,7 +241,7 @@ def test_a_mass_whose_change_alters_a_spring_constant_gives_a_warning(tmp_path, 
     assert kept.dampings == pytest.approx(gong2025().dampings, rel=1e-5)
 
 
-def test_springs_whose_change_alters_the_damping_give_a_warning(tmp_path):
+def test_changed_springs_that_alter_the_damping_give_a_warning(tmp_path):
     own = 'name = "mine"\nmodel = "gong2025"\nsingle_frequencies_hz = [322.0, 120.0, 390.6]\n'
     with pytest.warns(SpecimenWarning, match=r"dampings changed .* damping_time_s = 2e-05 to confirm"):
         load_specimen(write_file(tmp_path, own))
@@ -250,7 +250,7 @@ def test_springs_whose_change_alters_the_damping_give_a_warning(tmp_path):
     load_specimen(write_file(tmp_path, own + "damping_time_s = 2e-5"))
 
 
-def test_confirmed_and_independent_changes_give_no_warning(tmp_path):
+def test_changes_that_are_confirmed_or_alter_no_other_value_give_no_warning(tmp_path):
     head = 'name = "mine"\nmodel = "gong2025"\n'
     for own in (
         "gap_m = 30e-6",

@@ -258,7 +258,7 @@ def test_the_lowest_and_highest_codes_are_minus_one_and_plus_one():
     assert values.tolist() == [-1.0, 1.0]
 
 
-def test_a_mean_over_a_tiny_part_of_a_point_equals_the_point():
+def test_a_waveform_mean_over_a_tiny_part_of_a_point_equals_the_value_of_the_point():
     assert mean(TABLE, 0.3, 1e-15) == mean(TABLE, 0.3, 0.0)
 
 

@@ -28,7 +28,7 @@ def test_the_integral_of_the_played_signal_matches_the_queued_signal(rate_hz, vo
     assert np.all(output.render(step, 10) == 0)
 
 
-def test_every_sample_is_held_for_its_period():
+def test_every_output_sample_is_held_for_one_sample_period():
     output = AnalogueOutput()
     output.queue(np.array([1.0, -2.0, 3.0]), GRID_RATE_HZ / 2, 100)
     assert output.render(100, 8) == pytest.approx([1, 1, -2, -2, 3, 3, 0, 0])

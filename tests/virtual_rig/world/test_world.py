@@ -134,7 +134,7 @@ def test_conversions_at_different_rates_agree_at_equal_times():
         assert measured * RIG.daq.channels[DRIVE].attenuation == pytest.approx(1.0, rel=3e-4)
 
 
-def test_a_conversion_started_later_sees_the_earlier_signal():
+def test_a_conversion_started_later_reads_the_signal_that_already_plays():
     world = World(QUIET, Tone(260.0, 1.0))
     world.advance(0.5)
     volts = world.sample(INPUTS[:1], 51_200.0).read(100)[0]

@@ -119,7 +119,7 @@ def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
     page.simulator.cancel()
 
 
-def test_the_empty_axes_show_the_ranges_of_the_form(context, qtbot, closing):
+def test_empty_axes_show_the_ranges_entered_in_the_form(context, qtbot, closing):
     """With a recorded level the axis ran from 10 to 10^6 um."""
     page = closing(MapsPage(context))
     page.resize(900, 700)

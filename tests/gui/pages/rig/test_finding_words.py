@@ -32,7 +32,7 @@ def finding(number, unit, value="as the check says", uncertainty=None, advice=""
         (0.0, "V", "as the check says"),
     ],
 )
-def test_small_and_large_findings_have_unit_prefixes(number, unit, text):
+def test_small_and_large_values_of_findings_are_shown_with_unit_prefixes(number, unit, text):
     assert measured_text(finding(number, unit)) == text
 
 
