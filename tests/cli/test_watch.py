@@ -170,7 +170,7 @@ class TestWithoutAnEngine:
         assert "is not an engine and cannot be held" in held.stderr
         watched = vibench_here("watch", cwd=tmp_path)
         assert watched.returncode == 1
-        assert f"{script.pid} (alone) drives a bench itself" in watched.stderr
+        assert f"{script.pid} (alone) drives a bench without an engine" in watched.stderr
 
     @pytest.mark.thorough
     def test_a_bench_check_is_stopped(self, vibench_here, tmp_path):

@@ -58,7 +58,7 @@ def record(bench, excitation, tmp_path):
         assert not recording.gaps
         late = [each.text for each in recording.events if each.kind == "late"]
         # A sweep also notes cycles that it lost to slow commands: less than one is allowed.
-        lost = [text for text in late if "cycles off its plan" in text]
+        lost = [text for text in late if "cycles off the planned phase" in text]
         assert late == lost
         assert all(abs(float(re.search(r"[+-][\d.e+-]+", text)[0])) < 1.0 for text in lost)
     return path

@@ -286,7 +286,7 @@ class TestFaults:
         plugged.instrument.corrupt_next_reply()
         with pytest.raises(InstrumentError):
             generator.set_frequency(261.0)
-        with pytest.raises(InstrumentError, match=r"settings unknown"):
+        with pytest.raises(InstrumentError, match=r"settings are unknown"):
             generator.start()
         generator.load_sine(262.0, 0.1)
         generator.start()

@@ -87,8 +87,8 @@ def test_a_third_party_kind_of_excitation_is_planned_measured_and_reported(tmp_p
     ("target", "reason"),
     [
         ("no_such_module:TwoTones", "cannot be loaded (ModuleNotFoundError"),
-        ("vibench.acquisition.plan:Dwell", "not a plan for this kind only"),
-        ("two_tones:Segment", "not a plan for this kind only"),
+        ("vibench.acquisition.plan:Dwell", "not the plan of that kind"),
+        ("two_tones:Segment", "not the plan of that kind"),
     ],
 )
 def test_a_broken_third_party_kind_affects_only_its_own_plans(tmp_path, target, reason):

@@ -28,7 +28,7 @@ def test_a_path_never_loads_a_shipped_file(given, tmp_path, monkeypatch):
 
 def test_an_unknown_file_name_is_refused_with_a_list_of_known_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigurationError, match=r"'quik' is neither .* paper, quick, "):
+    with pytest.raises(ConfigurationError, match=r"'quik' is not a file.* paper, quick, "):
         load_campaign("quik")
     with pytest.raises(ConfigurationError, match="not part of this installation"):
         shipped_folder("recipes")
@@ -39,5 +39,5 @@ def test_a_folder_does_not_hide_a_shipped_file_of_the_same_name(tmp_path, monkey
     (tmp_path / "virtual_rig").mkdir()  # as in the folder of a checkout
     assert file_path("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
     (tmp_path / "mine").mkdir()
-    with pytest.raises(ConfigurationError, match="'mine' is a folder, not a file nor one that"):
+    with pytest.raises(ConfigurationError, match="'mine' is a folder, and vibench has no file of"):
         load_campaign("mine")

@@ -57,7 +57,7 @@ def test_an_invalid_until_bound_is_refused(said):
 
 
 def test_the_key_until_without_a_bound_is_refused():
-    with pytest.raises(ValidationError, match="until names no result"):
+    with pytest.raises(ValidationError, match="'until' names no result"):
         plan("dwell", {"shortest_s": 3.0})
 
 

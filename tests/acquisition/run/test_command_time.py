@@ -131,7 +131,7 @@ def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s)
     late = 0.02 * (plan.excitation.stop_hz - plan.excitation.start_hz)
     assert cycles(segment_drive(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
     *_, last = (text for _, kind, text in bench.recorder.events if kind == "late")
-    assert "cycles off its plan" in last
+    assert "cycles off the planned phase" in last
 
 
 @pytest.mark.parametrize("seed", range(6))

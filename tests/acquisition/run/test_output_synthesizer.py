@@ -120,5 +120,5 @@ def test_a_fade_starts_at_the_current_level_and_ends_in_silence(taken):
 def test_the_synthesizer_refuses_generator_waveforms():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(with_ramps(Waveform(np.array([0.0, 1.0]), 1.0)))
-    with pytest.raises(ConfigurationError, match="play it with the function generator"):
+    with pytest.raises(ConfigurationError, match="use the function generator"):
         synthesizer.take(10)

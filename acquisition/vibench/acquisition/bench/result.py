@@ -95,7 +95,7 @@ class BenchReport(FrozenModel):
         for finding in self.findings:
             if finding.name == name:
                 return finding
-        raise KeyError(f"no finding {name!r} in {', '.join(finding.name for finding in self.findings)}")
+        raise KeyError(f"no finding {name!r}; found: {', '.join(finding.name for finding in self.findings)}")
 
     def text(self) -> str:
         """Return the report as a table; advice stands below the line of its finding."""

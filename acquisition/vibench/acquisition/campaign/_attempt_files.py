@@ -104,7 +104,7 @@ def complete_attempt(
             continue
         if not found.is_of_this_plan:
             raise RecordingError(
-                f"{path} is complete, but its plan differs from that of {name!r} in the campaign. "
+                f"{path} is complete, but the campaign has another plan for {name!r}. "
                 "Nothing was recorded; give the measurement another name, or choose another folder"
             )
         return found

@@ -500,7 +500,7 @@ class Journal(ClosedOnLeaving):
         except sqlite3.IntegrityError as error:
             names = ", ".join(repr(each.name) for each in points)
             raise RecordingError(
-                f"{added_after!r} adds {names}, but the campaign already has a point with such a name. "
+                f"{added_after!r} adds {names}, but the campaign already has a point of that name. "
                 "Nothing was overwritten; give every added measurement a new name"
             ) from error
 

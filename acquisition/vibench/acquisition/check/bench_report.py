@@ -211,7 +211,7 @@ def _idle_finding(output: AnalogOutput) -> Finding:
 def _latency(bench: Bench) -> Finding:
     latency_s = bench.generator.measured_latency_s()
     verdict = LATENCY_S.verdict(latency_s)
-    advice = "shorten generator.settle_s, or reduce other bus traffic: a stop takes as long as a command"
+    advice = "shorten generator.settle_s, or reduce other bus traffic: a stop takes as long as this command"
     return finding_of("time per command", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
 
 
@@ -238,5 +238,5 @@ def _offset(channel: Channel, row: Samples) -> Finding:
     mean_v = float(np.mean(row))
     verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
     advice = "look for an open input, a sensor's bias voltage with DC coupling, or an off-centre shaker"
-    expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
+    expected = f"0 ± {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
     return finding_of(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

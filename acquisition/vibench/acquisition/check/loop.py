@@ -171,7 +171,7 @@ class LoopCheck:
         fit = self._fit(role)
         is_detected = self._detects(role)
         advice = {
-            "voltage": "check that the cable is intact, its source plugged in, and the amplifier on",
+            "voltage": "check that the cable is intact and plugged in at both ends, and the amplifier is on",
             "velocity": "check that the laser is on and focused, and its beam not blocked",
             "acceleration": "check that the accelerometer is plugged in and its supply current is on",
         }.get(role.quantity, "check that the sensor is plugged in, within its range, and powered")
@@ -218,8 +218,8 @@ class LoopCheck:
     def _clocks(self) -> Finding:
         ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
-        advice = "compare daq.sample_rate_hz with the source's clock; over minutes, a drift shifts phases"
-        expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
+        advice = "compare daq.sample_rate_hz with the generator's clock; over minutes, a drift shifts phases"
+        expected = f"0 ± {CLOCK_PPM.well:g} ppm"
         return finding_of(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 
     def _gain(self) -> Finding:
@@ -254,10 +254,10 @@ class LoopCheck:
             Role.AMPLIFIER_VOLTAGE: "swap the two wires of this input, or check if the amplifier inverts",
         }.get(
             role,
-            "if the sign of the base is right, this sensor is reversed (its direction, or the side that the "
-            "laser hits), or the specimen is not the configured one",
+            "if the sign of the base acceleration is right, this sensor is reversed (direction, or side that "
+            "the laser hits), or the specimen is not the configured one",
         )
-        expected = f"0 deg within {bounds.well:g} deg"
+        expected = f"0 ± {bounds.well:g} deg"
         verdict = bounds.verdict(abs(off_deg))
         return finding_of(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
 

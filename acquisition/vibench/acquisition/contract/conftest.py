@@ -68,7 +68,7 @@ def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
     """Return the error text for an instrument that no bench names."""
     who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
     kinds_in_words = " or ".join(each.value for each in kinds)
-    return f"{who} {name!r} as one of {kinds_in_words}; give a bench that does with --vibench-bench"
+    return f"{who} {name!r} as one of {kinds_in_words}; give such a bench with --vibench-bench"
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:

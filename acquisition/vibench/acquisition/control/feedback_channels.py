@@ -155,6 +155,6 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(
             f"the base acceleration was {acceleration:.3g} m/s2 at {frequency_hz:g} Hz; the model predicts "
-            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. The run was ramped down "
+            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of it. The run was ramped down "
             "and its recording kept; check the accelerometer, its cable and the amplifier"
         )

@@ -108,7 +108,7 @@ class FilePlayer:
             self._is_running = False
             raise InstrumentLost(
                 f"{self._recording.path.name} ends after {self._recording.samples} samples, but sample "
-                f"{last} was requested; play it back with the plan that it was made with"
+                f"{last} was requested; play it back with the plan of the recording"
             )
         volts = np.stack([self._volts(role, first, last) for role in self.roles])
         if np.isnan(volts).any():

@@ -259,8 +259,8 @@ class NoGenerator:
     def _take(self, what: str) -> None:
         if not self.silently:
             raise ConfigurationError(
-                f"{what} was requested from a bench without function generator. Nothing was played; use its "
-                'analogue output (daq.output.plays = "tones_and_streams"), or set generator.driver'
+                f"{what} was requested from a bench without a function generator. Nothing was played; use "
+                'its analogue output (daq.output.plays = "tones_and_streams"), or set generator.driver'
             )
 
 

@@ -151,7 +151,7 @@ class ScpiInstrument:
         """Return the last value read back for a setting; raises InstrumentError after a failed change."""
         if header not in self.held:
             raise InstrumentError(
-                f"{self.name}: settings unknown since a change failed; load a sine or a waveform first"
+                f"{self.name}: a change failed, so its settings are unknown; load a sine or a waveform first"
             )
         return self.held[header]
 

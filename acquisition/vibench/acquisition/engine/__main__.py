@@ -48,7 +48,7 @@ def _options() -> argparse.Namespace:
         "--forgotten-s",
         type=float,
         default=FORGOTTEN_S,
-        help="time without a request after which an unattended engine without a campaign ends [s]",
+        help="time [s] without a request until an unattended engine ends, if it has no campaign to run",
     )
     return parser.parse_args()
 

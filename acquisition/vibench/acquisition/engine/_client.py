@@ -98,7 +98,7 @@ def the_engine(pid: int | None) -> Announcement:
     wanted = "no engine is running" if pid is None else f"no engine runs as process {pid}"
     others = [each for each in programs_without_engine() if pid in (None, each.pid)]
     if others:
-        raise EngineError(f"{wanted}; {_names(others)} drives a bench itself: only 'vibench stop' reaches it")
+        raise EngineError(f"{wanted}; {_names(others)} drives a bench without an engine: use 'vibench stop'")
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: "
         "engines of other users, or with another VIBENCH_STATE_DIR, are not found"

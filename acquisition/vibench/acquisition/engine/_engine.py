@@ -80,7 +80,7 @@ class Engine:
     @property
     def bench(self) -> Bench:
         """The open bench; other threads may read its rig while the state says that the bench is open."""
-        assert self._reconnecting is not None, f"no bench is open while {self.published.state}"
+        assert self._reconnecting is not None, f"no bench is open in the state {self.published.state}"
         return self._reconnecting.bench
 
     @property

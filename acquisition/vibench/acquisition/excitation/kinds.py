@@ -58,7 +58,7 @@ def _of_packages() -> Iterator[type[AbstractExcitation]]:
             taken.update(_words(plan))
             yield plan
         else:
-            _LACKING[name] = f"{name!r} of vibench.excitations is {plan!r:.80}, not a plan for this kind only"
+            _LACKING[name] = f"{name!r} of vibench.excitations is {plan!r:.80}, not the plan of that kind"
 
 
 def _words(plan: type[AbstractExcitation]) -> tuple[str, ...]:

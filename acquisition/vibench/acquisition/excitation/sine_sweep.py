@@ -153,7 +153,7 @@ class SineSweep(MovingSine):
         if self.swept_by is SweptBy.GENERATOR and self.hold is not Hold.ACCELERATION:
             raise ValueError(
                 f"hold = {self.hold.value!r} changes the amplitude during the sweep, but the generator's own "
-                "sweep keeps its setting; use swept_by = 'computer', or hold = 'acceleration'"
+                "sweep keeps its amplitude; use swept_by = 'computer', or hold = 'acceleration'"
             )
         return self
 

@@ -61,8 +61,8 @@ def file_path(given: Path | str, folder: str) -> Path:
     known = {each.stem: each for each in all_shipped(folder)}
     if path.name not in known:
         raise ConfigurationError(
-            f"{path.name!r} is {'a folder, not a' if path.is_dir() else 'neither an existing'} file nor one "
-            f"that comes with vibench: {', '.join(known)}; give one of these, or the path of a TOML file"
+            f"{path.name!r} is {'a folder' if path.is_dir() else 'not a file'}, and vibench has no file of "
+            f"that name; give one of {', '.join(known)}, or the path of a TOML file"
         )
     return known[path.name]
 

@@ -239,7 +239,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
 
 def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck]:
     can = generator_driver(rig.generator).describe(rig.generator)
-    setting = "the highest setting of the generator"
+    setting = "the highest amplitude setting of the generator"
     most_vpp, range_of = can.amplitude_range_vpp[1], f"range of the {can.name}"
     yield LimitCheck(
         setting, excitation.highest_amplitude_vpp, most_vpp, "Vpp", range_of, "lower amplitude_vpp"
@@ -271,7 +271,7 @@ def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     if needed:
         most_vpp, at_hz = max(needed)
         yield LimitCheck(
-            f"the setting needed to hold the base's level (at {at_hz:g} Hz)",
+            f"the amplitude setting needed to hold the base's level (at {at_hz:g} Hz)",
             most_vpp,
             measurement.excitation.amplitude_vpp,
             "Vpp",

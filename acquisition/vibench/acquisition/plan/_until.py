@@ -42,7 +42,7 @@ class Until(FrozenModel):
     @model_validator(mode="after")
     def _wants_something(self) -> "Until":
         if not self.required_bounds:
-            raise ValueError('until names no result; give for example response_i = "1 %"')
+            raise ValueError("'until' names no result; give one, such as response_i = '1 %'")
         return self
 
     @property

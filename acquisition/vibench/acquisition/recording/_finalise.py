@@ -73,7 +73,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
         {
             "units": channel["units"],
             "long_name": f"{name} [{channel['units']}]",
-            "comment": f"smallest and largest of every {BIN_SAMPLES} samples, alternating",
+            "comment": f"smallest and largest value of every {BIN_SAMPLES} samples, alternating",
         },
     )
     # One dataset of times, linked from each channel's group.

@@ -438,7 +438,7 @@ def journal_objection(path: Path, seal: str) -> str:
     stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
     if stated and seal not in stated:
         point = noted[0].point
-        return f"its seal differs from that in the campaign's journal for {point}: another recording"
+        return f"its seal differs from that in the campaign's journal for {point}: it is another recording"
     for each in noted:
         if each.attempt_seal not in ("", each.seal):
             return f"the campaign's journal has two seals for {each.point}: the journal was changed"

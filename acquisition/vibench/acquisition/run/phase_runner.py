@@ -274,7 +274,7 @@ class PhaseRunner:
         more, self._lost_cycles = self.glide.more_cycles, 0.0
         self.glide.begin()
         if abs(more) > TOLD_CYCLES:
-            text = f"at its end, the recorded drive was {more:+.2g} cycles off its plan"
+            text = f"at its end, the recorded drive was {more:+.2g} cycles off the planned phase"
             self.loop.log(EventKind.LATE, text)
 
     def _require_pace(self, phase: Phase) -> float:

@@ -123,7 +123,7 @@ class OutputSynthesizer:
             case Waveform() | Sweep():
                 raise ConfigurationError(
                     "an analogue output plays only streams, not a repeated waveform or a generator's own "
-                    "sweep. Nothing of it was played; play it with the function generator"
+                    "sweep. Nothing was played; use the function generator"
                 )
 
 
