@@ -100,7 +100,7 @@ def analyse(
         option("Also estimate the hidden motion p of m1, impacts, gaps, the mass m1 and the contact law."),
     ] = False,
     keep: Annotated[
-        bool, option("With --hidden: store this motion in the recording, for vibench export --results.")
+        bool, option("With --hidden: store its result in the recording, for vibench export --results.")
     ] = False,
     specimen: SpecimenOption = None,
     branches: Annotated[

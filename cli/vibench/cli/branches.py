@@ -42,7 +42,7 @@ def branches(
     ] = None,
     like: Annotated[
         Path | None,
-        option("Use range and level of this stepped sine or sweep, and draw it too.", "RECORDING.h5"),
+        option("Use frequency range and level of this stepped sine or sweep; also draw it.", "RECORDING.h5"),
     ] = None,
     resonance: Annotated[
         str | None,

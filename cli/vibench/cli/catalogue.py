@@ -18,7 +18,7 @@ COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "le
 
 def show_catalogue(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of recordings.")],
-    rebuild: Annotated[bool, option("Read every file again, not only changed files.")] = False,
+    rebuild: Annotated[bool, option("Read all files again, not only the changed ones.")] = False,
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:

@@ -37,8 +37,8 @@ def export(
         Path | None, option("Path of the new file or its folder; by default beside the recording.", "PATH")
     ] = None,
     channels: Annotated[str, option("Channels, separated by commas; by default all.", "NAMES")] = "",
-    from_s: Annotated[float | None, option("Start [s]; first sample at 0 s.", "S", name="--from")] = None,
-    to_s: Annotated[float | None, option("End [s]; first sample at 0 s.", "S", name="--until")] = None,
+    from_s: Annotated[float | None, option("Start [s]; 0 at the first sample.", "S", name="--from")] = None,
+    to_s: Annotated[float | None, option("End [s]; 0 at the first sample.", "S", name="--until")] = None,
     results: Annotated[bool, option("Also export results stored in the recording.")] = False,
     spectra: Annotated[
         bool,

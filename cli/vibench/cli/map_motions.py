@@ -58,7 +58,7 @@ def map_motions(
         list[Path] | None, option("Overlay level and responses of a recording on the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int, option("For maps of initial states: number of kicks per motion and size.", "N", min=0)
+        int, option("For maps of initial states: number of kicks of each size to each motion.", "N", min=0)
     ] = 0,
     _allow_external: AllowExternal = False,
     as_json: AsJson = False,
@@ -115,7 +115,7 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")
     if len(results.motions) > SHOWN_MOTIONS:
-        console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer motions: see the table or --json.")
+        console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer motions are in the table and in --json.")
     if results.plan.is_basin:
         console.print(_boundary_words(results))
     for each in stability:

@@ -300,7 +300,7 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
     text = f"{where} the motion depends sensitively on the start, or did not settle."
     if not ensembles:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
-        return f"{text} The result there is a mean over {averaged} starts in total." if averaged else text
+        return f"{text} The results there are means over {averaged} starts in total." if averaged else text
     return (
         f"{text} Simulated there: {starts} starts, {followed_s:.0f} s in total; "
         f"several motions at {count_text(sum(each.is_one_of_several for each in lost), 'point')}."

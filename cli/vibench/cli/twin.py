@@ -128,7 +128,7 @@ class _Following:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
             except OSError as error:  # such as a full disk; the twin continues without storing
                 reason = f"{path} could not be written ({error.strerror})"
-                print_warnings([f"{reason}: the usual level of this run is not stored; free disk space"])
+                print_warnings([f"{reason}: the usual innovation of this run is not stored; free disk space"])
 
     def _status(self, rate_hz: float) -> TwinStatus:
         newest = self.live.newest

@@ -14,8 +14,8 @@ from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineA
 
 def _refuse_draws(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[SteppedResponse]]:
     raise UnusableData(
-        "the branch was not simulated: a fast loop held its motions, which the model leaves if only the "
-        "recorded voltage drives it; compare the motions with the branch of the model"
+        "the branch was not simulated: a fast loop held its motions, and driven by the recorded voltage "
+        "alone the model would leave them; compare the motions with the branch of the model"
     )
 
 

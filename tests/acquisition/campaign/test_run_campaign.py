@@ -118,7 +118,7 @@ def test_a_lost_instrument_or_disk_always_ends_a_campaign(bench, tmp_path, lost)
 
 def test_a_campaign_does_not_start_if_one_plan_exceeds_a_limit(bench, tmp_path):
     measurements = (dwell("one"), dwell("hard", 20.0, 10), dwell("harder", 21.0, 10))
-    with pytest.raises(LimitExceeded, match=r"hard: the stroke.*beyond a limit: harder"):
+    with pytest.raises(LimitExceeded, match=r"hard: the stroke.*exceed a limit: harder"):
         run_campaign(bench, Campaign(name="c", measurements=measurements), tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert bench.world.calls == []

@@ -411,7 +411,7 @@ def test_an_imported_recording_names_its_source(tmp_path):
         ("started_utc = 2026-03-01T12:00:00Z", "", "started_utc is missing"),
         ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00", "started_utc.*time zone"),
         ("frequency_hz = 260", "frequency = 260", "frequency is not a known key"),
-        ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert the numbers by scale"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert the numbers with scale"),
         ('role = "m0_velocity"', 'role = "other"', "needs quantity and unit"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = 0', "all values would be 0"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = "100 mV/g"', "such as '250 mm/s/V'"),

@@ -109,7 +109,7 @@ def test_empty_intervals_and_times_outside_the_intervals_are_refused():
     with pytest.raises(ValueError, match=r"Interval 0\.0 s is not allowed"):
         CubicRun(gong2025(), 0.0, np.zeros(6), 1e-7)
     run = CubicRun(gong2025(), 1e-5, np.zeros(6), 1e-7)
-    with pytest.raises(ValueError, match="start and end must be in the intervals"):
+    with pytest.raises(ValueError, match="start and end must be within its intervals"):
         run.advance(np.zeros((3, 4)), RunRecord(10), last_to_s=2e-5)
     with pytest.raises(ValueError, match="rigid stops are at"):
         CubicRun(gong2025(contact="rigid:0.5"), 1e-5, [0.0, 1e-3, 0.0, 0.0, 0.0, 0.0], 1e-7)

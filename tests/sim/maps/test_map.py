@@ -46,7 +46,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
         (
             {"x_m": {"start": -1e308, "stop": 1e308, "points": 3}},
-            r"3 points from -1e\+308 to 1e\+308 are not different numbers; give fewer points",
+            r"3 points from -1e\+308 to 1e\+308 are not all different numbers; give fewer points",
         ),
         ({"x_m": {"start": 1.0, "stop": 1.0 + 1e-15, "points": 9}}, "9 points from 1.0 to 1.0000000000000"),
         ({"frequency_hz": FREQUENCIES, "chain": ("up", "up")}, "has a direction twice"),

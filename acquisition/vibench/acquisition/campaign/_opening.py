@@ -155,7 +155,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
             complaints[point.name] = str(error)
     if complaints:
         _, *others = leading(list(complaints))
-        also = f" Other measurements beyond a limit: {', '.join(others)}." if others else ""
+        also = f" Other measurements that exceed a limit: {', '.join(others)}." if others else ""
         raise LimitExceeded(next(iter(complaints.values())) + also)
 
 

@@ -37,8 +37,8 @@ def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: 
     peak_v = float(np.max(np.abs(volts), initial=0.0))
     if not peak_v <= limit_v:  # this form also refuses a NaN
         raise LimitExceeded(
-            f"a peak of {peak_v:g} V was requested from {physical}; {limit_v:g} V are allowed here. Nothing "
-            "was written; lower the amplitude"
+            f"a peak of {peak_v:g} V was requested from {physical}; at most {limit_v:g} V are allowed. "
+            "Nothing was written; lower the amplitude"
         )
     if not is_open:
         raise InstrumentError(f"{physical} is closed; open the bench again")

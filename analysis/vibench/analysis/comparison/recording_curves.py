@@ -30,7 +30,7 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
     """Yield the curves of predicted Responses I and II."""
     low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
-    note = f"sines of A0 = {level}, {found.accuracy.value}"
+    note = f"sines of A0 = {level}, {found.accuracy.value} accuracy"
     unknown = np.full(found.frequency_hz.shape, np.nan)
     values = (found.response_i, found.response_ii, unknown)
     yield from _responses(name, CurveOrigin.PREDICTED, found.frequency_hz, values, note)

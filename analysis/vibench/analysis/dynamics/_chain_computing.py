@@ -183,7 +183,7 @@ class ChainAnswer(Tabular):
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
         complaint = f"; {count_text(lost, 'run')} ended early" if lost else ""
-        exactly = f"; errors of contacts below {self.request.accuracy.promise:g} times 100 µm or 0.1 m/s"
+        exactly = f"; each contact exact to {self.request.accuracy.promise:g} times 100 µm or 0.1 m/s"
         if self.request.error is not None:
             met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
             exactly = f"; {met} runs reached an error of {100.0 * self.request.error:g} %"

@@ -122,7 +122,7 @@ def _read_line(group: h5py.Group) -> BranchLine:
         value = group.attrs[name]
         kept[name] = value.item() if isinstance(value, np.generic) else value
     if not isinstance(kept["periods"], int):
-        raise TypeError(f"{group.name} has no whole number of periods")
+        raise TypeError(f"{group.name} does not state a whole number of periods")
     events = group["events"]
     rows = zip(events["kind"].asstr()[()], *(events[name][()] for name in _EVENT_COLUMNS), strict=True)
     kept["events"] = tuple(

@@ -150,7 +150,7 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
         if mapping.time == "even":
             low, high = each.rates_hz
             rate_text = "no sample rate" if high == inf else f"{(low + high) / 2:.9g} samples/s"
-            runs = f", {len(each.runs) - 1} jumps of the times" if len(each.runs) > 1 else ""
+            runs = f", {len(each.runs) - 1} jumps in its times" if len(each.runs) > 1 else ""
             start = f", starts at {each.start_s:.9g} s" if each.start_s else ""
             trouble = f", {each.time_trouble}" if each.time_trouble else ""
             text = f"{rate_text}{start}{runs}{trouble}"

@@ -85,8 +85,8 @@ def pack_folder(
     outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
     if outside:
         raise InvalidRequest(
-            f"{outside[0]} is a link to {outside[0].resolve()}, outside of the folder, which would also be "
-            "published; nothing was packed. Replace the link by a copy of the file, or remove it"
+            f"{outside[0]} is a link to {outside[0].resolve()}, outside of the folder; its target would "
+            "also be published, so nothing was packed. Replace the link by a copy of the file, or remove it"
         )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):

@@ -97,7 +97,7 @@ class ChannelMapping(FrozenModel):
         for given, needed in zip((self.quantity, self.unit), KNOWN_ROLES[self.role], strict=True):
             if given not in {"", needed}:
                 raise ValueError(
-                    f"{self.role} needs {needed!r}, but {given!r} was given; convert the numbers by scale"
+                    f"{self.role} needs {needed!r}, but {given!r} was given; convert the numbers with scale"
                 )
         return self
 

@@ -109,7 +109,7 @@ def fit_specimen(
     allowed = (*LINEAR, *ALSO_FREE)
     if not free or not set(free) <= set(allowed) or len(set(free) & set(MASSES)) > 1:
         raise InvalidRequest(
-            f"a fit of {', '.join(free) or 'no parameter'} was requested; a transmission determines any of "
+            f"a fit of {', '.join(free) or 'no parameter'} was requested; a transmission can determine "
             f"{', '.join(allowed)}, but at most one mass"
         )
     lines = lines_of(frequency_response, nominal, free, scale_sd)

@@ -60,7 +60,7 @@ class TableFit:
         sentence = (
             f"a moving table of {1e3 * self.mass_kg:.4g} g instead of {1e3 * self.described_kg:.4g} "
             f"({100 * (ratio - 1):+.3g} %), or all three masses of the specimen "
-            f"{100 * (1 / ratio - 1):+.3g} % at once (motion determines ratios of masses only)"
+            f"{100 * (1 / ratio - 1):+.3g} % together (motion determines only ratios of masses)"
         )
         return (Suspect(Assumption.TABLE_MASS, sentence, self.reduced_chi_square, mends=True, behind=0.0),)
 
@@ -330,7 +330,7 @@ def _linear(
         channels = RecordedChannels(recording, response=facts.response)
         scatter = scatter_over_silence(channels, results.noise[0].analysis.excitation, weakest)
     if scatter > _LARGEST_SCATTER:
-        why = f"m0 scatters {np.sqrt(scatter):.2g} times as much about any linear response as in silence"
+        why = f"m0 scatters about any linear response, {np.sqrt(scatter):.2g} times as much as in silence"
         return not_linear(nominal, f"{why}, {_WEAKER}")
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:

@@ -72,7 +72,7 @@ class MassCheck:
         return (
             f"The measured {self.channel} {verdict} the track: "
             f"{100 * self.unexplained:.2g} % of its rms is not explained ({100 * self.expected:.2g} % is "
-            f"expected), and it is {self.scale:.3f} times the tracked velocity."
+            f"expected), and its amplitude is {self.scale:.3f} times that of the track."
         )
 
 
@@ -393,7 +393,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     last_s = end_s if stop_s is None else stop_s
     if not 0.0 <= start_s < last_s:
         raise InvalidRequest(
-            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give a start and a later end"
+            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give two times in order"
         )
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 

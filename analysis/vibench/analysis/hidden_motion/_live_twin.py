@@ -427,7 +427,7 @@ class LiveTwin:
             time_s = self._block_end / self._rate
             sentences.append(
                 f"The specimen changed at {time_s:.1f} s: the measured motion no longer fits its "
-                f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
+                f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usually "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
             # Drop a running search, because it uses samples from before the specimen changed.

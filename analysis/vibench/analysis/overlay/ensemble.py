@@ -424,8 +424,8 @@ class EscapeRate:
         low, high = self.bounds_per_s
         return (
             f"The end of {self.what} is random: it occurred in {self.ends} of {self.runs} runs, including "
-            f"the measured one; after the first end, the rate was {self.per_s:.2g} per second ({low:.2g} to "
-            f"{high:.2g})"
+            f"the measured one; after the first end, each other run ended at a rate of {self.per_s:.2g} per "
+            f"second ({low:.2g} to {high:.2g})"
         )
 
 

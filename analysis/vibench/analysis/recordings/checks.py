@@ -128,7 +128,7 @@ def _overloads(facts: RecordingFacts) -> Check:
         both = zip(mapped, imported.get("channels", ()), strict=False)
         unknown = [one["role"] for one, other in both if not (one["full_scale"] or other["full_scale"])]
         if unknown:
-            text = f"the full scale of {', '.join(unknown)} is not known; no flat tops were found"
+            text = f"the full scale of {', '.join(unknown)} is not known, but no flat tops were found"
             return Check("Overloads", Verdict.NOTE, text)
         return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
@@ -136,7 +136,7 @@ def _overloads(facts: RecordingFacts) -> Check:
     if facts.dropouts and facts.response in facts.overload_s:
         what = (
             "the vibrometer lost its light for longer than can be bridged, or peaks were cut: check the "
-            "velocity there, and do not trust Response I"
+            "velocity at these times, and do not trust Response I"
         )
     return Check("Overloads", Verdict.WARNING, f"near full scale: {', '.join(parts)}; {what}")
 

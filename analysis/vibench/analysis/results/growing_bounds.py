@@ -105,7 +105,7 @@ def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
             return recording
         recording.close()
         if time.monotonic() > give_up_s:
-            raise RecordingError(f"the file did not contain {recorded_s:g} s of this part in time")
+            raise RecordingError(f"the file did not receive {recorded_s:g} s of this part in time")
         time.sleep(_PAUSE_S)
 
 

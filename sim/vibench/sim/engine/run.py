@@ -459,7 +459,7 @@ class CubicRun(_Run):
     def _run(self, drive: Structure, record: RunRecord) -> Outcome:
         code = self._engine.run_cubics(self._tables, self._state, drive, self._tolerance, record.structure)
         if code < 0:
-            raise ValueError("The native engine refuses the run: start and end must be in the intervals.")
+            raise ValueError("The native engine refuses the run: start and end must be within its intervals.")
         return Outcome(code)
 
 

@@ -192,8 +192,8 @@ class Range(FrozenModel):
             is_ascending = np.all(np.diff(self.values) > 0.0)
         if not is_ascending:
             raise ValueError(
-                f"{self.points} points from {self.start!r} to {self.stop!r} are not different numbers; give "
-                "fewer points, or ends that are neither so close together nor so far apart"
+                f"{self.points} points from {self.start!r} to {self.stop!r} are not all different numbers; "
+                "give fewer points, or a range that is neither so narrow nor so wide"
             )
         return self
 

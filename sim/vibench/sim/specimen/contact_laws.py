@@ -195,7 +195,7 @@ class PowerLaw(Strict):
                     f"Exponents {[n for n, _ in self.terms]} are not allowed: "
                     f"give odd, ascending numbers from 3 to {HIGHEST_EXPONENT}."
                 )
-            require_positive(f"Force of p^{exponent} at the reference", force, "N")
+            require_positive(f"Force of p^{exponent} at the reference displacement", force, "N")
             previous = exponent
 
     @property

@@ -119,7 +119,7 @@ NUMBERS = {
         "relative_i", REAL, "1", "largest displacement of m1 relative to m2 over the drive amplitude"
     ),
     "relative_ii": Column(
-        "relative_ii", REAL, "1", "displacement of m1 relative to m2 at the drive frequency, over the drive"
+        "relative_ii", REAL, "1", "m1 relative to m2 at the drive frequency, over the drive amplitude"
     ),
     "impacts": Column("impacts", WHOLE, "1", "impacts within the window"),
     "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts per second within the window"),
@@ -132,7 +132,7 @@ NUMBERS = {
     "relative_i_error": Column("relative_i_error", REAL, "1", "estimated relative error of relative_i"),
     "relative_ii_error": Column("relative_ii_error", REAL, "1", "estimated relative error of relative_ii"),
     "error_estimate": Column("error_estimate", REAL, "1", "largest of the four responses' errors"),
-    "integration_error": Column("integration_error", REAL, "1", "error that a stricter accuracy reduces"),
+    "integration_error": Column("integration_error", REAL, "1", "error that a higher accuracy would reduce"),
     "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
@@ -164,7 +164,7 @@ FOUND_SHARE = {
 ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "number of starts with sensitive dependence on the start"),
     "requested_motion": Column("found_asked", WHOLE, "1", "index of the motion from the requested start"),
-    "unseen_share": Column("unseen_share", REAL, "1", "upper bound on the share of a motion not found"),
+    "unseen_share": Column("unseen_share", REAL, "1", "upper bound on the share of any motion not found"),
     "scatter": Column("scatter_of_starts", REAL, "1", "relative standard deviation of Response I"),
     "followed_s": Column("followed_in_all", REAL, "s", "total simulated time of all starts"),
 }

@@ -142,7 +142,7 @@ class WatchCard(QGroupBox):
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
-        self.impacts.setToolTip("Number of jumps in the acceleration of m0, derived from its sensor")
+        self.impacts.setToolTip("Number of jumps in the acceleration of m0, computed from its sensor")
         self.meters = LevelMeters(theme)
         self.span = Choice(tip="Seconds in a time history", items=(f"{span_s:g} s" for span_s in SPANS_S))
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
