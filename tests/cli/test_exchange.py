@@ -91,7 +91,7 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, h5_path, folder
         (("export", "run.h5", "--to", "csv", "--until", "nan"), "the beginning to nan s was requested"),
         (("export", "run.h5", "--to", "uff", "--spectra", "--until", "inf"), "to inf s was requested"),
         (("export", "run.h5", "--to", "csv", "--until", "1e308"), "to 1e+308 s was requested"),
-        (("export", "run.h5", "--to", "csv", "--from", "1", "--until", "0.5"), "two of these times in order"),
+        (("export", "run.h5", "--to", "csv", "--from", "1", "--until", "0.5"), "a start and a later end"),
         (("export", "run.h5", "--to", "uff", "--out", "a.csv"), "another format; use the suffix .uff"),
         (("pack", ".", "--license", "MIT", "--out", "a.h5"), "another format; use the suffix .zip"),
         (("export", ".", "--to", "csv"), ". is a folder; give a recording (vibench catalogue"),

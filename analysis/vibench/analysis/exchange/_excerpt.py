@@ -102,7 +102,7 @@ def excerpt(
     if not 0 <= start < stop <= recording.samples:
         raise InvalidRequest(
             f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was requested; "
-            f"{recording.path.name} has 0 to {recording.duration_s:.9g} s; give two of these times in order"
+            f"{recording.path.name} has 0 to {recording.duration_s:.9g} s; give a start and a later end"
         )
     return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)
 

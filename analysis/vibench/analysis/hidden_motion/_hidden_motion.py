@@ -393,7 +393,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     last_s = end_s if stop_s is None else stop_s
     if not 0.0 <= start_s < last_s:
         raise InvalidRequest(
-            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give two times in order"
+            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give a start and a later end"
         )
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 
