@@ -65,7 +65,7 @@ def test_a_swapped_recording_is_refused_by_every_command(folder, how):
     for command in (("verify", "dwell.h5"), ("analyse", "dwell.h5", "--no-simulate"), ("catalogue", ".")):
         code, text = run_reader(folder, *command)
         assert code == 1, text
-        assert "the campaign's journal for dwell: another recording" in text
+        assert "the campaign's journal for dwell: it is another recording" in text
 
 
 def test_a_missing_seal_gives_one_warning_and_is_stated_in_the_report(vibench_here, folder):

@@ -77,12 +77,12 @@ def analyse(
     driven_by: Annotated[
         DrivenBy,
         option(
-            "voltage: simulate rig and specimen several times, valid in chaos; base: simulate the specimen "
-            "under the recorded base motion."
+            "voltage: simulate rig and specimen several times, also valid in chaos; base: simulate the "
+            "specimen under the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
-        int, option("Simulation runs for motions with contact.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS)
+        int, option("Number of simulations of motions with contact.", "N", min=FEWEST_DRAWS, max=MOST_DRAWS)
     ] = DRAWS,
     fit: Annotated[
         bool,

@@ -33,7 +33,7 @@ def figure(
     recordings: Annotated[
         Path | None, option("Recordings for figures 12 to 14; see vibench demo.", "DIR")
     ] = None,
-    damping_time: Annotated[float, option("Damping c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
+    damping_time: Annotated[float, option("Time in c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
     gap: Annotated[float, option("Clearance at both stops.", "M")] = FigureOptions.gap_m,
     accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = FigureOptions.accuracy,
     grid: Annotated[FrequencyGrid, option("Points every 5 Hz (coarse) or 1 Hz (fine).")] = FigureOptions.grid,

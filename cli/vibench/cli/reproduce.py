@@ -29,7 +29,7 @@ IMAGES = "images"
 def reproduce(
     out: Annotated[Path, option("Folder for the page and its studies.", "DIR")],
     markdown: Annotated[Path | None, option("File of the page; by default in DIR.", "FILE.md")] = None,
-    damping_time: Annotated[float, option("Damping c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
+    damping_time: Annotated[float, option("Time in c_i = time * k_i.", "S")] = FigureOptions.damping_time_s,
     accuracy: Annotated[Accuracy, option("Accuracy of every point.")] = Accuracy.QUICK,
     grid: Annotated[FrequencyGrid, option("Points every 5 Hz (coarse) or 1 Hz (fine).")] = FigureOptions.grid,
     choices: Annotated[

@@ -239,7 +239,7 @@ def test_every_seal_check_detects_a_swapped_recording(folder):
         for depth in SealDepth:
             found = recording.check_seal(depth)
             assert found.state is SealState.DAMAGED
-            assert found.sentence.endswith("the campaign's journal for two: another recording")
+            assert found.sentence.endswith("the campaign's journal for two: it is another recording")
         assert not recording.is_checked
     assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
         ("two.h5", "damaged")

@@ -87,7 +87,7 @@ def test_loads_without_stops_are_proportional_to_the_drive(rig):
 
 def test_a_plan_that_overstretches_the_specimen_is_refused(rig):
     sweep = SineSweep(amplitude_vpp=9.9, start_hz=180, stop_hz=220, duration_s=60)
-    with pytest.raises(LimitExceeded, match=r"specimen's amplitude \(estimated, at 2\d\d.*keep away from"):
+    with pytest.raises(LimitExceeded, match=r"specimen's amplitude \(estimated, at 2\d\d.*avoid the"):
         require_within_limits(Measurement(name="plan", excitation=sweep), rig)
 
 

@@ -68,7 +68,7 @@ def test_a_mean_over_initial_states_reaches_an_error_of_one_percent():
     assert found.error_estimate <= 0.01
     assert found.target.starts == 32
     assert found.target.unseen_share == pytest.approx(1.0 - 0.05 ** (1.0 / 32.0))
-    assert found.target.text.endswith("; 32 starts may miss motions of up to 8.9 % of starts")
+    assert found.target.text.endswith("; 32 starts may miss motions with shares up to 8.9 %")
     assert "mean of" in found.ended
     again = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert again.response_ii == found.response_ii

@@ -338,7 +338,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
         limit.value,
         "m",
         limit.source,
-        "lower amplitude_vpp or keep away from the resonance",
+        "lower amplitude_vpp or avoid the resonance",
         load=BaseQuantity.AMPLITUDE,
     )
     flagged = measurement.limits.on_overload is OnOverload.FLAG

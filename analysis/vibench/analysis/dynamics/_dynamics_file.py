@@ -87,7 +87,7 @@ def read_diagram(path: Path) -> BranchDiagram:
     try:
         with open_hdf5(path) as file:
             if (file.attrs["format"], file.attrs["format_version"]) != (BRANCHES_FORMAT, FORMAT_VERSION):
-                raise ValueError("it contains no branches, or those of another vibench version")
+                raise ValueError("it contains no branches, or branches of another vibench version")
             request = BranchRequest.model_validate_json(str(file.attrs["request"]))
             lines = tuple(_read_line(file[name]) for name in sorted(file) if name.startswith("branch_"))
             return BranchDiagram(request, lines, float(file.attrs["elapsed_s"]))

@@ -33,8 +33,8 @@ def require_estimator(estimator: Estimator, noise_ratio: float | None, confidenc
     """Raise InvalidRequest for a missing, useless or invalid noise ratio, and for an invalid confidence."""
     if estimator is Estimator.HV and noise_ratio is None:
         raise InvalidRequest(
-            "hv was requested without a noise ratio; give the noise density of the response over that of "
-            "the base, or use the estimator 'drive'"
+            "hv was requested without a noise ratio; give the ratio of the noise densities of "
+            "response and base, or use the estimator 'drive'"
         )
     if estimator is not Estimator.HV and noise_ratio is not None:
         raise InvalidRequest(f"a noise ratio has no meaning for {estimator.value}; only hv uses it")

@@ -145,8 +145,8 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
     if facts.dropouts:
         times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
         text = (
-            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in total; the motion there "
-            "was interpolated, which misses effects of impacts. Refocus the laser, or apply "
+            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in total; its motion "
+            "was interpolated then, which misses effects of impacts. Refocus the laser, or apply "
             "reflective tape"
         )
         often = facts.dropout_s > _OFTEN_DARK * facts.duration_s

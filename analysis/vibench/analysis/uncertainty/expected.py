@@ -331,7 +331,7 @@ def until_checks(facts: RecordingFacts) -> Iterator[Check]:
     forecast = "no time was predicted" if expected_s is None else f"{expected_s:.3g} s were predicted"
     last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
     reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} parts known well enough, {time_s:.4g} s in total; {forecast}"
+    text = f"{last}{reached} of {len(notes)} parts reached their targets, {time_s:.4g} s in total; {forecast}"
     yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 

@@ -127,8 +127,8 @@ class TargetReport:
 
     @property
     def text(self) -> str:
-        """Return a phrase with the requested and reached error and time, and the limits of several starts."""
-        missed = f"{self.starts} starts may miss motions of up to {_percent(self.unseen_share)} of starts"
+        """Return requested and reached error and time as a phrase, and the limits of several starts."""
+        missed = f"{self.starts} starts may miss motions with shares up to {_percent(self.unseen_share)}"
         return f"{self._reached}; {missed}" if self.starts > 1 else self._reached
 
     @property

@@ -87,7 +87,7 @@ class ComparePage(Page):
         self.plots = CurvePlots(context.theme)
         self.panel = AnalysisPanel()
         self.pair_box = PairBox()
-        self.peaks = NumberTable("Peaks of the curves", "Frequency, height and damping of each ticked curve.")
+        self.peaks = NumberTable("Peaks of the curves", "Frequency, height and damping of each peak.")
         self.readings = NumberTable(
             "Curves at the markers", "Show the markers (Alt+M) to read the ticked curves at two frequencies."
         )

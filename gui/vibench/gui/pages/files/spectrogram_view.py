@@ -290,7 +290,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
     def _lay_out(self) -> None:
         bar = QHBoxLayout()
         for text, choice, tip in (
-            ("Channel", self.channel, "The channel whose frequencies are shown"),
+            ("Channel", self.channel, "Channel shown in the spectrogram"),
             ("Frequencies", self.spacing, "Scale of the vertical axis"),
             ("up to", self.highest, "Upper end of the frequency axis"),
             ("lines", self.line_width, "Spectral line width: narrow resolves frequency, wide resolves time"),

@@ -180,7 +180,7 @@ class SimulatePage(Page):
             "Over&lay on recordings", "Show these curves on the Compare page", self._hand_to_compare
         )
         self.motions = ReadTable(
-            "Motions at points that depend sensitively on the initial state, and their shares", MOTION_COLUMNS
+            "Motions and their shares at points with sensitive dependence on the start", MOTION_COLUMNS
         )
         self.motions.setMaximumHeight(_LINES * self.motions.verticalHeader().defaultSectionSize())
         self.motions.hide()
