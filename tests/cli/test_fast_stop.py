@@ -51,7 +51,7 @@ def test_the_fast_stop_loads_no_library_beyond_the_standard_library():
     assert (others, ours) == ("", "vibench.command vibench.stop_files")
 
 
-def test_stop_takes_less_than_0_1_s_of_processor_time():
+def test_the_stop_command_takes_less_than_0_1_s_of_processor_time():
     with driving_program("north"):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         assert vibench_stop().returncode == 0

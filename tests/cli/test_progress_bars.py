@@ -45,7 +45,7 @@ def test_a_stage_of_unknown_length_shows_no_numbers_of_the_previous_stage():
         assert progress_line(bars) == "simulating"
 
 
-def test_work_under_ten_seconds_prints_no_progress():
+def test_a_command_that_takes_less_than_ten_seconds_prints_no_progress():
     log = Log()
     with show_bars(Progress(console=Console(file=log))) as bars:
         bars.add_task("noise", total=60)

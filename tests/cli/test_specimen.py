@@ -165,7 +165,7 @@ def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(output_of, tmp_path):
     assert "-0," not in text
 
 
-def test_a_gap_in_metres_gives_a_warning(vibench_here, tmp_path):
+def test_a_gap_in_micrometres_typed_as_metres_gives_a_warning(vibench_here, tmp_path):
     (tmp_path / "wide.toml").write_text('name = "wide"\nmodel = "gong2025"\ngap_m = 30\n')
     said = vibench_here("specimen", "wide.toml", cwd=tmp_path).stderr
     assert "if 30 micrometres were meant, give 3e-05" in said

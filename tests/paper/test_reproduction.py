@@ -45,7 +45,7 @@ def test_short_runs_show_the_effects_of_collisions(evidence):
     assert len(asked) == len(set(asked)) == 3
 
 
-def test_each_damping_gets_its_own_score(evidence):
+def test_the_claims_are_scored_for_each_damping(evidence):
     weak = replace(SHORT, highest_hz=25.0)
     found_scores = scores(claims("linear-resonances", "p-saturates"), evidence, weak)
     assert [each.damping_time_s for each in found_scores] == list(SCORED_S)

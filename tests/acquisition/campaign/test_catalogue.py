@@ -54,7 +54,7 @@ def reads(monkeypatch):
     return opened
 
 
-def test_the_catalogue_lists_recordings_in_subfolders_with_plan_time_and_size(folder):
+def test_the_catalogue_lists_recordings_in_subfolders_with_their_plan_and_time_and_size(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "samples not checked", "dwell")

@@ -35,7 +35,7 @@ def test_a_subharmonic_phase_is_known_up_to_whole_drive_periods(drives, shift_ra
 
 
 @pytest.mark.parametrize("harmonic", [1, 3])
-def test_ac_coupling_does_not_shift_the_phase(harmonic):
+def test_ac_coupling_of_the_channels_does_not_shift_the_measured_phase(harmonic):
     """A first-order high-pass shifts the base by 0.9 degrees at 31 Hz, which counts three times at 3:1."""
     channels = replace(CHANNELS, base_cut_hz=0.5, response_cut_hz=0.5, response_delay_s=0.0)
     order = harmonic * 2 * np.pi * HERTZ
@@ -50,7 +50,7 @@ def test_the_response_ratio_is_zero_if_the_base_does_not_move():
 
 
 @pytest.mark.parametrize("derivatives", [-1, 0, 1])
-def test_the_response_ratio_is_equal_from_acceleration_displacement_and_velocity_of_m0(derivatives):
+def test_acceleration_displacement_and_velocity_of_m0_give_the_same_response_ratio(derivatives):
     """The velocity follows from a signal after `derivatives` differentiations."""
     channels = replace(CHANNELS, response_derivatives=derivatives, response_delay_s=0.0)
     orders_hz = HERTZ * np.arange(5)

@@ -53,7 +53,7 @@ def test_a_point_on_a_third_branch_counts_as_being_after_the_jump(response, expe
     assert side(SettledPoint(177, response), SettledPoint(175, 3.6), SettledPoint(180, 5.4)) is expected
 
 
-def test_a_chaotic_motion_of_the_same_size_is_another_branch():
+def test_a_chaotic_motion_of_the_same_size_counts_as_another_branch():
     linear, chaotic = SettledPoint(100, 1.0, period=1), SettledPoint(100, 1.05, period=0)
     assert not is_on_branch(chaotic, linear, factor=1.5)
     assert is_on_branch(SettledPoint(100, 1.4, period=0), chaotic, factor=1.5)

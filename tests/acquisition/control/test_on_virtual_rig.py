@@ -271,7 +271,7 @@ def test_a_superharmonic_resonance_matches_harmonic_balance(record_run):
 @pytest.mark.parametrize(
     ("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), pytest.param((30e-6, 60e-6), 90, marks=pytest.mark.slow)]
 )
-def test_the_second_superharmonic_is_tracked_with_either_bumper_nearer(record_run, gap_m, phase_deg):
+def test_the_second_superharmonic_is_tracked_whichever_bumper_is_nearer(record_run, gap_m, phase_deg):
     """The reference is harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
     plan = track_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
     found = notes_of(record_run(plan, **bumpers(*gap_m)), "resonance")

@@ -39,7 +39,7 @@ def bus(tmp_path, monkeypatch):
         ("USB0::0x0699::0x0345::C010101::INSTR", "0699", False, False),
     ],
 )
-def test_missing_usb_permission_gives_advice(bus, resource, vendor, may_write, is_told):
+def test_the_error_for_a_missing_usb_permission_gives_advice(bus, resource, vendor, may_write, is_told):
     bus(vendor, "0353", may_write)
     with pytest.raises(InstrumentLost) as caught:
         _visa_link.open_link(resource, "@py", 0.2)

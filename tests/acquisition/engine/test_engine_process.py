@@ -409,7 +409,7 @@ class TestEndOfTheEngine:
         assert not process.is_alive
 
     @pytest.mark.thorough
-    def test_leaving_the_context_of_an_engine_ends_its_run(self, shipped_rig, tmp_path):
+    def test_leaving_the_with_block_of_an_engine_ends_its_run(self, shipped_rig, tmp_path):
         with start_engine() as process:
             start_run(process.client, shipped_rig, tmp_path)
         assert not process.is_alive

@@ -84,7 +84,7 @@ def test_every_recorded_segment_is_labelled_as_result_or_lead_in(excitation):
 
 
 @every_kind
-def test_the_band_contains_all_played_frequencies(excitation):
+def test_the_stated_band_of_a_plan_contains_all_played_frequencies(excitation):
     low_hz, high_hz = excitation.band_hz
     tones = [step.play.frequency_hz for step in excitation.steps() if hasattr(step.play, "frequency_hz")]
     assert low_hz < high_hz

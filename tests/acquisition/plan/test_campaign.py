@@ -112,7 +112,7 @@ class TestDefaults:
         ],
         ids=["missing values are filled in", "a given value remains", "other kinds have no effect"],
     )
-    def test_defaults_fill_in_missing_values_of_their_kind(self, tmp_path, defaults, ramp_s, found):
+    def test_defaults_apply_to_missing_values_of_their_excitation(self, tmp_path, defaults, ramp_s, found):
         text = f'name = "c"\n[defaults]\n{defaults}\n' + DWELL_TABLE
         (measurement,) = load(tmp_path, text).measurements
         assert measurement.ramp_s == ramp_s

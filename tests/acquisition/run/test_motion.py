@@ -42,7 +42,7 @@ def test_the_motion_does_not_depend_on_the_block_size():
 
 
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 3.0])
-def test_residual_ringing_at_the_start_does_not_inflate_the_motion(phase):
+def test_residual_ringing_at_the_start_does_not_inflate_the_computed_motion(phase):
     """The previous run has just ended: base at 66 Hz and 3.6 m/s2, m0 at 95 Hz and 30 mm/s."""
     time_s = TIME_S[: round(0.4 * RATE_HZ)]
     acceleration = 3.6 * np.exp(-60 * time_s) * np.cos(2 * np.pi * 66 * time_s + phase)

@@ -141,7 +141,7 @@ def test_a_failing_input_fades_the_output_out(laboratory, tmp_path, code, kind):
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
 
 
-def test_ctrl_c_plays_the_written_samples_and_a_ramp_before_silence(laboratory, tmp_path):
+def test_after_ctrl_c_the_written_samples_and_a_ramp_are_played_before_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     elapsed_s = []
 
@@ -159,7 +159,7 @@ def test_ctrl_c_plays_the_written_samples_and_a_ramp_before_silence(laboratory, 
     assert np.max(np.abs(drive[-200:])) < 0.01
 
 
-def test_a_second_ctrl_c_skips_the_ramp_and_ends_in_silence(laboratory, tmp_path):
+def test_after_a_second_ctrl_c_the_ramp_is_skipped_and_the_output_silent(laboratory, tmp_path):
     virtual, connected = laboratory()
     insist = when_recording(lambda: [signal.raise_signal(signal.SIGINT) for _ in range(2)])
     with bench_on(connected) as bench:

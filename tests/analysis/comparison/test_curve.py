@@ -75,7 +75,7 @@ def test_a_curve_is_interpolated_and_never_extrapolated():
     assert values[2] == pytest.approx(np.sqrt(curve.magnitude[0] * curve.magnitude[1]))
 
 
-def test_a_downward_sweep_is_reversed():
+def test_the_points_of_a_downward_sweep_are_sorted_by_rising_frequency():
     frequency_hz = np.array([300.0, 200.0, 200.0, 100.0])
     turned = sorted_curve(mode(frequency_hz))
     assert np.array_equal(turned.frequency_hz, [100.0, 200.0, 300.0])

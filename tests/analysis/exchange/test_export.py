@@ -153,7 +153,7 @@ def test_an_interrupted_export_leaves_no_file(known, tmp_path):
 
 
 @pytest.mark.parametrize(("from_s", "to_s"), [(-1.0, None), (2.0, 1.0), (0.0, 100.0), (1.0, 1.0)])
-def test_a_range_outside_the_recording_is_refused_with_its_length(known, from_s, to_s):
+def test_a_range_outside_the_recording_is_refused_with_the_length_of_the_recording(known, from_s, to_s):
     with pytest.raises(InvalidRequest, match=r"has 0 to 2\.34375 s"):
         excerpt(known, (), from_s, to_s)
 

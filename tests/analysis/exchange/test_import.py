@@ -84,7 +84,7 @@ def test_rows_of_a_matlab_matrix_become_channels(tmp_path):
     assert_same(values, signals()[:1])
 
 
-def test_the_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
+def test_the_scales_of_file_and_mapping_are_multiplied_and_integers_stay_exact(tmp_path):
     counts = np.random.default_rng(1).integers(-(2**23), 2**23, SAMPLES, dtype=np.int32)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["acc"] = counts

@@ -154,7 +154,7 @@ def test_collisions_throughout_a_sweep_are_reported_in_one_phrase(sweep_file):
     assert regions_text(replace(found, regions=(whole,))) == "the masses collide during the whole sweep"
 
 
-def test_dwells_are_drawn_in_rows_by_level_with_responses_in_the_caption(dwell_file):
+def test_dwells_are_drawn_in_rows_by_level_and_the_caption_states_their_responses(dwell_file):
     strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
     drawn = dwells_figure([(each.analysis, each.overlay) for each in (strong, weak)])
     assert len(drawn.figure.axes) == 6
@@ -181,7 +181,7 @@ def test_a_stepped_sine_figure_has_one_marker_per_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
-def test_more_parts_than_planned_are_attributed_to_feedback(dwell_file):
+def test_a_number_of_parts_above_the_plan_is_attributed_to_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
     said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]

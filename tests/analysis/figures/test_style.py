@@ -28,13 +28,13 @@ def _numbers(low, high):
 
 
 @pytest.mark.parametrize(("low", "high"), [(1.5, 3.5), (1.7, 23), (0.4, 15), (0.02, 30), (1e-6, 10)])
-def test_magnitude_axes_have_numbers_without_overlap(low, high):
+def test_the_numbers_of_magnitude_axes_do_not_overlap(low, high):
     numbers = sorted(_numbers(low, high), key=lambda each: each[1])
     assert len(numbers) >= 2
     assert all(below[2] < above[1] for below, above in pairwise(numbers)), numbers
 
 
-def test_axes_under_a_decade_show_intermediate_numbers():
+def test_axes_that_span_less_than_a_decade_show_intermediate_numbers():
     assert [text for text, *_ in _numbers(1.5, 3.5)] == ["2", "3"]
     assert {"0.4", "0.6", "1", "2"} <= {text for text, *_ in _numbers(0.3, 3.5)}
     assert {"$4\\cdot10^{-5}$", "$6\\cdot10^{-5}$"} <= {text for text, *_ in _numbers(3e-5, 7e-5)}

@@ -156,7 +156,7 @@ def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
     assert fit.reduced_chi_square < 1.5
 
 
-def test_frequency_intervals_include_the_converter_clock(true):
+def test_frequency_intervals_include_the_uncertainty_of_the_converter_clock(true):
     """A clock that runs 40 ppm fast lowers all frequencies by 40 ppm, without any scatter."""
     slow = transmission(true, np.random.default_rng(7), sd=1e-6)
     fit = fit_specimen(replace(slow, frequency_hz=LINES_HZ * (1 - 40e-6)), NOMINAL)

@@ -73,7 +73,7 @@ def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
     assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
-def test_square_nonlinearity_distorts_even_lines_and_cubic_odd_lines(analyse_with):
+def test_a_square_nonlinearity_distorts_even_lines_and_a_cubic_one_odd_lines(analyse_with):
     square = distortion(analyse_with(lambda velocity: 0.05 * velocity**2).response.periodic)
     cube = distortion(analyse_with(lambda velocity: 0.02 * velocity**3).response.periodic)
     noise = square.detection_noise_m_per_s

@@ -75,7 +75,7 @@ def test_the_scatter_of_the_measured_repetition_period_is_as_stated():
     assert np.mean(periods) == pytest.approx(512.01, abs=4 * stated / np.sqrt(150))
 
 
-def test_zero_order_hold_images_do_not_affect_clock_or_band():
+def test_zero_order_hold_images_do_not_affect_the_measured_clock_or_the_band():
     """A zero-order hold of 8192 points per period adds an image at 8192 - k; 10 dB lower here."""
     rng = np.random.default_rng(9)
     period = 51200 * (1 + 60e-6)

@@ -53,5 +53,5 @@ def test_an_envelope_without_columns_is_refused():
         envelope(np.zeros(5), 0)
 
 
-def test_both_edges_of_an_envelope_form_one_zigzag_line():
+def test_both_edges_of_an_envelope_are_drawn_as_one_zigzag_line():
     assert np.array_equal(zigzag(np.array([[0.0, 1.0]]), np.array([[2.0, 3.0]])), [[0, 2, 1, 3]])

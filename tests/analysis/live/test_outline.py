@@ -43,7 +43,7 @@ def test_an_impact_of_three_samples_is_in_the_outline():
     assert abs(struck.mean() - 500) <= 3
 
 
-def test_the_outline_of_each_channel_uses_its_own_period():
+def test_the_outline_of_each_channel_uses_the_period_of_that_channel():
     both = np.stack((sine(260.0, 2.0), sine(20.0, 2.0)))
     low, high = outline(both, COLUMNS)
     assert np.array_equal(high[1], envelope(both[1], COLUMNS)[1])

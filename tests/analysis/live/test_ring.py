@@ -10,7 +10,7 @@ def numbers(first, count):
 
 
 @pytest.mark.parametrize("length", [1, 7, 99, 100, 101, 250])
-def test_the_newest_samples_are_contiguous_for_any_block_size(length):
+def test_the_newest_samples_of_a_ring_buffer_are_contiguous_for_any_block_size(length):
     ring = Ring(2, 100)
     for first in range(40, 1000, length):
         ring.add(first, numbers(first, length))

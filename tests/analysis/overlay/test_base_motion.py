@@ -37,7 +37,7 @@ def test_a_gap_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_file
         motion_of(dwell_file("weak", hole=(9000, 9030)))
 
 
-def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
+def test_a_signal_can_be_advanced_by_a_fraction_of_a_sample():
     time = np.arange(512)
     shown = np.cos(2 * np.pi * 16 / 512 * (time - 0.3))
     np.testing.assert_allclose(advance(shown, 0.3), np.cos(2 * np.pi * 16 / 512 * time), atol=1e-12)

@@ -167,7 +167,7 @@ def scaled(facts, channel, factor, **header):
 
 
 @pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-6), ("m0_velocity", 1e-5)])
-def test_a_scale_that_makes_the_response_absurd_is_reported(dwell_file, role, factor):
+def test_a_scale_that_makes_the_response_implausible_is_reported(dwell_file, role, factor):
     facts = analyse(dwell_file("weak")).facts
     assert "Scales" not in {each.what for each in measurement_checks(facts)}
     (found,) = [each for each in measurement_checks(scaled(facts, role, factor)) if each.what == "Scales"]

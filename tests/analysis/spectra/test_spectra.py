@@ -13,7 +13,7 @@ from vibench.analysis.tones.sine_fit import largest_peak
 RATE = 2048.0
 
 
-def test_the_density_agrees_with_scipy():
+def test_the_spectral_density_agrees_with_scipy():
     x = np.random.default_rng(1).standard_normal(30_000)
     ours = spectral_density(x, RATE, segment_samples=513, overlap=0.4)
     frequency, theirs = signal.welch(x, RATE, nperseg=513, noverlap=int(0.4 * 513), detrend=False)

@@ -37,7 +37,7 @@ def test_stability_notes_are_assigned_to_their_points_in_any_order():
     assert any(each.startswith(wanted) for each in said), said
 
 
-def test_a_branch_without_perturbations_has_no_stability():
+def test_a_branch_measured_without_perturbations_has_no_stability_verdict():
     assert held_branch(POINTS).stability == ("",) * 4
     assert not any("Without feedback" in each for each in branch_sentences(POINTS))
     assert held_branch([]).multiplier.size == 0

@@ -151,7 +151,7 @@ def test_an_incompatible_ungated_or_occupied_board_is_refused(board_and_rig):
 
 
 @pytest.mark.thorough
-def test_a_lost_connection_is_reported_and_closes_the_safety_gate(playing_board):
+def test_a_lost_connection_to_the_board_is_reported_and_closes_its_safety_gate(playing_board):
     board, bench = playing_board
     board.drop()
     assert board.is_left.wait(10)

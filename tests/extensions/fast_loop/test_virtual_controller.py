@@ -120,7 +120,7 @@ def test_a_feedback_law_acts_on_samples_and_its_internal_state(wired):
     assert wired.played[3:] == pytest.approx([2 * each - 0.25 for each in memory])
 
 
-def test_changing_the_program_causes_no_jump(wired):
+def test_changing_the_program_of_the_controller_causes_no_jump_of_its_output(wired):
     wired.tell("play", program=LoopProgram(frequency_hz=90, reference_v=((1.0, 0.0),), glide_s=0.1))
     wired.run(0.2)
     wired.tell("play", program=LoopProgram(frequency_hz=120, reference_v=((0.2, 0.4),), glide_s=0.1))

@@ -25,7 +25,7 @@ def test_decades_have_labels_at_one_two_and_five():
     assert round(10 ** minor[0]) == 30
 
 
-def test_less_than_a_decade_is_labelled_at_round_numbers():
+def test_an_axis_of_less_than_a_decade_is_labelled_at_round_numbers():
     ((_, major),) = logarithmic_ticks(log10(150), log10(350))
     assert [round(10**value) for value in major] == [150, 200, 250, 300, 350]
 

@@ -97,7 +97,7 @@ def test_a_run_ends_at_the_first_impact_that_cannot_be_stored():
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_drive_with_nan_is_reported_and_does_not_hang_the_run(contact):
+def test_a_drive_with_nan_is_reported_and_does_not_block_the_run(contact):
     pieces = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
     run = CubicRun(gong2025(contact=contact), 1e-5, np.zeros(6), Accuracy.STANDARD.tolerance)
     motions, impacts = run.follow(pieces, RunRecord(10))

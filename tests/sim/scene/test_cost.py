@@ -99,7 +99,7 @@ def test_a_pilot_run_corrects_the_planned_cost():
     assert time.monotonic() - begun_s < 3.0 * 2.0
 
 
-def test_invalid_scenes_need_no_pilot():
+def test_invalid_scenes_need_no_pilot_run():
     def refused(_):
         raise ValueError("not allowed")
 

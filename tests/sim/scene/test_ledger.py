@@ -13,7 +13,7 @@ def ledger(tmp_path):
     return CostLedger(tmp_path / "costs" / "here.json")
 
 
-def test_a_cost_estimate_without_experience_keeps_its_wide_factor(ledger):
+def test_a_cost_estimate_without_earlier_runs_keeps_its_wide_factor(ledger):
     expected = ledger.expected_time(KIND, 2.0)
     assert (expected.time_s, expected.runs) == (2.0, 0)
     assert expected.factor >= 10.0

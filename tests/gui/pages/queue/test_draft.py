@@ -21,7 +21,7 @@ def names(campaign):
     return campaign.recording_names()
 
 
-def test_adding_a_test_twice_gives_two_names():
+def test_a_test_that_is_added_twice_gets_two_names():
     campaign = with_measurement(with_measurement(None, DWELL), DWELL)
     assert names(campaign) == ("dwell", "dwell-2")
 
