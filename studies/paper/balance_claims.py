@@ -36,7 +36,7 @@ def continuous_weak_three(r: Reading) -> Values:
 
 @costly_claim(
     "3.2, Fig. 6(a)",
-    "For each resonance, nearest peak of the lowest stable first-order solution on the frequency grid.",
+    "Peak of the lowest stable first-order solution nearest to each resonance, on the frequency grid.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
     tried=(NARROWER_FIT, *DAMPINGS),
     remark=_BENT,
@@ -49,7 +49,7 @@ def continuous_weak_balance(r: Reading) -> Values:
 
 @costly_claim(
     "3.2, Fig. 6(a)",
-    "For each resonance, nearest peak of Response I of n = 5 at 1 µm, on the frequency grid.",
+    "Peak of Response I of n = 5 at 1 µm nearest to each resonance, on the frequency grid.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
     tried=(NARROWER_FIT, ALIKE),
 )

@@ -20,7 +20,7 @@ _GROWS = (at_least("exponent, 10 over 5 µm", "", 1.0), at_least("50 over 10 µm
 
 @claim(
     "4, Fig. 10(a)",
-    "Largest |exponent| on the grid; near zero: at most a tenth of what the paper calls severe.",
+    "Largest |exponent| on the grid; near zero means at most a tenth of what the paper calls severe.",
     at_most("largest |exponent|", "1/s", NEAR_ZERO_PER_S),
 )
 def calm_at_1um(r: Reading) -> Values:

@@ -39,7 +39,7 @@ def bound_resonances(r: Reading) -> Values:
 
 @claim(
     "3.1, Fig. 3(a)",
-    "For each resonance, nearest peak of Response I at 1 µm, on the frequency grid.",
+    "Peak of Response I at 1 µm nearest to each resonance, on the frequency grid.",
     *peaks_at(PAPER_RESONANCES_HZ, _GRID_HZ),
 )
 def weak_peaks(r: Reading) -> Values:
@@ -50,7 +50,7 @@ def weak_peaks(r: Reading) -> Values:
 
 @claim(
     "3.1, Fig. 3(a)",
-    "Distance between the three peaks near each resonance on the grid, at most one step.",
+    "Largest distance of the three peaks near each resonance; at most one grid step is required.",
     *(at_most(f"spread near {each:g} Hz", "Hz", _GRID_HZ) for each in PAPER_RESONANCES_HZ),
 )
 def weak_identical(r: Reading) -> Values:

@@ -75,7 +75,7 @@ def fits(r: Reading) -> Values:
 
 @claim(
     "4, Fig. 7(a-d)",
-    "Eqs. 6 and 7 on the grid, at 1 and 50 µm.",
+    "Rates by eqs. 6 and 7 on the grid, at 1 and 50 µm.",
     about("at 1 µm", "%", 0.83, _READ_OFF),
     about("at 50 µm", "%", 0.42, _READ_OFF),
     tried=(*FITTED, *DAMPINGS),
@@ -94,7 +94,7 @@ def _fall_and_rise(between: str) -> tuple[Expectation, ...]:
 
 @claim(
     "4, Fig. 7(e-h)",
-    "Eqs. 6 and 7 at 1, 10 and 50 µm; the paper does not state the amplitude of the 68 %.",
+    "Rates by eqs. 6 and 7 at 1, 10 and 50 µm; the paper does not state the amplitude of the 68 %.",
     *_fall_and_rise("at 10 µm"),
     tried=(*FITTED, *DAMPINGS),
     draws=_DRAWS,
@@ -107,7 +107,7 @@ def cubic_ii(r: Reading) -> Values:
 
 @claim(
     "4, Fig. 7(e-h)",
-    "Eqs. 6 and 7 at 1 µm, at 5 or 10 µm (smaller rate), and at 50 µm.",
+    "Rates by eqs. 6 and 7 at 1 µm, at 5 or 10 µm (the smaller rate), and at 50 µm.",
     *_fall_and_rise("lower of 5 and 10 µm"),
     tried=(*FITTED, *DAMPINGS),
     draws=_DRAWS,
@@ -140,7 +140,7 @@ def rates_fall_steadily_i(r: Reading) -> Values:
 
 @_fitted_claim(
     "4, Fig. 8(b)",
-    "Smaller rate of 1 and 50 µm minus smaller rate of 5 and 10 µm.",
+    "Smaller of the rates at 1 and 50 µm minus smaller of the rates at 5 and 10 µm.",
     *(at_least(each, "%", 0.0) for each in ("depth of minimum, n = 3", *_OTHERS)),
 )
 def rates_fall_rise_ii(r: Reading) -> Values:

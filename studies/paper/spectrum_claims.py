@@ -50,7 +50,7 @@ def lines_emerge(r: Reading) -> Values:
 
 @claim(
     "5, Figs. 10(f) and 14(b)",
-    "Frequency of the highest peak at 50 µm, smoothed over 10 Hz, in 150-245 and in 350-500 Hz.",
+    "Highest peaks at 50 µm from 150 to 245 Hz and from 350 to 500 Hz, smoothed over 10 Hz.",
     *(about(f"peak near {each:g} Hz", "Hz", each, _NEAR_HZ) for each in TERMINAL_HZ),
 )
 def lines_at_terminal(r: Reading) -> Values:
