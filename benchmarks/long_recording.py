@@ -23,8 +23,8 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
+from vibench.acquisition.rig import RESPONSE_ROLES
 from vibench.analysis import analyse
-from vibench.analysis.live import RESPONSE
 from vibench.analysis.recordings.channels import BASE, DRIVE
 
 RATE_HZ = 51_200
@@ -35,6 +35,7 @@ CONVERTER_NOISE = 1e-4
 RANGE_V = 10.0
 STEP_V = 2 * RANGE_V / 2**24
 """Voltage step of a 24-bit converter [V]."""
+RESPONSE = RESPONSE_ROLES[0].value
 PER_VOLT = {DRIVE: 1.0, BASE: 10.0, RESPONSE: 0.1, "table_acceleration": 10.0}
 UNITS = {
     DRIVE: ("voltage", "V"),

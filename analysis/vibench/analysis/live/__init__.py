@@ -18,59 +18,6 @@ An impact of three samples is therefore always visible. This package imports no 
 'GOOD'
 """
 
-from ..recordings.channels import RESPONSE
-from ._levels import (
-    OVER_SHARE,
-    Level,
-    LevelVerdict,
-)
-from ._outline import (
-    THUMBNAIL_COLUMNS,
-    OverviewLevel,
-    RecordingOverview,
-    Thumbnail,
-    column_starts,
-    envelope,
-    has_overview,
-    kept_levels,
-    outline,
-    overview_levels,
-    thumbnail,
-    zigzag,
-)
-from ._portrait import (
-    Portrait,
-)
-from ._spectra import (
-    DensityPicture,
-    RowSpacing,
-    SpectrogramRequest,
-    recording_spectrogram,
-)
-from ._view import LiveChannel, LiveView
+import lazy_loader
 
-__all__ = [
-    "OVER_SHARE",
-    "RESPONSE",
-    "THUMBNAIL_COLUMNS",
-    "DensityPicture",
-    "Level",
-    "LevelVerdict",
-    "LiveChannel",
-    "LiveView",
-    "OverviewLevel",
-    "Portrait",
-    "RecordingOverview",
-    "RowSpacing",
-    "SpectrogramRequest",
-    "Thumbnail",
-    "column_starts",
-    "envelope",
-    "has_overview",
-    "kept_levels",
-    "outline",
-    "overview_levels",
-    "recording_spectrogram",
-    "thumbnail",
-    "zigzag",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

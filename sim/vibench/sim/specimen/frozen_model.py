@@ -15,7 +15,7 @@ _SCALES = {"": 1.0, "%": 0.01, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 def number_of(text: str, *units: str) -> float:
-    """Return the number in `text`, alone or followed by one of `units`, converted to SI units.
+    """Return the number [SI units] in `text`, which stands alone or is followed by one of `units`.
 
     Raises ValueError for other text, including ``1_0`` and digits of other scripts, which `float` accepts.
     """

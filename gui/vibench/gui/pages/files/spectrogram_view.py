@@ -12,9 +12,9 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
+from vibench.acquisition.rig import RESPONSE_ROLES
 from vibench.analysis.hidden_motion import LONGEST_VIEW_S, HiddenView, HiddenViewRequest, Numbers, hidden_view
 from vibench.analysis.live import (
-    RESPONSE,
     DensityPicture,
     RecordingOverview,
     RowSpacing,
@@ -243,7 +243,8 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
                 self.channel.clear()
                 for role in roles:
                     self.channel.addItem(role_text(role), role)
-                self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
+                usual = RESPONSE_ROLES[0].value
+                self.channel.setCurrentIndex(roles.index(usual) if usual in roles else len(roles) - 1)
 
     def retheme(self, theme: Theme) -> None:
         """Change the colours of the scales."""
