@@ -27,7 +27,7 @@ def states(points):
     return [(point.name, point.state) for point in points]
 
 
-def test_the_journal_keeps_plan_and_bench(journal, bench):
+def test_the_journal_stores_the_plan_and_the_bench(journal, bench):
     path = journal.path
     journal.close()
     with Journal.open(path) as again:
@@ -37,7 +37,7 @@ def test_the_journal_keeps_plan_and_bench(journal, bench):
         assert {point.state for point in again.points()} == {JournalPointState.QUEUED}
 
 
-def test_each_attempt_is_stored_with_its_number_file_and_reason(journal):
+def test_each_attempt_is_stored_with_its_number_its_file_and_its_reason(journal):
     journal.start("two", "two.h5")
     assert states(journal.points())[1] == ("two", JournalPointState.RUNNING)
     journal.end("two", JournalPointState.FAILED, ReasonCode.DATA_LOST, "a hole")

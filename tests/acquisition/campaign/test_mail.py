@@ -72,7 +72,7 @@ def test_a_notice_is_sent_as_one_mail(server, tmp_path):
     assert "recorded: 3" in server.heard
 
 
-def test_a_missing_mail_server_is_reported_without_an_exception(server, tmp_path):
+def test_a_missing_mail_server_is_reported_and_raises_no_exception(server, tmp_path):
     with socketserver.TCPServer(("127.0.0.1", 0), None) as closed:
         port = closed.server_address[1]
     assert MailMessenger(settings(tmp_path, port)).send(NOTICE).startswith("mail through 127.0.0.1 failed")

@@ -36,7 +36,7 @@ def failed_findings(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
-def test_a_healthy_bench_passes_and_matches_its_configuration(check_rig, rig, tmp_path):
+def test_a_healthy_bench_passes_its_check_and_matches_its_configuration(check_rig, rig, tmp_path):
     report = check_rig(rig, tmp_path)
     assert failed_findings(report) == set()
     clock = report["drive's clock"]
@@ -114,7 +114,7 @@ def test_a_laser_drop_out_is_distinguished_from_hum(check_rig, rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_reversed_vibrometer_sign_gives_a_warning(check_rig, rig, tmp_path):
+def test_a_vibrometer_with_a_reversed_sign_gives_a_warning(check_rig, rig, tmp_path):
     assert check_rig(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
     report = check_rig(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
     assert report["sign of m0_velocity"].verdict is Verdict.WARN

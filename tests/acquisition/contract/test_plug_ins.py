@@ -126,7 +126,7 @@ def offer_generator(folder, monkeypatch, name, target):
 
 
 @pytest.mark.thorough
-def test_third_party_instruments_work_without_changes_to_vibench(installed, tmp_path):
+def test_third_party_instruments_can_be_used_without_changes_to_vibench(installed, tmp_path):
     done = run("-c", MEASURES, BENCH, tmp_path / "dwell.h5", path=installed)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split(maxsplit=2) == ["complete", "AFG1022", "base acceleration (charge amplifier)\n"]
@@ -180,7 +180,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
         ),
     ],
 )
-def test_a_wrong_contract_command_gives_a_single_error_message(tmp_path, options, sentence):
+def test_a_wrong_command_for_contract_tests_gives_a_single_error_message(tmp_path, options, sentence):
     bench = CONFIGS / "virtual_rig.toml"
     done = run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),

@@ -60,7 +60,7 @@ def test_a_gap_or_a_changed_tone_restarts_the_drop_out_bridging():
 
 
 @pytest.mark.thorough
-def test_a_mode_is_tracked_despite_vibrometer_drop_outs(rig, tmp_path):
+def test_a_resonance_is_tracked_despite_vibrometer_drop_outs(rig, tmp_path):
     """Six drop-outs per second once gave 263.4 +- 2.2 Hz and a negative damping ratio."""
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 6.0})
     daq = rig.daq.model_copy(update={"sample_rate_hz": RATE_HZ})

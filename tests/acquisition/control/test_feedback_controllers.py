@@ -84,7 +84,7 @@ def test_every_recorded_step_states_its_pass_its_branch_and_its_direction(sweep_
     assert max(len(json.dumps(each)) for each in steps) < 480
 
 
-def test_steps_lie_on_the_branches_of_the_closed_form(sweep_bench):
+def test_the_recorded_steps_lie_on_the_branches_of_the_closed_form(sweep_bench):
     up = [each for each in notes_of(sweep_bench, "achieved") if each["segment"] == "step"][:9]
     lower, upper = folds_hz(sweep_bench.oscillator, LEVEL)
     for step in up:
@@ -136,7 +136,7 @@ def test_an_unreachable_base_level_is_flagged_and_the_voltage_stays_within_the_p
     assert max(setting for *_, setting in bench.settings) == pytest.approx(0.05)
 
 
-def test_a_sweep_holds_its_level_over_a_shaker_resonance(new_control_bench):
+def test_a_sweep_holds_its_level_across_a_resonance_of_the_shaker(new_control_bench):
     bench = new_control_bench(
         shaker_factor=lambda frequency_hz: 1 + 0.5 / (1 + ((frequency_hz - 150) / 4) ** 2)
     )

@@ -30,7 +30,7 @@ def test_the_level_is_exact_from_the_second_step_if_the_gain_is_constant():
     assert estimator.level == pytest.approx(1.0)
 
 
-def test_a_steady_trend_of_the_gain_is_extrapolated():
+def test_a_steady_trend_of_the_measured_gain_is_extrapolated():
     achieved, _ = tracked_levels(lambda time_s: 1 + 0.3 * time_s)
     np.testing.assert_allclose(achieved[5:], 1.0, atol=1e-9)
 
@@ -48,7 +48,7 @@ def test_a_level_error_after_a_jump_of_the_gain_decays_within_the_memory_of_the_
     assert abs(estimator.level - 1) < 0.01
 
 
-def test_the_gain_is_unknown_without_a_measurement():
+def test_the_gain_remains_unknown_without_a_measurement():
     estimator = GainEstimator(0.5)
     estimator.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
     assert not estimator.is_known

@@ -325,7 +325,7 @@ def test_no_subharmonic_is_found_in_a_motion_of_period_one(record_run, subharmon
 
 
 @pytest.mark.thorough
-def test_a_phase_search_ends_where_the_motion_and_its_phase_jump(record_run):
+def test_a_phase_search_ends_at_a_jump_of_the_motion_and_its_phase(record_run):
     """Below 197 Hz, m0's motion at half the drive is small, then jumps; bisection must not continue there."""
     plan = track_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
     (found,) = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")

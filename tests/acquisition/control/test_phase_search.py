@@ -55,12 +55,12 @@ def test_the_phase_error_of_the_sensors_widens_the_frequency_uncertainty():
     assert search.resonance(0.3).uncertainty_hz == pytest.approx(0.3 / slope, rel=0.15)
 
 
-def test_the_phase_search_stays_in_its_range():
+def test_the_phase_search_stays_in_its_frequency_range():
     search = PhaseSearch(260.0, 270.0, 4.0, [PhaseError(258.0 + 4, 80.0, 0.1), PhaseError(268.0, 70.0, 0.1)])
     assert search.next_hz() == 270.0
 
 
-def test_phase_errors_beyond_90_degrees_do_not_count_as_a_resonance():
+def test_a_phase_error_beyond_90_degrees_does_not_count_as_a_resonance():
     tries = [PhaseError(100.0, 130.0, 1.0), PhaseError(101.0, 120.0, 1.0)]
     found = PhaseSearch(90.0, 110.0, 1.0, tries).resonance(0.3)
     assert found.frequency_hz == 101.0

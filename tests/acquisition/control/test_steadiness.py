@@ -39,7 +39,7 @@ def test_a_motion_repeating_after_k_periods_has_period_k(period, depth, seed):
 
 
 @pytest.mark.parametrize("periods_of_decay", [20, 70, 200])
-def test_settling_waits_until_a_transient_has_decayed(periods_of_decay):
+def test_settling_lasts_until_a_transient_has_decayed(periods_of_decay):
     decay = 0.5 * np.exp(-np.arange(3000) / periods_of_decay)
     turning = np.exp(0.3j * np.arange(3000))
     for transient in (decay, decay * turning):

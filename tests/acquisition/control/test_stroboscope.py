@@ -40,12 +40,12 @@ def test_no_period_is_lost_or_repeated_between_blocks():
     assert periods.count == int(12 * 0.2 * NEAR_HZ)
 
 
-def test_the_mean_and_each_harmonic_are_measured_at_their_own_order():
+def test_the_mean_and_each_harmonic_are_measured_separately():
     periods = observe(lambda a: 0.7 + np.sin(a) + 0.3 * np.sin(2 * a) + 0.1 * np.cos(4 * a)).periods()
     np.testing.assert_allclose(np.abs(periods.response.mean(axis=0)), [0.7, 1, 0.3, 0, 0.1], atol=1e-4)
 
 
-def test_a_subharmonic_alternates_from_one_drive_period_to_the_next():
+def test_a_subharmonic_makes_successive_drive_periods_alternate():
     motion = observe(lambda a: np.sin(a) + 0.1 * np.sin(a / 2))
     response = motion.periods().response[FIRST_BLOCK:]
     np.testing.assert_allclose(response[2:], response[:-2], atol=2e-4)

@@ -72,14 +72,14 @@ class TestOpening:
             AFG1022X.open(impostor.config)
         assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
 
-    def test_opening_a_generator_in_use_is_refused_with_its_serial_number(self, plugged, generator):
+    def test_a_generator_in_use_is_refused_with_its_serial_number(self, plugged, generator):
         with pytest.raises((InstrumentBusy, InstrumentLost), match=plugged.instrument.serial):
             AFG1022X.open(plugged.config)
         generator.load_sine(100.0, 1.0)
 
 
 class TestLoad:
-    def test_high_impedance_is_set_and_its_reply_with_an_ohm_sign_is_read(self, plugged, generator):
+    def test_a_high_impedance_load_is_set_and_the_ohm_sign_in_its_reply_is_read(self, plugged, generator):
         assert math.isinf(plugged.instrument.settings(1).declared_load_ohm)
         assert generator.unconfirmed == ()
 
@@ -109,7 +109,7 @@ class TestLoad:
 
 
 class TestPlaying:
-    def test_the_commands_follow_the_manual(self, plugged, generator):
+    def test_the_commands_sent_to_the_generator_follow_its_manual(self, plugged, generator):
         generator.load_sine(260.0, 1.5)
         generator.start()
         assert plugged.log.commands() == [
@@ -119,7 +119,7 @@ class TestPlaying:
             "OUTP1:STAT ON",
         ]
 
-    def test_every_setting_is_read_back_and_the_error_queue_emptied(self, plugged, generator):
+    def test_every_setting_is_read_back_and_the_error_queue_is_emptied(self, plugged, generator):
         generator.set_frequency(261.0)
         assert plugged.log.messages == ["SOUR1:FREQ 261.000000", "SYST:ERR?", "SOUR1:FREQ?"]
 
@@ -154,7 +154,7 @@ class TestPlaying:
         volts = (held / 8191.5 - 1) * plugged.instrument.settings(1).amplitude_vpp / 2
         assert volts == pytest.approx(values - values.mean(), abs=2 / 16383)
 
-    def test_changes_between_signals_have_no_overshoot(self, plugged, generator):
+    def test_the_output_has_no_overshoot_when_the_signal_is_changed(self, plugged, generator):
         generator.load_sine(20e6, 2.0)
         generator.start()
         for change in (
@@ -182,7 +182,7 @@ class TestPlaying:
         ]
         assert max(heard) == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
 
-    def test_a_burst_counts_its_cycles_and_ends(self, plugged, generator):
+    def test_a_burst_is_set_to_its_number_of_cycles_and_can_be_ended(self, plugged, generator):
         generator.load_sine(100.0, 1.0)
         generator.arm_burst(7)
         state = plugged.instrument.settings(1)

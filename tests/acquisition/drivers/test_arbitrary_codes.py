@@ -29,14 +29,14 @@ def test_codes_reproduce_the_zero_mean_waveform_within_half_a_step(values):
 
 
 @given(waveforms)
-def test_the_largest_magnitude_maps_to_the_outermost_code(values):
+def test_the_value_of_largest_magnitude_is_mapped_to_the_outermost_code(values):
     codes = AFG1022_MODEL.codes(values).codes
     assert codes.min() == 0 or codes.max() == AFG1022_MODEL.top_code
     assert codes.max() <= AFG1022_MODEL.top_code
 
 
 @given(waveforms)
-def test_the_remaining_dc_is_below_half_a_step(values):
+def test_the_remaining_dc_offset_is_below_half_a_step(values):
     made = AFG1022_MODEL.codes(values)
     assert abs(waveform_of(made).mean()) <= half_a_step(made) * (1 + 1e-9)
 

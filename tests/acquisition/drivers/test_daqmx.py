@@ -78,7 +78,7 @@ def digitizer(rig, open_digitizer):
 
 
 class TestReading:
-    def test_the_identity_names_product_and_driver(self, digitizer):
+    def test_the_identity_of_a_converter_names_its_product_and_driver(self, digitizer):
         assert digitizer.identity.model == "NI 9234"
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
@@ -139,7 +139,7 @@ class TestStates:
 
 
 class TestConfiguration:
-    def test_coupling_and_sensor_current_reach_the_device(self, rig, digitizer):
+    def test_the_configured_coupling_and_sensor_current_are_set_on_the_device(self, rig, digitizer):
         # Without AC coupling the accelerometer shows its bias of volts, without current exactly nothing.
         digitizer.start()
         digitizer.read(25_600)

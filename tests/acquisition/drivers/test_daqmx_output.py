@@ -66,7 +66,7 @@ def tone(first, count, amplitude_v=1.0):
     return amplitude_v * np.sin(2 * np.pi * 100.0 * (first + np.arange(count)) / RATE_HZ)
 
 
-def test_the_stream_is_played_from_its_first_sample_without_gaps(digitizer, output):
+def test_a_stream_is_played_from_its_first_sample_without_gaps(digitizer, output):
     written = 0
     output.write(tone(0, 6400))
     written += 6400
@@ -118,7 +118,7 @@ def test_samples_beyond_the_limit_are_refused_before_writing(output, volts):
         output.arm()
 
 
-def test_stopping_and_closing_are_allowed_at_any_time_and_free_the_output(digitizer, output):
+def test_an_output_can_be_stopped_and_closed_at_any_time_and_is_then_free(digitizer, output):
     output.stop()
     output.stop()
     output.close()
@@ -141,7 +141,7 @@ def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
         np.testing.assert_allclose(heard[delay + 256 :], expected[256:], atol=0.03 * amplitude_v)
 
 
-def test_opening_zeroes_an_output_that_another_program_left_high(digitizer, virtual):
+def test_opening_sets_an_output_that_another_program_left_high_to_zero(digitizer, virtual):
     virtual.world.play("Dev1/ao0", np.full(51_200, 1.0), 51_200.0)
     digitizer.start()
     open_output(digitizer).close()

@@ -61,7 +61,7 @@ def port(instrument, **options):
     return ScpiInstrument(lambda: instrument, "the generator", **options)
 
 
-def test_an_error_names_the_refused_command_and_every_message():
+def test_an_scpi_error_names_the_refused_command_and_every_error_message():
     instrument = Instrument()
     instrument.errors.extend([b'-222,"Data out of range"\n', b'-102,"Syntax error"\n'])
     with pytest.raises(
@@ -104,7 +104,7 @@ def test_a_timeout_raises_an_error_that_states_the_waiting_time():
     ],
 )
 @pytest.mark.parametrize("act", ["command", "query", "query_codes"])
-def test_every_error_of_a_lost_device_is_recognised(death, act):
+def test_every_kind_of_error_from_a_lost_device_is_recognised(death, act):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [b"1\n"]
     instrument.dies_with = death
@@ -124,7 +124,7 @@ def test_a_late_answer_to_an_interrupted_query_is_discarded():
     assert instrument.timeout == 3000.0
 
 
-def test_a_query_can_be_repeated_after_a_timeout():
+def test_an_scpi_query_can_be_repeated_after_a_timeout():
     instrument = Instrument()
     instrument.answers["FREQ?"] = [TIMEOUT, b"1000\n"]
     ours = port(instrument)
@@ -136,7 +136,7 @@ def test_a_query_can_be_repeated_after_a_timeout():
 @pytest.mark.parametrize(
     "reply", [b"\n", b"123\n", b"#\n", b"#0\n", b"#2x4\x00\x01\n", b"#16\x00\x01\n", b"#13\x00\x01\x02\n"]
 )
-def test_a_malformed_block_raises_an_error(reply):
+def test_a_malformed_binary_block_raises_an_error(reply):
     instrument = Instrument()
     instrument.answers["DATA?"] = [reply]
     with pytest.raises(InstrumentError, match=r"block|announced"):

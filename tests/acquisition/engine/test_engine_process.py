@@ -122,7 +122,7 @@ class TestRuns:
         np.testing.assert_allclose(newest_samples.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
     @pytest.mark.thorough
-    def test_a_mark_is_stored_with_its_sample(self, client, shipped_rig, tmp_path):
+    def test_a_mark_is_stored_with_its_sample_number(self, client, shipped_rig, tmp_path):
         before = start_run(client, shipped_rig, tmp_path).samples
         client.mark("the sphere was heard")
         client.stop(StopLevel.ABORT)
@@ -158,7 +158,7 @@ class TestStoppedChecks:
         assert status.check is None
         assert "the bench check was stopped: smoke in the laboratory" in status.messages[-1].what
 
-    def test_a_check_is_stopped_if_its_viewer_is_gone(self, client, shared_engine, shipped_rig, tmp_path):
+    def test_a_check_is_stopped_if_its_viewer_has_gone(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
         open_rig(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
         client.check(tmp_path)
@@ -385,7 +385,7 @@ class TestMissingViewers:
 
 class TestEndOfTheEngine:
     @pytest.mark.thorough
-    def test_an_unused_unattended_engine_ends_after_a_timeout(self):
+    def test_an_unattended_engine_without_requests_ends_after_a_timeout(self):
         arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
         with subprocess.Popen(
             [sys.executable, "-m", "vibench.acquisition.engine", *arguments],

@@ -64,7 +64,7 @@ def test_a_request_that_the_state_does_not_permit_is_refused(handler, word):
         handler.carry_out(verb, arguments)
 
 
-def test_a_closing_bench_refuses_requests(shipped_rig):
+def test_requests_are_refused_while_the_bench_is_being_closed(shipped_rig):
     """A request between the decision to close and the closing once ended the client's connection."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)
@@ -83,7 +83,7 @@ def test_a_closing_bench_refuses_requests(shipped_rig):
     jobs.run()
 
 
-def test_a_closed_bench_can_be_opened_at_once(shipped_rig):
+def test_a_closed_bench_can_be_opened_again_at_once(shipped_rig):
     """The closing thread publishes the state just before it ends; opening in between must succeed."""
     engine = Engine(Supervision.UNATTENDED)
     jobs = JobQueue(engine)

@@ -119,7 +119,7 @@ def require_ending(tmp_path, reason):
 
 class TestStalls:
     @pytest.mark.thorough
-    def test_a_stop_during_a_stall_of_the_engine_is_carried_out_after_the_stall(self, running, tmp_path):
+    def test_a_stop_requested_while_the_engine_stalls_is_carried_out_after_the_stall(self, running, tmp_path):
         with frozen(running.pid):
             told = the_engine(None)
             assert told.pid == running.pid

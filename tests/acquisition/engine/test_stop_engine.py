@@ -63,5 +63,5 @@ def test_a_stop_before_the_first_run_is_confirmed_at_once(driving, tmp_path):
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
 
 
-def test_a_hold_is_delivered_without_confirmation(driving):
+def test_a_hold_request_is_delivered_without_confirmation(driving):
     assert stop_engine(the_engine(None), "hold") is StopDelivery.TOLD

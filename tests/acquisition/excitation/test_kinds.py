@@ -114,7 +114,7 @@ def test_the_band_of_resonance_tracking_is_its_search_range():
         ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
-def test_each_kind_declares_a_generator_voltage_or_a_held_base_acceleration(kind, level):
+def test_each_excitation_declares_a_generator_voltage_or_a_held_base_acceleration(kind, level):
     assert by_kind[kind].level_at(250.0) == level
 
 

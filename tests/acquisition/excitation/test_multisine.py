@@ -47,7 +47,7 @@ def test_the_mean_of_a_multisine_period_is_zero():
     assert abs(np.mean(values)) < 1e-15
 
 
-def test_realisations_have_equal_rms_and_the_largest_peak_is_full_scale():
+def test_all_realisations_have_equal_rms_and_the_largest_peak_is_at_full_scale():
     periods = flat_periods(BAND, realisations=6, seed=5)
     rms = [np.sqrt(np.mean(np.square(period))) for period in periods]
     peaks = [np.max(np.abs(period)) for period in periods]
@@ -63,14 +63,14 @@ def test_waveforms_of_a_plan_are_cached():
         first[0][0] = 0.0
 
 
-def test_realisations_of_a_multisine_are_uncorrelated():
+def test_the_realisations_of_a_multisine_are_uncorrelated():
     first, second = flat_periods(BAND, realisations=2, seed=5)
     correlation = np.corrcoef(first, second)[0, 1]
     # The correlation of two random-phase multisines of L lines is a mean of L cosines: sd 1/sqrt(2 L).
     assert abs(correlation) < 5 / np.sqrt(2 * len(BAND))
 
 
-def test_equal_seeds_give_equal_periods_and_different_seeds_different_ones():
+def test_equal_seeds_give_equal_noise_periods_and_different_seeds_different_ones():
     again = flat_periods(BAND, 1, seed=7)[0]
     np.testing.assert_array_equal(flat_periods(BAND, 1, seed=7)[0], again)
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
@@ -89,7 +89,7 @@ def test_phases_are_chosen_for_a_low_crest_factor():
     assert 2.9 < crest < 3.6
 
 
-def test_multisine_values_are_close_to_gaussian():
+def test_the_values_of_a_multisine_have_a_nearly_gaussian_distribution():
     (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
     kurtosis = np.mean(values**4) / np.mean(values**2) ** 2
     assert kurtosis == pytest.approx(3.0, abs=0.3)
@@ -100,7 +100,7 @@ def test_multisine_values_are_close_to_gaussian():
     width=st.integers(1, 400),
     repetition_hz=st.sampled_from([0.1, 0.3, 0.5, 1.0, 2.0]),
 )
-def test_a_band_includes_harmonics_at_its_edges(start, width, repetition_hz):
+def test_a_frequency_band_includes_harmonics_at_its_edges(start, width, repetition_hz):
     noise = WhiteNoise(
         amplitude_vpp=1.0,
         band_start_hz=start * repetition_hz,
@@ -129,7 +129,7 @@ def test_no_value_of_a_multisine_exceeds_full_scale(seed, first, count):
         assert np.max(np.abs(values)) <= 1.0
 
 
-def test_the_first_spectral_image_matches_the_zero_order_hold():
+def test_the_first_spectral_image_has_the_level_that_a_zero_order_hold_gives():
     (values,) = flat_periods(np.array([1000]), 1, seed=1)
     lines = np.abs(held_lines(values, spans=4))
     # -17.1 dB at 7192 Hz for 1000 Hz and 8192 points per second (ratio of the hold's gains).

@@ -130,7 +130,7 @@ def test_an_unplayable_plan_names_the_allowed_values(kind, fields, sentence):
     assert sentence in str(refused.value)
 
 
-def test_noise_excites_exactly_the_lines_of_its_band():
+def test_periodic_noise_excites_exactly_the_spectral_lines_in_its_band():
     plan = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
     # At this multiple of the playback rate, lines lie on bins; images lie above half the playback rate.
     shown = plan.preview(8192 * 0.5 * 4)
@@ -144,7 +144,7 @@ def test_noise_of_1_v_peak_to_peak_has_an_rms_of_half_a_volt_divided_by_its_cres
     assert 0.11 < shown.rms_v < 0.17
 
 
-def test_odd_multisine_leaves_out_one_of_every_four_odd_lines():
+def test_an_odd_multisine_leaves_out_one_of_every_four_odd_lines():
     plan = OddMultisine(amplitude_vpp=1.0, band_start_hz=1, band_stop_hz=800, seed=4)
     odd = np.arange(1, 800, 2).reshape(-1, 4)
     left_out = np.isin(odd, plan.detection_lines)
@@ -154,7 +154,7 @@ def test_odd_multisine_leaves_out_one_of_every_four_odd_lines():
     assert set(np.argmax(left_out, axis=1)) == {0, 1, 2, 3}
 
 
-def test_odd_multisine_is_silent_on_even_and_detection_lines():
+def test_an_odd_multisine_is_silent_on_even_and_detection_lines():
     plan = OddMultisine(amplitude_vpp=2.0, band_start_hz=1, band_stop_hz=800)
     shown = plan.preview(8192.0)
     excited = shown.spectrum_v[list(plan.excited_lines)]
@@ -236,7 +236,7 @@ def test_the_sweep_of_the_paper_has_an_integer_number_of_steps():
     assert len(steps) == 2000
 
 
-def test_stepped_sine_goes_up_then_down_through_every_frequency():
+def test_a_stepped_sine_goes_up_and_then_down_through_every_frequency():
     plan = SteppedSine(
         amplitude_vpp=1,
         grid=FrequencyGrid(start_hz=100, stop_hz=100.3, step_hz=0.1),
@@ -279,7 +279,7 @@ class TestStreamedNoise:
         far_out = (frequency_hz < 25) | (frequency_hz > 825)
         assert np.sum(power[far_out]) / np.sum(power) < 1e-5
 
-    def test_the_values_of_streamed_noise_are_gaussian(self):
+    def test_the_values_of_streamed_noise_have_a_gaussian_distribution(self):
         samples = self.PLAN.source.samples(0, 400_000, self.RATE)
         assert np.mean(samples**4) / np.mean(samples**2) ** 2 == pytest.approx(3.0, abs=0.1)
 

@@ -108,7 +108,7 @@ def test_common_beginner_mistakes_in_a_campaign_are_refused_in_toml_terms(tmp_pa
         ('began = "-1.5"\n', "began = '-1.5': give a date, time and time zone"),
     ],
 )
-def test_errors_describe_values_without_python_terms(tmp_path, text, told):
+def test_errors_describe_wrong_values_without_python_terms(tmp_path, text, told):
     class Words(FrozenModel):
         few: Annotated[tuple[float, ...], Field(min_length=1, max_length=2)] = (1.0,)
         pair: tuple[float, float] = (1.0, 2.0)

@@ -149,7 +149,7 @@ class TestRefusals:
         with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):
             load(tmp_path, 'name = "c"\n' + DWELL_TABLE + DWELL_TABLE.replace('"dwell"\n[', '"Dwell"\n['))
 
-    def test_a_repeat_whose_name_equals_that_of_another_measurement_is_refused(self, tmp_path):
+    def test_a_repeat_that_gets_the_name_of_another_measurement_is_refused(self, tmp_path):
         twice = DWELL_TABLE.replace("[measurements.exc", "repeats = 2\n[measurements.exc")
         with pytest.raises(ConfigurationError, match="recorded as 'dwell-2'"):
             load(tmp_path, 'name = "c"\n' + twice + DWELL_TABLE.replace('name = "dwell"', 'name = "dwell-2"'))

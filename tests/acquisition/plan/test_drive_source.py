@@ -41,12 +41,12 @@ def test_a_sine_uses_the_analogue_output_only_if_configured_for_sines(rig, tone)
 
 
 @pytest.mark.parametrize("plays", list(OutputUse))
-def test_streams_use_the_analogue_output_and_waveforms_the_generator(rig, plays):
+def test_streams_are_played_by_the_analogue_output_and_waveforms_by_the_generator(rig, plays):
     assert drive_source(STREAM, with_output(rig, plays)) is DriveSource.OUTPUT
     assert drive_source(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
 
 
-def test_a_stream_requires_an_analogue_output_even_if_the_rig_has_none(rig):
+def test_a_stream_is_assigned_to_the_analogue_output_even_if_the_rig_has_none(rig):
     assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 

@@ -41,7 +41,7 @@ def test_the_predicted_loads_of_a_sine_are_its_amplitude_times_the_transfer_func
         assert loads[quantity].rms == pytest.approx(float(expected) / np.sqrt(2), rel=1e-12)
 
 
-def test_acceleration_far_above_the_suspension_resonance_is_force_over_mass(rig):
+def test_the_acceleration_far_above_the_suspension_resonance_is_force_over_mass(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
     mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
     assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(

@@ -55,7 +55,7 @@ def test_a_preview_of_a_long_sweep_has_a_bounded_number_of_samples(rig):
 @pytest.mark.parametrize(
     ("name", "band_hz"), [("noise", (20, 800)), ("sweep", (220, 310)), ("dwell", (130, 520))]
 )
-def test_the_preview_band_is_the_excited_band(name, band_hz):
+def test_the_band_in_a_preview_is_the_excited_band(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
 
 

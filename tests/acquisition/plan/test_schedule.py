@@ -29,7 +29,7 @@ def test_the_lead_in_tones_of_a_dwell_are_part_of_its_lead_in_time():
     assert lead_in_s(measurement(dwell)) == pytest.approx(CHECK_S + 0.5 + 2 * 0.25 + 1.0)
 
 
-def test_settling_under_feedback_does_not_count_as_lead_in():
+def test_the_settling_time_under_feedback_does_not_count_as_lead_in():
     tracking = ResonanceTracking(
         amplitude_vpp=1.0, start_hz=94, low_hz=90, high_hz=98, accelerations_m_per_s2=(0.1,)
     )

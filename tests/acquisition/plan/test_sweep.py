@@ -104,7 +104,7 @@ class TestChains:
         assert [point.chain for point in plan.points()] == ["line-0p5vpp-up"] * 3 + ["line-0p5vpp-down"] * 3
         assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
 
-    def test_a_limited_lead_in_keeps_the_last_points(self):
+    def test_a_lead_in_of_limited_length_keeps_the_last_points(self):
         def pick(points, **bound):
             return campaign(
                 amplitude_vpp=[0.5],
@@ -120,7 +120,7 @@ class TestChains:
         assert whole_s[1] - 2 * whole_s[0] == pytest.approx(0.5 * 20 * 20)
         assert len(pick(1200, lead_points=2).points()) == 1200
 
-    def test_an_up_and_down_sweep_is_one_chain(self):
+    def test_an_up_and_down_sweep_is_one_chain_of_points(self):
         plan = campaign(
             amplitude_vpp=[0.5],
             direction=["up_then_down"],
@@ -133,7 +133,7 @@ class TestChains:
         last = plan.points()[-1].measurement.excitation
         assert [tone.frequency_hz for tone in last.lead_in] == [200, 205, 205]
 
-    def test_a_downward_level_chain_is_checked_at_its_highest_level(self, rig):
+    def test_a_chain_of_falling_levels_is_checked_at_its_highest_level(self, rig):
         plan = campaign(
             measurement={"ramp_s": 0.3, "excitation": {**DWELL, "frequency_hz": 200}},
             amplitude_vpp=[0.5, 1.0, 2.0],

@@ -31,7 +31,7 @@ def test_volts_without_a_known_converter_step_are_stored_to_within_half_a_fine_s
     assert np.abs(counts * fine_step - volts).max() <= 0.5 * fine_step
 
 
-def test_a_wrong_converter_step_is_detected():
+def test_volts_that_contradict_the_stated_converter_step_are_detected():
     true_step, claimed_step = 5.0 / 2**23, 5.0 / 2**22
     volts = np.arange(-100.0, 100.0)[None] * true_step
     with pytest.raises(RecordingError, match=r"'m0_velocity' differ by up to 0\.50 counts from"):

@@ -92,7 +92,7 @@ def test_the_text_of_a_feedback_note_is_parsed_into_values():
     assert read("resonance", LOST).mode_hz is None
 
 
-def test_other_events_and_truncated_notes_are_ignored():
+def test_events_of_other_kinds_and_truncated_notes_are_ignored():
     assert read("check", "skipped: the bench was checked shortly before") is None
     assert read("settled", SETTLED[:100] + "…") is None
 

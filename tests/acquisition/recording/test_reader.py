@@ -76,7 +76,7 @@ def test_reading_a_closed_recording_is_refused(path):
         recording.read("m0_velocity")
 
 
-def test_a_finished_recording_is_still_found_by_its_part_name(path):
+def test_a_finished_recording_is_found_by_the_name_of_its_part_file(path):
     with open_recording(path.with_name("a.h5.part")) as recording:
         assert recording.path == path
         assert recording.state == "complete"
@@ -138,7 +138,7 @@ def test_each_kind_of_unreadable_file_has_a_specific_message(path, damage, sente
         open_recording(path)
 
 
-def test_results_are_stored_beside_their_samples(path):
+def test_results_are_stored_in_the_recording_beside_the_samples(path):
     frequency = np.linspace(0.0, 500.0, 6)
     response = np.exp(1j * frequency)
     arrays = {

@@ -208,7 +208,7 @@ def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(make_
 
 
 @pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])
-def test_an_incomplete_seal_is_invalid(make_file, change):
+def test_a_seal_of_which_a_part_is_missing_is_invalid(make_file, change):
     path = make_file()
     with h5py.File(path, "r+") as file:
         if change != "dataset":
@@ -329,7 +329,7 @@ def with_result(make_file):
     return path
 
 
-def test_a_result_has_a_separate_seal(with_result):
+def test_a_result_stored_in_a_recording_has_a_separate_seal(with_result):
     with open_recording(with_result) as recording:
         assert recording.check_seal("whole").state is SealState.INTACT
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.INTACT]

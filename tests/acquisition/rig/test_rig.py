@@ -69,7 +69,7 @@ def test_a_generator_set_to_50_ohm_gives_twice_the_displayed_voltage(tmp_path, l
     assert rig.generator.terminal_factor() == pytest.approx(factor * loading)
 
 
-def test_vibrometer_range_and_voltage_divider_scale_their_channels():
+def test_the_vibrometer_range_and_a_voltage_divider_set_the_scales_of_their_channels():
     rig = load_rig(VIRTUAL)
     by_role = {channel.role: channel for channel in channels_of(rig)}
     velocity = by_role[Role.M0_VELOCITY]

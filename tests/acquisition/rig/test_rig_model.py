@@ -78,7 +78,7 @@ def test_velocity_and_acceleration_are_derivatives_of_the_stroke(frequency_hz):
 
 
 @given(st.floats(0.5, 20e3))
-def test_state_equations_and_transfer_function_agree(frequency_hz):
+def test_the_state_equations_of_the_rig_agree_with_its_transfer_functions(frequency_hz):
     equations = shaker_of(RIG).equations()
     s = 2j * np.pi * frequency_hz
     voltage = complex(MODEL.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))

@@ -39,7 +39,7 @@ MEANINGS = {
     ("text", "unit", "expected"),
     [(text, *meaning) for meaning, texts in MEANINGS.items() for text in texts],
 )
-def test_data_sheet_units_are_converted(text, unit, expected):
+def test_sensitivities_in_data_sheet_units_are_converted(text, unit, expected):
     assert volts_per_unit(text, unit) == pytest.approx(expected, rel=1e-14)
 
 

@@ -52,7 +52,7 @@ def cycles(drive):
 
 
 @pytest.mark.parametrize("latency_s", [0.02, 0.1, 0.2, 0.35])
-def test_the_check_waits_until_commands_have_taken_effect(bench, tmp_path, latency_s):
+def test_the_low_level_check_waits_until_commands_have_taken_effect(bench, tmp_path, latency_s):
     bench.world.latency_s = latency_s
     recorder = carry_out(bench, dwell(), tmp_path)
     assert recorder.ending[0] is RecordingState.COMPLETE
@@ -77,7 +77,7 @@ def test_settling_starts_when_the_tone_plays(bench, tmp_path, latency_s):
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.02, 0.05, 0.1])
 @pytest.mark.parametrize("step_s", [0.02, 0.05, 0.1, 0.2, 0.5])
-def test_a_sweep_on_a_slow_generator_is_correct_or_refused(bench, tmp_path, latency_s, step_s):
+def test_a_sweep_on_a_slow_generator_is_played_correctly_or_refused(bench, tmp_path, latency_s, step_s):
     bench.world.latency_s = latency_s
     plan = sweep(step_s)
     if step_s < 1.25 * latency_s:
@@ -118,7 +118,7 @@ def test_a_drive_that_lags_its_plan_ends_the_run_with_an_error(bench, tmp_path):
 
 
 @pytest.mark.parametrize("stall_s", [0.25, 0.8])
-def test_a_single_delay_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
+def test_a_single_late_command_is_noted_and_the_run_continues(bench, tmp_path, stall_s):
     bench.world.latency_s = 0.02
     plan = sweep(0.1)
     with run_of(bench, plan, tmp_path) as run:

@@ -113,7 +113,7 @@ def test_bursts_contain_whole_periods_and_are_separated_by_short_gaps(guarded, t
     assert max(b - a for a, b in gaps) < GUARD_S + 1e-3
 
 
-def test_the_generator_can_play_again_after_a_run_with_bursts(guarded, tmp_path):
+def test_the_generator_can_play_continuously_again_after_a_run_with_bursts(guarded, tmp_path):
     virtual, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
         upto(run, RunState.RECORDING)
@@ -137,7 +137,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_plans_that_bursts_cannot_play_are_refused_before_the_campaign(kind, guarded, tmp_path):
+def test_plans_that_cannot_be_played_in_bursts_are_refused_before_the_campaign(kind, guarded, tmp_path):
     virtual, bench = guarded
     before_s = virtual.world.time_s
     refused = {"name": "second", "excitation": {"amplitude_vpp": 1.0, **REFUSED[kind]}}

@@ -73,7 +73,7 @@ def test_a_generator_without_hardware_sweep_is_refused_before_output():
         require_within_limits(sweep(), load_rig("virtual_rig"))
 
 
-def test_a_dead_man_switch_excludes_hardware_sweeps(tmp_path):
+def test_hardware_sweeps_are_refused_on_a_rig_with_a_dead_man_switch(tmp_path):
     rig = load_rig("virtual_rig_keysight")
     generator = rig.generator.model_copy(update={"dead_man_s": 0.5})
     with (

@@ -81,7 +81,7 @@ def test_segment_boundaries_are_rounded_to_the_nearest_sample(durations):
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 
-def test_the_last_signal_fades_out_without_a_step():
+def test_the_last_signal_of_an_output_fades_out_without_a_step():
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(
         [Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)]
@@ -104,7 +104,7 @@ def test_a_signal_appended_after_the_end_begins_at_the_next_sample():
 
 
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
-def test_a_fade_starts_at_the_current_level_and_ends_in_silence(taken):
+def test_a_fade_out_starts_at_the_current_level_and_ends_in_silence(taken):
     synthesizer = OutputSynthesizer(RATE_HZ)
     synthesizer.append(with_ramps(NOISE))
     synthesizer.take(taken)

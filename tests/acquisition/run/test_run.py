@@ -134,7 +134,7 @@ class TestCompleteRuns:
         assert settings[RunState.CHECKING] == pytest.approx(0.02 * AMPLITUDE_VPP)
         assert settings[RunState.RECORDING] == AMPLITUDE_VPP
 
-    def test_a_ramp_follows_a_half_cosine_in_steps(self, played):
+    def test_a_ramp_follows_a_half_cosine_in_amplitude_steps(self, played):
         ramp = next(each for each in played.recorder.segments if each["label"] == "ramp_up")
         stairs = [
             (at - ramp["first"], value) for at, value in played.world.amplitudes() if ramp["first"] <= at
@@ -204,7 +204,7 @@ class TestSweepsAndSteps:
         assert all(abs(gap - 0.13 * RATE) <= 1 for gap in gaps)
         assert bench.recorder.states().count("ramping_up") == 1
 
-    def test_a_new_waveform_is_loaded_only_when_the_drive_is_quiet(self, bench, tmp_path):
+    def test_a_new_waveform_is_loaded_only_while_the_drive_is_quiet(self, bench, tmp_path):
         band = {"band_start_hz": 20, "band_stop_hz": 800, "repetition_hz": 2}
         noise = WhiteNoise(amplitude_vpp=2, realisations=3, periods=1, settle_s=0.1, **band)
         list(run_of(bench, tmp_path, changed_dwell(excitation=noise)))
@@ -302,7 +302,7 @@ class TestEndsOfARun:
         assert_ended_without_a_jump(bench, state)
 
     @every_state
-    def test_a_lost_generator_still_receives_a_stop_command(self, bench, tmp_path, state):
+    def test_a_generator_that_was_lost_still_receives_a_stop_command(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         for name in ("set_amplitude", "set_frequency", "load_sine"):
             bench.world.permanent[name] = lambda: InstrumentLost("no answer")
@@ -311,7 +311,7 @@ class TestEndsOfARun:
         assert_silent_and_finished(bench, RecordingState.FAILED)
 
     @every_state
-    def test_a_generator_that_does_not_stop_raises_an_alarm(self, bench, tmp_path, state):
+    def test_a_generator_that_does_not_stop_causes_an_alarm(self, bench, tmp_path, state):
         run = run_upto(state, bench, tmp_path)
         bench.world.permanent["stop"] = lambda: InstrumentLost("THE OUTPUT MAY STILL BE ON")
         with pytest.raises(InstrumentLost, match="MAY STILL BE ON"):
@@ -411,7 +411,7 @@ class TestStopLevels:
         assert bench.world.calls[before][0] == "stop"
         assert_silent_and_finished(bench, RecordingState.STOPPED)
 
-    def test_a_faster_stop_replaces_a_slow_ramp(self, bench, tmp_path):
+    def test_a_faster_stop_replaces_a_slow_ramp_down(self, bench, tmp_path):
         _, shown = self.stop_at_levels(bench, tmp_path, StopLevel.RAMP, StopLevel.ABORT)
         assert shown[-1].elapsed_s - shown[0].elapsed_s < shortest_ramp_s(bench.rig) + 2 * SLOW.ramp_s / 50
         assert_ended_without_a_jump(bench)
@@ -476,7 +476,7 @@ class TestStopLevels:
         assert FEWEST_STAIRS <= len(settings) <= stairs(DWELL)
         assert np.min(np.diff([AMPLITUDE_VPP, *settings])) >= -0.36 * AMPLITUDE_VPP
 
-    def test_a_drive_that_stays_on_is_recorded_and_raises_an_alarm(self, bench, tmp_path):
+    def test_a_drive_that_stays_on_is_recorded_and_causes_an_alarm(self, bench, tmp_path):
         run = run_upto(RunState.RECORDING, bench, tmp_path)
         bench.world.stays_on = True
         run.switch.ask(by_operator(StopLevel.OFF))

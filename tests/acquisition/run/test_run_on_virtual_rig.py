@@ -50,7 +50,7 @@ def test_a_recorded_dwell_has_the_planned_frequency_and_amplitude(virtual_bench,
     assert rms == pytest.approx(0.75 * TERMINAL / np.sqrt(2), rel=1e-3)
 
 
-def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
+def test_the_recorded_ramps_rise_and_fall_along_a_half_cosine(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=500, settle_s=0.1, duration_s=0.2)
     with record(virtual_bench, tmp_path, dwell) as recording:
         rate_hz = recording.sample_rate_hz
@@ -84,7 +84,7 @@ def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_
     assert np.max(lines[900:]) < 0.02 * np.mean(inside)
 
 
-def test_a_recorded_sweep_has_the_cycles_of_the_ideal_sweep(virtual_bench, tmp_path):
+def test_a_recorded_sweep_has_as_many_cycles_as_the_ideal_sweep(virtual_bench, tmp_path):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
     with record(virtual_bench, tmp_path, sweep) as recording:
         drive = segment(recording, "sweep")

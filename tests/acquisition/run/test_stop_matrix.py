@@ -289,7 +289,7 @@ LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
 
 
 @pytest.mark.thorough
-def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tmp_path):
+def test_a_slow_generator_is_silenced_in_time_when_samples_are_lost(laboratory, tmp_path):
     """A ramp of 20 steps with a setting each would take two seconds."""
     virtual, connected = laboratory()
     with bench_on(slow_rig(connected)) as bench:
@@ -306,7 +306,7 @@ def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tm
 
 
 @pytest.mark.thorough
-def test_an_abort_with_a_slow_generator_is_silent_within_its_stated_time(rig, tmp_path):
+def test_a_run_with_a_slow_generator_is_silent_within_the_stated_time_after_an_abort(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     plan = PLAN.model_copy(update={"ramp_step_s": 0.015})

@@ -179,7 +179,7 @@ class TestEndsOfARun:
         if state is not RunState.CHECKING:
             assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
-    def test_a_hold_request_ramps_a_stream_down_and_the_reason_is_stated(self, streaming_bench, tmp_path):
+    def test_a_hold_request_ramps_down_a_stream_and_the_reason_is_stated(self, streaming_bench, tmp_path):
         run = run_upto(RunState.RECORDING, streaming_bench, tmp_path)
         assert "cannot be held" in run.switch.refusal_to_hold()
         run.switch.hold()
@@ -247,7 +247,7 @@ class TestEndsOfARun:
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
 
     @heard_state
-    def test_an_output_that_does_not_stop_raises_an_alarm(self, streaming_bench, tmp_path, state):
+    def test_an_output_that_does_not_stop_causes_an_alarm(self, streaming_bench, tmp_path, state):
         run = run_upto(state, streaming_bench, tmp_path)
         streaming_bench.world.permanent["output.stop"] = lambda: InstrumentLost("MAY STILL BE PLAYING")
         with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING"):

@@ -112,7 +112,7 @@ def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_in_sile
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
-def test_after_a_server_dies_at_most_the_written_samples_are_played(laboratory, tmp_path):
+def test_after_the_death_of_the_server_at_most_the_written_samples_are_played(laboratory, tmp_path):
     virtual, connected = laboratory()
     die = when_recording(virtual.faults.lose_daq_server)
     with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING") as failure, bench_on(connected) as bench:
@@ -204,7 +204,7 @@ def test_a_full_disk_fades_the_output_out_and_keeps_the_recording(laboratory, tm
         assert recording.samples > 0
 
 
-def test_leaving_the_bench_silences_a_playing_output(laboratory):
+def test_leaving_the_with_block_of_a_bench_silences_a_playing_output(laboratory):
     virtual, connected = laboratory()
     with bench_on(connected) as bench:
         bench.output.write(np.full(25_600, 1.0))

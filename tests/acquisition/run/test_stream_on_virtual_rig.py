@@ -96,13 +96,13 @@ def test_the_recording_matches_the_preview_within_converter_noise(streamed):
     assert np.max(np.abs(left)) < 10 * NOISE_V
 
 
-def test_the_output_is_silent_between_check_and_ramp(streamed):
+def test_the_output_is_silent_between_the_check_and_the_ramp(streamed):
     quiet = streamed.drive_v[streamed.segments["check"].stop + 4000 : streamed.segments["ramp_up"].start]
     assert quiet.size > 0.2 * RATE_HZ
     assert np.std(quiet) == pytest.approx(NOISE_V, rel=0.1)
 
 
-def test_the_check_at_low_level_plays_through_the_output(streamed):
+def test_the_low_level_check_plays_through_the_analogue_output(streamed):
     assert "drive 0.01993 V (0.01993 V expected)" in streamed.log
     check = streamed.drive_v[streamed.segments["check"]]
     assert np.max(np.abs(check)) == pytest.approx(0.01 * 2.0 * TERMINAL, rel=0.02)
@@ -142,7 +142,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     assert np.max(np.abs(left)) < 1e-3
 
 
-def test_the_check_through_the_output_finds_a_raised_amplifier_gain(tmp_path):
+def test_the_check_through_the_analogue_output_finds_a_raised_amplifier_gain(tmp_path):
     turned = changed(RIG, amplifier={"gain_db": 20.0})
     with open_bench(turned) as bench:
         bench.rig = RIG

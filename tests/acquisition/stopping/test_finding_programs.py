@@ -88,7 +88,7 @@ def test_other_files_in_the_folder_do_not_hide_announcements(litter):
 
 
 @pytest.mark.timeout(15)
-def test_a_stop_file_that_is_a_pipe_stops_without_a_reason():
+def test_a_stop_file_that_is_a_pipe_causes_a_stop_without_a_reason():
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         (program,) = announced_programs(Program)
@@ -233,7 +233,7 @@ def test_an_unreadable_folder_is_not_treated_as_empty(state_of_other_user):
         programs_to_stop(None)[0]
 
 
-def test_wrong_permissions_of_the_state_folder_are_corrected(state_of_other_user):
+def test_the_wrong_permissions_of_a_state_folder_are_corrected(state_of_other_user):
     engines_folder().chmod(0o300)
     os.seteuid(NOBODY)
     with stop_on_signal(StopSwitch(), "dwell"):

@@ -37,7 +37,7 @@ UNCATCHABLE = ("SIGKILL", "SIGSTOP")
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 @pytest.mark.parametrize("number", VALID, ids=signal_name)
-def test_ending_or_suspending_the_program_aborts_the_run(number, default_handlers, tmp_path, monkeypatch):
+def test_signals_that_end_or_suspend_a_program_abort_its_run(number, default_handlers, tmp_path, monkeypatch):
     if signal_name(number) in LEFT_TO_THE_DEAD_MAN:
         assert number not in stop_signals()
         return

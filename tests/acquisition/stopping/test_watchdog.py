@@ -5,7 +5,7 @@ from threading import Event
 from vibench.acquisition.stopping.program import Watchdog
 
 
-def test_the_watchdog_continues_after_a_failed_check(caplog):
+def test_a_watchdog_thread_continues_after_a_failed_check(caplog):
     looks, thrice = [], Event()
 
     def look():

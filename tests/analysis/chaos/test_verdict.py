@@ -21,7 +21,7 @@ def section(rng, period=1, scatter=0.0, count=1200):
 
 
 @pytest.mark.parametrize("period", [1, 2, 3, 7, 32])
-def test_a_repeating_motion_is_periodic_with_its_period(period):
+def test_a_repeating_motion_is_called_periodic_with_the_right_period(period):
     rng = np.random.default_rng(period)
     noise = 1e-3
     found = motion_verdict(Points(section(rng, period, noise), np.full(2, noise)), DRIVE_HZ)
@@ -226,7 +226,7 @@ def test_the_exponent_estimated_from_poincare_points_is_a_lower_bound(name):
     assert said or name == "stops"
 
 
-def test_scattered_points_give_no_exponent():
+def test_random_points_give_no_exponent():
     rng = np.random.default_rng(2)
     found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
     assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
@@ -247,7 +247,7 @@ def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
     assert found.kind is MotionKind.UNDECIDED, found.why
 
 
-def test_the_shortest_period_is_found_if_it_repeats_several_times():
+def test_the_shortest_period_is_reported_only_if_it_repeats_several_times():
     points = section(np.random.default_rng(6), 5)
     assert shortest_period(Points(points, QUIET)) == 5
     assert shortest_period(Points(points[:18], QUIET)) is None

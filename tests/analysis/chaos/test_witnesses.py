@@ -49,7 +49,7 @@ def autoregression(rng, count):
 
 
 @pytest.mark.parametrize(("growth", "k"), [(4.0, 1.0), (3.55, 0.0)])
-def test_the_zero_one_test_separates_chaos_from_period_eight(growth, k):
+def test_the_zero_one_test_distinguishes_chaos_from_a_motion_of_period_eight(growth, k):
     assert zero_one(logistic(growth, 2000)).k == pytest.approx(k, abs=0.01)
 
 
@@ -117,7 +117,7 @@ def test_a_series_whose_surrogates_have_wrong_spectra_is_undecided():
     assert not found.rejects_linear_noise
 
 
-def test_a_surrogate_keeps_values_and_spectrum_and_changes_the_order():
+def test_a_surrogate_keeps_the_values_and_the_spectrum_but_not_the_order_of_the_values():
     series = henon(1000)
     made, error = surrogate(series, np.random.default_rng(4))
     assert np.array_equal(np.sort(made), np.sort(series))

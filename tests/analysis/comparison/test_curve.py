@@ -67,7 +67,7 @@ def test_curves_without_a_common_frequency_have_no_difference():
         curve_difference(mode(np.arange(10.0, 20.0)), mode(np.arange(30.0, 40.0)))
 
 
-def test_a_curve_is_interpolated_and_never_extrapolated():
+def test_a_response_curve_is_interpolated_and_never_extrapolated():
     curve = mode(np.array([100.0, 200.0]))
     values = curve.at(np.array([50.0, 100.0, np.sqrt(2) * 100, 300.0])).magnitude
     assert np.isnan(values[[0, 3]]).all()
@@ -109,7 +109,7 @@ def test_an_exported_svg_places_a_known_point_at_its_coordinates(tmp_path):
     assert (x1, height - y1) == pytest.approx(tuple(expected), abs=0.2)
 
 
-def test_tables_have_units_and_one_file_per_curve(tmp_path):
+def test_exported_tables_have_units_and_one_file_per_curve(tmp_path):
     curves = [mode(np.arange(50.0, 600.0, 0.7)), mode(np.arange(100.0, 400.0), 0.5, "other")]
     written = comparison_figure("both", curves, (curves[0], curves[1]), [266.0]).save(tmp_path)
     names = {each.name for each in written}
@@ -161,7 +161,7 @@ def test_chaotic_scatter_gives_no_modes_beside_a_resonance(depth):
     ("modes_hz", "damping"),
     [((95, 260, 268), 0.005), ((95, 266, 500), 0.03), ((100, 120, 140), 0.01), ((94, 264, 500), 0.002)],
 )
-def test_separate_modes_are_listed_as_peaks(modes_hz, damping):
+def test_well_separated_modes_are_listed_as_peaks(modes_hz, damping):
     found = curve_peaks(response_curve(np.arange(40.0, 700.0, 0.1), modes_hz, damping))
     assert [each.frequency_hz for each in found] == pytest.approx(modes_hz, rel=0.01)
 

@@ -59,7 +59,7 @@ def test_a_chain_driven_by_recorded_noise_has_the_linear_transmission(noise_file
     assert chain_figure(found).svg
 
 
-def test_alternating_cells_repeat_and_changed_values_apply_to_every_cell():
+def test_alternating_cells_repeat_along_the_chain_and_changed_values_apply_to_all():
     others = (SpecimenTable.model_validate("heavy"), SpecimenTable.model_validate("asymmetric"))
     request = ChainRequest(others=others, lengths=(5,), gap_m=30e-6)
     chain = request.chain(5)

@@ -125,7 +125,7 @@ def test_a_branch_file_round_trips_and_is_never_overwritten(paper_diagram, tmp_p
     assert path.read_bytes() == before
 
 
-def test_a_file_without_branches_is_refused(tmp_path):
+def test_a_dynamics_file_without_branches_is_refused(tmp_path):
     with h5py.File(tmp_path / "x.h5", "w") as file:
         file["a"] = 1
     (tmp_path / "y.h5").write_text("no HDF5")
@@ -175,7 +175,7 @@ def test_the_json_document_contains_every_branch_point(paper_diagram):
     assert {event["kind"] for event in found["branches"][0]["events"]} >= {"grazing", "symmetry breaking"}
 
 
-def test_stable_and_unstable_parts_are_separate_curves():
+def test_the_stable_and_unstable_parts_of_a_branch_are_separate_curves():
     curves = {(each.origin, each.response): each for each in DIAGRAM.curves()}
     stable = curves[CurveOrigin.STABLE, CurveKind.RESPONSE_I]
     unstable = curves[CurveOrigin.UNSTABLE, CurveKind.RESPONSE_I]
@@ -206,7 +206,7 @@ def test_a_recorded_level_is_the_median_per_bin_in_ascending_frequency():
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_a_figure_draws_unstable_parts_dashed_and_marks_events(along):
+def test_a_figure_draws_unstable_parts_of_branches_dashed_and_marks_events(along):
     request = BranchRequest(along=along, start=1e-6 if along is Parameter.AMPLITUDE else 100.0, stop=120.0)
     drawn = branches_figure(BranchDiagram(request, (FOLDED,), 1.0))
     first, second = drawn.figure.axes

@@ -50,7 +50,7 @@ def test_every_file_of_a_folder_is_packed_unchanged_and_described(folder, crate)
     assert not (folder / "ro-crate-metadata.json").exists()
 
 
-def test_links_out_of_the_folder_are_not_published(folder, tmp_path):
+def test_files_outside_the_folder_are_not_published_through_links(folder, tmp_path):
     """A link in a received folder may point to a private key of the person who packs it."""
     (tmp_path / "private").write_text("a key")
     (folder / "notes.txt").symlink_to(tmp_path / "private")

@@ -24,7 +24,7 @@ RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")
 
 
-def test_csv_contains_every_value_with_unit_and_time(known, known_values, tmp_path):
+def test_a_csv_file_contains_every_value_with_its_unit_and_its_time(known, known_values, tmp_path):
     path, _ = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
     with path.open(newline="", encoding="utf-8") as file:
         assert next(csv.reader(file)) == ["time [s]", "drive_voltage [V]", "m0_velocity [m s-1]"]
@@ -34,7 +34,7 @@ def test_csv_contains_every_value_with_unit_and_time(known, known_values, tmp_pa
         np.testing.assert_allclose(table[:, column], known_values[role], rtol=1e-9)
 
 
-def test_an_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_path):
+def test_an_exported_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_path):
     chosen = excerpt(known, ("m0_velocity",), 1.0, 1.5)
     path, facts = export_samples(chosen, Format.CSV, tmp_path / "part.csv")
     table = np.loadtxt(path, delimiter=",", skiprows=1)
@@ -99,7 +99,7 @@ def test_segments_in_a_matlab_file_index_the_exported_arrays(known, tmp_path):
     assert segments["last"].tolist() == [70_000 - 51_200, 120_000 - 51_200]
 
 
-def test_wav_keeps_converter_counts_relative_to_full_scale(known, known_values, tmp_path):
+def test_a_wav_file_keeps_the_converter_counts_relative_to_full_scale(known, known_values, tmp_path):
     path, facts = export_samples(excerpt(known), Format.WAV, tmp_path / "a.wav")
     rate, data = wavfile.read(path)
     assert (rate, data.dtype) == (RATE_HZ, np.int32)
@@ -109,7 +109,7 @@ def test_wav_keeps_converter_counts_relative_to_full_scale(known, known_values, 
         np.testing.assert_array_equal(column / 2.0**31 * full_scale, np.nan_to_num(known_values[role]))
 
 
-def test_a_sampling_rate_that_wav_cannot_state_is_refused(known, tmp_path):
+def test_a_sampling_rate_that_a_wav_file_cannot_state_is_refused(known, tmp_path):
     odd = replace(known, sample_rate_hz=51_199.7)
     with pytest.raises(
         InvalidRequest, match=r"51199\.7 samples/s, but the rate of a WAV file is a whole number"

@@ -65,7 +65,7 @@ def assert_same(found, wanted):
         np.testing.assert_allclose(row, expected, rtol=0, atol=2 * np.nanmax(np.abs(expected)) * ROUNDING)
 
 
-def test_columns_of_a_table_in_hdf5_become_channels(tmp_path):
+def test_the_columns_of_a_table_in_hdf5_become_channels(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["run/data"] = signals().T
     meaning = mapping(tmp_path, ("/run/data#1", "drive_voltage", ""), ("/run/data#2", "m0_velocity", ""))
@@ -187,7 +187,7 @@ def test_a_tdms_file_is_imported_with_rate_and_values(tmp_path):
 
 
 @pytest.mark.parametrize(("dtype", "full"), [(np.int16, 2**15), (np.int32, 2**31), (np.float32, 1)])
-def test_wav_samples_are_fractions_of_full_scale(tmp_path, dtype, full):
+def test_samples_of_a_wav_file_are_read_as_fractions_of_full_scale(tmp_path, dtype, full):
     fractions = np.clip(signals()[0], -0.9, 0.9)
     stored = (fractions * full).astype(dtype)
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), np.stack((stored, -stored), axis=1))
@@ -310,7 +310,7 @@ def test_trailing_bytes_after_binary_samples_are_ignored(known, known_values, tm
 
 
 @pytest.mark.parametrize("unit", [b"m/s\xb2 ", b"m/s\xc2\xb2"])
-def test_units_may_contain_non_ascii_characters(known, tmp_path, unit):
+def test_units_in_a_file_may_contain_non_ascii_characters(known, tmp_path, unit):
     path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.1), Format.UFF, tmp_path / "a.uff")
     path.write_bytes(path.read_bytes().replace(b"m s-1", unit))
     with open_source(path) as source:
@@ -609,7 +609,7 @@ def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
 
 
 @pytest.mark.parametrize("encoding", ["cp037", "utf-16-le"])
-def test_zero_bytes_in_a_table_are_explained(tmp_path, encoding):
+def test_the_error_for_zero_bytes_in_a_text_table_explains_them(tmp_path, encoding):
     text = "Zeit [s];v [m/s]\n" + "".join(f"{0.001 * number:.3f};1\n" for number in range(20))
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0\0\0")
     with (
@@ -680,7 +680,7 @@ def test_external_links_are_followed_only_if_allowed(tmp_path):
         assert [each.name for each in source.channels] == ["/v"]
 
 
-def test_an_import_overwrites_no_file(tmp_path):
+def test_an_import_never_overwrites_a_file(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     (tmp_path / "made.h5").write_text("mine")
     with pytest.raises(RecordingError, match="nothing is ever overwritten"):
@@ -717,7 +717,7 @@ def test_sensors_on_m0_need_no_unit_in_the_mapping(tmp_path, role, unit):
     assert meaning.channels[1].kind == (role.removeprefix("m0_"), unit)
 
 
-def test_one_channel_of_a_file_can_be_imported_as_two_channels(tmp_path):
+def test_one_channel_of_a_file_can_be_imported_under_two_roles(tmp_path):
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
     _, values = read_import(tmp_path / "a.wav", meaning)

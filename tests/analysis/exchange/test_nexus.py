@@ -62,7 +62,7 @@ def test_nexus_values_are_physical_and_errors_are_half_a_step(nexus, known, know
             assert data["values_errors"][5] == pytest.approx(step / 2)
 
 
-def test_silx_shows_a_labelled_curve_of_each_channel(known_file, known_values):
+def test_silx_shows_each_channel_as_a_labelled_curve(known_file, known_values):
     nxdata = pytest.importorskip("silx.io.nxdata", reason="pip install vibench[test] brings silx")
     with h5py.File(known_file) as file:
         assert nxdata.get_default(file).group.name == "/view/m0_velocity"

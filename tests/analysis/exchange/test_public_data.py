@@ -61,7 +61,7 @@ MODES = [
 
 
 @pytest.mark.parametrize(("name", "frequency_hz", "damping_ratio", "by", "damping_by"), MODES)
-def test_a_published_mode_is_found(analysis_of, name, frequency_hz, damping_ratio, by, damping_by):
+def test_a_mode_in_published_data_is_found(analysis_of, name, frequency_hz, damping_ratio, by, damping_by):
     found = min(analysis_of(name).response.resonances, key=lambda each: abs(each.frequency_hz - frequency_hz))
     assert found.frequency_hz == pytest.approx(frequency_hz, rel=by)
     if damping_ratio is not None:

@@ -141,7 +141,7 @@ def test_a_sampling_rate_in_a_heading_line_of_another_form_is_compared_with_the_
 
 
 @pytest.mark.parametrize(("head", "between"), [("t u a v\n  mV g mm/s", " "), ("t,u,a,v\nmV,g,mm/s", ",")])
-def test_a_row_of_units_with_empty_cells_is_refused(tmp_path, head, between):
+def test_a_row_of_units_with_an_empty_cell_is_refused(tmp_path, head, between):
     with pytest.raises(UnusableData, match="has 3 units for 4 columns"):
         read_import(text(tmp_path / "a.csv", head, (TIMES, *signal(TIMES)), between))
 
@@ -309,7 +309,7 @@ def with_facts(tmp_path, suffix, values, facts):
 
 @pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("word", ["unit", "EU", "engineering_unit", "PhysicalUnit", "y_units", "Einheit"])
-def test_a_unit_attribute_of_any_common_name_is_applied(tmp_path, suffix, word):
+def test_a_unit_attribute_with_any_common_name_is_applied(tmp_path, suffix, word):
     volts, acceleration, velocity = signal(TIMES)
     units = [{word: unit} for unit in ("V", "g", "mm/s")]
     is_right(with_facts(tmp_path, suffix, (volts, acceleration / G, 1000 * velocity), units)())
@@ -401,7 +401,7 @@ def test_several_start_times_or_gains_of_one_table_are_refused(tmp_path, suffix,
 
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (3, 4, 5, 0, 1, 2), (3, 0, 4, 1, 5, 2)])
 @pytest.mark.parametrize("suffix", [".csv", ".mat"])
-def test_times_that_belong_to_no_definite_channel_are_refused(tmp_path, suffix, order):
+def test_times_that_cannot_be_assigned_to_a_channel_are_refused(tmp_path, suffix, order):
     late = TIMES + LATE / RATE_HZ
     columns = [TIMES, TIMES, late, *signal(TIMES)[:2], signal(late)[2]]
     names = ("t_u", "t_a", "t_v", "u", "a", "v")
@@ -473,7 +473,7 @@ def test_numbers_that_mark_lost_samples_are_refused(tmp_path, suffix, mark):
 
 
 @pytest.mark.parametrize("peak", [0.9, 1.5])
-def test_floating_point_sound_within_full_scale_needs_a_scale(tmp_path, peak):
+def test_floating_point_wav_samples_within_full_scale_need_a_scale(tmp_path, peak):
     """Floats in sound files are usually fractions of full scale; larger values cannot be."""
     values = peak * signal(TIMES) / np.array([[1.0], [30.0], [0.5]])
     wavfile.write(tmp_path / "a.wav", int(RATE_HZ), values.T.astype(np.float32))

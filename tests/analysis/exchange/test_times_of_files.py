@@ -312,7 +312,7 @@ def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more="", plan=DWELL):
         (-9, 9, 0.0, "10"),
     ],
 )
-def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, low, high, noise):
+def test_clipped_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, low, high, noise):
     rng = np.random.default_rng(1)
     phase = 2 * np.pi * 260.0 * np.arange(22_000) / 5120.0
     volts, base = np.cos(phase), 3.0 * np.cos(phase + 0.4) + 1e-4 * rng.standard_normal(phase.size)
@@ -332,7 +332,7 @@ def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, 
 
 @pytest.mark.parametrize("cycles", [4, 8, 10, 16, 20, 25, 40])
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
-def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, noise):
+def test_peaks_of_a_sine_locked_to_the_sample_clock_do_not_count_as_flat_tops(tmp_path, cycles, noise):
     """Such a sine repeats few values in each period, many of them at the maximum."""
     phase = 2 * np.pi * np.arange(20_000) / cycles
     rng = np.random.default_rng(cycles)
@@ -344,7 +344,7 @@ def test_a_sine_locked_to_the_sample_clock_has_no_flat_tops(tmp_path, cycles, no
 
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-3])
 @pytest.mark.parametrize("motion_of", ["one side", "two sides", "clipped hits"])
-def test_only_clipped_peaks_of_hits_are_flat_tops(tmp_path, motion_of, noise):
+def test_only_the_clipped_peaks_of_hits_count_as_flat_tops(tmp_path, motion_of, noise):
     """A free body moves at a constant velocity between hits, and vibrates after each hit."""
     rng = np.random.default_rng(3)
     since = np.arange(22_000)[:, np.newaxis] - np.array([1700, 5300, 8000, 12_500, 17_100])

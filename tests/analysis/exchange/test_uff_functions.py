@@ -69,7 +69,7 @@ def test_pyuff_reads_every_line_and_both_axes(known, tmp_path, lines, is_even, i
     assert read["id1"].strip() == "m0 velocity over base acceleration"
 
 
-def test_universal_file_records_have_the_defined_width(known, tmp_path):
+def test_lines_of_a_universal_file_have_the_width_of_the_format(known, tmp_path):
     hz = np.array([1.0, 2.5, 7.25])
     path, _ = export_functions(
         excerpt(known), [function(hz, np.array([1 + 2j, -3j, 5e-7 + 0j]))], Format.UFF, tmp_path / "a.uff"
@@ -145,7 +145,7 @@ def test_exported_densities_cover_only_the_played_segments_and_name_them(tmp_pat
     assert read["id4"].endswith(told), read["id4"]
 
 
-def test_a_recording_without_drive_has_no_densities(tmp_path):
+def test_a_recording_without_drive_has_no_spectral_densities(tmp_path):
     with open_recording(write_parts(tmp_path / "a.h5", RUN)) as recording:
         for stretch in ((0.0, 1.5), (0.0, 2.4)):
             with pytest.raises(

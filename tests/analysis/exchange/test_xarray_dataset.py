@@ -20,7 +20,7 @@ def test_a_dataset_holds_the_values_units_and_times_of_the_recording(known, know
     assert data.attrs["recording_id"] == known.recording_id
 
 
-def test_samples_are_chosen_by_their_segment(known):
+def test_samples_of_a_dataset_can_be_chosen_by_their_segment(known):
     data = xarray_dataset(known, ("m0_velocity",), from_s=1.0)
     said = json.loads(data.attrs["segments_json"])
     assert [each["label"] for each in said] == ["dwell", "step"]

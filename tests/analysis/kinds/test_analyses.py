@@ -13,7 +13,7 @@ def test_every_kind_of_excitation_has_an_analysis():
     assert ANALYSES["stepped_level"] is not ANALYSES["stepped_sine"]
 
 
-def test_every_kind_of_excitation_has_figures_and_sentences():
+def test_every_kind_of_excitation_has_figures_and_report_sentences():
     assert set(DRAWINGS) == set(EXCITATION_KINDS)
 
 

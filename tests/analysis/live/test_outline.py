@@ -16,7 +16,7 @@ def sine(frequency_hz, span_s, noise=0.0):
 
 @pytest.mark.parametrize("frequency_hz", [95.0, 130.0, 260.0, 331.0, 470.0, 700.0, 2000.0])
 @pytest.mark.parametrize("noise", [0.0, 0.01])
-def test_the_edges_of_a_steady_sine_are_straight(frequency_hz, noise):
+def test_the_outline_of_a_steady_sine_has_straight_edges(frequency_hz, noise):
     low, high = outline(sine(frequency_hz, 2.0, noise), COLUMNS)
     room = 0.03 + 5 * noise
     assert high[4:-4] == pytest.approx(1.3, abs=room)
@@ -65,7 +65,7 @@ def test_lost_samples_stay_empty_and_silence_stays_zero_in_an_outline():
 
 @pytest.mark.parametrize(("start_hz", "stop_hz", "span_s"), [(150, 350, 8.2), (20, 600, 8.2), (350, 60, 4.0)])
 @pytest.mark.parametrize("columns", [500, 1000, 1800, 1960])
-def test_the_edges_of_a_steady_sweep_have_no_notches(start_hz, stop_hz, span_s, columns):
+def test_the_outline_of_a_steady_sweep_has_edges_without_notches(start_hz, stop_hz, span_s, columns):
     """With the period of the sweep's middle the edges once fell to half at its slow end."""
     time_s = np.arange(round(span_s * RATE_HZ)) / RATE_HZ
     hz = start_hz + (stop_hz - start_hz) * time_s / span_s

@@ -97,7 +97,7 @@ def test_an_overview_picture_of_an_empty_range_is_refused(recording, start, stop
 
 
 @pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 11.5])
-def test_a_steady_sine_has_straight_edges_with_bins_shorter_than_a_period(tmp_path, frequency_hz):
+def test_the_overview_of_a_steady_sine_is_straight_with_bins_shorter_than_a_period(tmp_path, frequency_hz):
     with open_recording(write(tmp_path, frequency_hz)) as opened:
         for columns in (390, 350, 300):
             picture = overview_of(opened).picture(("m0_velocity",), 0, SAMPLES, columns)

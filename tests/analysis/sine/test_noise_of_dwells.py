@@ -99,7 +99,7 @@ def test_a_residual_too_large_for_noise_is_not_counted_as_noise(tmp_path):
 
 
 @pytest.mark.thorough
-def test_chaos_is_not_reported_as_noise(tmp_path):
+def test_chaotic_motion_is_not_counted_as_noise(tmp_path):
     found = measure(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
     first = budgets_of(found)[1]
     assert found.analysis.response.response_i > 1.5 * found.analysis.response.response_ii

@@ -26,7 +26,7 @@ def drawn_data(plot):
 
 
 @pytest.mark.parametrize("place", np.linspace(0.001, 1.999, 13))
-def test_an_impact_of_three_samples_is_visible_in_two_seconds(plot, place):
+def test_an_impact_of_three_samples_is_visible_in_a_plot_of_two_seconds(plot, place):
     samples = np.zeros(round(2 * RATE_HZ))
     first = round(place * RATE_HZ)
     samples[first : first + 3] = (0.5, 1.0, -0.5)

@@ -57,7 +57,7 @@ def test_an_interval_without_contact_is_exact(interval_s, contact):
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_motion_does_not_depend_on_the_base_intervals(contact):
+def test_a_motion_does_not_depend_on_the_division_of_the_base_motion_into_intervals(contact):
     specimen, speed, reached = gong2025(damping_time_s=3e-5, contact=contact), 0.3, []
     for intervals in (1, 7, 64):
         length = 2e-3 / intervals

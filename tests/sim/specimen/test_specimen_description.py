@@ -156,7 +156,7 @@ def test_a_description_round_trips_through_its_text(tmp_path):
         ),
     ],
 )
-def test_a_broken_specimen_file_is_refused_by_name(tmp_path, change, said):
+def test_a_broken_specimen_file_is_named_in_its_error(tmp_path, change, said):
     path = write_file(tmp_path, WHOLE.replace(*change))
     with pytest.raises(UnknownSpecimenError, match=said) as refusal:
         load_specimen(path)

@@ -47,7 +47,7 @@ def test_the_successor_of_a_finished_study_point_can_start_at_once():
     assert scheduler.take(10.0, 10) == (1,)
 
 
-def test_measured_times_of_neighbours_change_the_order_of_study_points():
+def test_measured_computing_times_of_neighbours_change_the_order_of_study_points():
     scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
     assert scheduler.take(0.1, 1) == (3,)
     scheduler.finish(3)
@@ -70,7 +70,7 @@ def test_a_study_point_that_failed_in_a_group_is_repeated_alone():
 @given(
     st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=20), st.integers(0, 2**32)
 )
-def test_every_study_point_is_scheduled_until_finished_and_never_after(points, seed):
+def test_every_study_point_is_scheduled_until_it_is_finished_and_never_again(points, seed):
     """Chains of any length, replies in any order, some points put back, some costs learnt."""
     luck = random.Random(seed)
     planned_s, is_chained = zip(*points, strict=True)

@@ -33,6 +33,6 @@ def test_noise_is_white_gaussian_of_unit_variance():
 
 
 @pytest.mark.parametrize(("seed", "place"), [(1, "there"), (2, "here")])
-def test_noise_at_another_position_or_seed_is_independent(seed, place):
+def test_noise_at_other_positions_or_with_another_seed_is_independent(seed, place):
     one, other = NoiseStream(1, "here").draw(0, 100_000), NoiseStream(seed, place).draw(0, 100_000)
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.02

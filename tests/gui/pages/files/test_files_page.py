@@ -187,7 +187,7 @@ def test_a_recording_without_overview_can_be_opened(show_file):
     assert np.nanmax(curve_data(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
 
-def test_a_broken_file_shows_the_reason_and_a_remedy(page, show_file, folder, qtbot):
+def test_the_page_shows_a_reason_and_a_remedy_for_a_broken_file(page, show_file, folder, qtbot):
     with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "is not a readable HDF5 file" in said.args[0].what
