@@ -205,7 +205,7 @@ def worn_words(text):
 
 
 @every_document
-def test_documents_use_plain_words(document):
+def test_documents_contain_only_plain_words(document):
     return worn_words(text_of(document))
 
 

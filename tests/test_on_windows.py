@@ -70,7 +70,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_posix_functions_that_windows_tests_remove_exist_on_this_system():
+def test_posix_functions_that_the_windows_tests_remove_exist_on_this_system():
     # A misspelt name, or one removed from Python, would test nothing.
     program = f"import os; print(sum(hasattr(os, each) for each in {POSIX_ONLY!r}))"
     assert int(call("-c", program).stdout) > 25
@@ -100,7 +100,7 @@ def test_a_campaign_is_measured_verified_and_analysed_on_windows(here):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_study_on_windows_is_solved_by_spawned_processes(here):
+def test_a_study_is_solved_on_windows_by_spawned_processes(here):
     call("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--workers", "1", folder=here)
     again = call("-m", "tests.windows_here", "study", "study.toml", "--out", "a.h5", "--resume", folder=here)
     assert "2 of 2 points, 0 failed (complete)" in again.stdout

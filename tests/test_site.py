@@ -34,7 +34,7 @@ def notebook(site, name):
     return site / link
 
 
-def test_text_in_the_reference_is_not_rendered_as_a_type(site):
+def test_text_in_the_reference_pages_is_not_rendered_as_a_type(site):
     pages = sorted((site / "reference").glob("*.html"))
     assert len(pages) > 15
     assert [page.name for page in pages if ">Type<" in page.read_text(encoding="utf-8")] == []

@@ -125,7 +125,7 @@ def test_nested_results_with_scalar_values_become_columns_of_a_dataset():
 
 
 @pytest.mark.parametrize("name", ["numpy.ndarray[tuple[typing.Any, ...]]", "NDArray[numpy.float64]"])
-def test_arrays_are_recognised_by_type_names_of_old_and_new_numpy(name):
+def test_array_fields_are_recognised_by_the_type_names_of_old_and_new_numpy(name):
     assert holds_array(name)
     assert not holds_array(float)
 
@@ -334,7 +334,7 @@ def test_reported_values_of_a_recording_have_units(request, kind, units):
     assert "" not in [each.attrs.get("units") for each in data.variables.values()]
 
 
-def test_rows_with_different_units_get_a_column_of_units():
+def test_a_table_whose_rows_have_different_units_gets_a_column_of_units():
     f0 = FittedValue(Parameter.F0, 95.0, 94.0, 96.0, 0.5, 95.5)
     m0 = dataclasses.replace(f0, parameter=Parameter.M0)
 
@@ -383,7 +383,7 @@ def test_a_json_document_has_all_fields_in_order_and_null_for_unknown():
     )
 
 
-def test_rows_of_several_results_are_concatenated():
+def test_table_rows_of_several_results_are_concatenated():
     found = rows([result(), result(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
     np.testing.assert_array_equal(found["frequency_hz"], [95.0, 266.0, 95.0, 266.0])
     np.testing.assert_array_equal(found["mean_m"], [2.0, 3.0])

@@ -36,7 +36,7 @@ def test_a_value_is_rounded_to_the_digits_of_its_uncertainty(value, half_width, 
     st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3),
     st.floats(1e-9, 1e5),
 )
-def test_rounding_to_the_uncertainty_loses_only_insignificant_digits(value, half_width):
+def test_rounding_a_value_to_its_uncertainty_loses_only_insignificant_digits(value, half_width):
     read, bound = (
         float(each) for each in re.fullmatch(r"(\S+) ± (\S+)", plus_minus(value, half_width)).groups()
     )

@@ -54,7 +54,7 @@ def test_a_mutant_depends_on_its_seed_and_number_only():
     assert mutants(Shard(7, 40, until_s=time.monotonic() - 1)) == {}
 
 
-def test_tallies_of_shards_are_added_up(tmp_path):
+def test_the_tallies_of_the_shards_of_an_attack_are_added_up(tmp_path):
     first, second = Tally("toml"), Tally("toml")
     first.count(0, took_s=2.0, peak_bytes=5)
     second.count(0, took_s=1.0, peak_bytes=7)
@@ -67,7 +67,7 @@ def test_tallies_of_shards_are_added_up(tmp_path):
         first.add(Tally("imports"))
 
 
-def test_a_shard_continues_from_its_file(tmp_path):
+def test_a_shard_of_an_attack_continues_from_its_file(tmp_path):
     path = tmp_path / "shard.json"
 
     def tally_after(count, part=0):

@@ -38,7 +38,7 @@ def test_an_intact_recording_gives_reproducible_results(tmp_path):
         assert recordings_flips.verdict_of_file(path)[0] == said
 
 
-def test_an_undetected_bit_flip_would_be_reported():
+def test_a_bit_flip_that_no_check_detects_would_be_reported():
     assert recordings_flips.faults("1234", "5678", 0.1, 1) == ("other numbers, unnoticed",)
     assert recordings_flips.faults("refused: it is damaged", "5678", 0.1, 1) == ()
     assert recordings_flips.faults("5678", "5678", 0.1, 1) == ()

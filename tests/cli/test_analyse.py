@@ -62,7 +62,7 @@ def test_options_for_estimator_quantity_and_resolution_are_applied_and_reported(
     assert "Estimator h1; hann segments of 0.3 s overlapping by 50 %, lines 5 Hz wide." in page
 
 
-def test_a_growing_recording_is_analysed_up_to_its_last_sample(vibench_here, noise, tmp_path):
+def test_a_recording_that_still_grows_is_analysed_up_to_its_last_sample(vibench_here, noise, tmp_path):
     plan, base, velocity, parts = noise
     half = round(SECONDS * synthetic.RATE / 2)
     with synthetic.start_recording(
@@ -97,7 +97,7 @@ def test_a_bad_recording_does_not_prevent_the_analysis_of_other_recordings(viben
     assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 
 
-def test_a_bad_recording_analysed_alone_leaves_no_report(vibench_here, tmp_path):
+def test_no_report_is_written_if_the_only_recording_is_bad(vibench_here, tmp_path):
     (tmp_path / "nothing.h5").touch()
     done = vibench_here("analyse", "nothing.h5", cwd=tmp_path)
     assert done.returncode == 1
@@ -193,7 +193,7 @@ def test_warnings_about_a_result_are_printed(vibench_here, tmp_path):
     assert "warning: other: drive frequency: " in " ".join(done.stdout.split()), done.stdout
 
 
-def test_a_missing_simulation_is_noted_without_a_failure(capsys):
+def test_a_simulation_that_is_not_possible_is_noted_without_a_failure(capsys):
     failure = AnalysisFailure("a.h5", FailedStep.SIMULATION, "the reason")
     complain_about(CampaignResults("night", (), (failure,)))
     assert capsys.readouterr().err == "note: a.h5: the reason\n"

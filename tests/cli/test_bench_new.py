@@ -107,7 +107,7 @@ def test_a_sensitivity_is_accepted_in_the_unit_of_its_certificate(tmp_path):
         assert part in told
 
 
-def test_a_plain_number_replaces_a_sensitivity_with_unit(tmp_path):
+def test_a_number_without_unit_replaces_a_sensitivity_with_unit(tmp_path):
     text = with_answer(LAB.read_text(encoding="utf-8"), SENSITIVITY, "100 mV/g", "note")
     assert value_in(text, SENSITIVITY) == '"100 mV/g"'
     assert value_in(with_answer(text, SENSITIVITY, "0.0102", "note"), SENSITIVITY) == "0.0102"
@@ -138,7 +138,7 @@ def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
     assert switch.request is None
 
 
-def test_ctrl_c_at_a_question_stops_without_writing(tmp_path, monkeypatch):
+def test_ctrl_c_at_a_question_ends_the_procedure_and_nothing_is_written(tmp_path, monkeypatch):
     def abort(*_given, **_named):
         raise typer.Abort
 
@@ -150,7 +150,7 @@ def test_ctrl_c_at_a_question_stops_without_writing(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_ctrl_c_at_a_knob_stops_before_output(monkeypatch):
+def test_ctrl_c_at_a_knob_ends_the_procedure_before_output(monkeypatch):
     def abort(_question):
         raise KeyboardInterrupt
 
@@ -180,7 +180,7 @@ def test_a_target_that_is_not_a_folder_is_reported_before_any_question(tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_wrong_gain_is_found_at_5_mv_without_larger_output(tmp_path):
+def test_a_wrong_gain_is_found_with_an_output_of_5_mv_and_nothing_larger(tmp_path):
     (tmp_path / "faults.toml").write_text(
         '[[faults]]\nat_s = 0.0\nfault = "turn_amplifier_gain"\ngain_db = 16\n'
     )
@@ -211,7 +211,7 @@ def test_the_only_instrument_found_is_the_default_answer(tmp_path):
         ("generator.settle_s", "-5", r"generator\.settle_s"),
     ],
 )
-def test_an_impossible_bench_value_is_refused_without_writing(tmp_path, key, answer, said):
+def test_an_impossible_value_of_a_bench_is_refused_and_nothing_is_written(tmp_path, key, answer, said):
     def ask(question, choices, held):
         return answer if question.key == key else ""
 

@@ -42,7 +42,7 @@ def test_an_estimate_refuses_a_level_beyond_the_limits(refusal, tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_campaign_is_logged_and_catalogued_and_its_end_is_notified(vibench, tmp_path):
+def test_a_campaign_is_logged_and_catalogued_and_a_notice_is_sent_at_its_end(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
     measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)

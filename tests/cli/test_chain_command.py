@@ -21,7 +21,7 @@ def test_a_chain_without_drive_reports_bands_gaps_and_transmission():
     np.testing.assert_allclose(found["linear_transmission"]["3"], expected)
 
 
-def test_a_steady_chain_gives_results_per_cell_and_a_file(tmp_path):
+def test_a_steadily_driven_chain_gives_results_for_each_cell_and_a_file(tmp_path):
     options = ("--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.2, "--settle", 0.1)
     found = json_of("chain", *options, "--out", tmp_path / "out")
     (point,) = found["runs"]
@@ -50,7 +50,7 @@ def test_a_swept_chain_shows_its_band_gap_and_matches_the_linear_transmission():
         assert last[np.argmin(np.abs(over_hz - 405.0))] < 1e-3 * last[np.argmin(np.abs(over_hz - 520.0))]
 
 
-def test_several_chain_lengths_and_alternating_cells_can_be_computed():
+def test_chains_of_several_lengths_and_of_alternating_cells_can_be_computed():
     options = ("--amplitude", 20e-6, "--frequency", 220, "--duration", 0.1, "--settle", 0, "--gap", 20e-6)
     found = json_of("chain", "--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
     assert [each["cells"] for each in found["runs"]] == [1, 2, 3]

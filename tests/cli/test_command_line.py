@@ -240,7 +240,7 @@ def test_an_option_without_effect_is_refused(refusal, words, said):
     assert said in refusal(*words)
 
 
-def test_a_page_path_that_is_a_folder_is_refused_before_computation(refusal, tmp_path):
+def test_a_folder_given_as_path_of_the_page_is_refused_before_computation(refusal, tmp_path):
     (tmp_path / "pages").mkdir()
     said = refusal("reproduce", "--out", "new", "--markdown", "pages")
     assert "pages is a folder. Nothing was computed; give the name of a file" in said
@@ -259,7 +259,7 @@ def test_invalid_notify_options_are_refused_before_output(refusal, tmp_path, wor
 
 
 @pytest.mark.parametrize("name", [":smile:", "[red]rig[/red]", r"C:\[bold]", "[/]"])
-def test_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_path, name):
+def test_file_names_that_look_like_markup_are_printed_unchanged(vibench_here, tmp_path, name):
     refused = vibench_here("verify", f"{name}.h5", cwd=tmp_path)
     assert f"{name}.h5" in refused.stderr + refused.stdout
     bars = Progress(words("{task.description}"), console=errors)

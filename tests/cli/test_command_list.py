@@ -61,6 +61,6 @@ def test_a_command_loads_no_library_that_it_does_not_need(words, unneeded):
         assert process.stdout.index("Measure:") < process.stdout.index("Predict:")
 
 
-def test_a_command_group_loads_its_own_commands(output_of):
+def test_a_group_of_commands_can_load_its_commands(output_of):
     assert "vibench bench check [OPTIONS]" in output_of("bench", "check", "--help")
     assert isinstance(COMMANDS["bench"].load(), typer.Typer)

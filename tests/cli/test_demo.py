@@ -156,7 +156,7 @@ def test_the_demo_collision_region_begins_where_the_simulation_predicts(results)
         assert found["start"]["frequency_hz"] < 266 < 320 < found["stop"]["frequency_hz"]
 
 
-def test_peaks_of_demo_dwells_approach_the_terminal_resonances_with_rising_level(results):
+def test_the_peaks_of_demo_dwells_approach_the_terminal_resonances_as_the_level_rises(results):
     weak, moderate, strong = (
         results[f"dwell_{level}"]["measured"]["terminal_bands"] for level in ("weak", "moderate", "strong")
     )

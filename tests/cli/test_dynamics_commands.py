@@ -11,7 +11,7 @@ from vibench.sim import ArcEnd
 from .in_this_process import invoke, json_of, refusal_of
 
 
-def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_path):
+def test_branches_are_printed_as_json_and_stored_with_a_figure_and_tables(tmp_path):
     options = ("--frequency", "60:64", "--amplitude", "5e-6", "--places", 2, "--starts", 1)
     (branch,) = json_of("branches", *options, "--out", tmp_path / "out")["branches"]
     assert branch["points"][0]["frequency_hz"] == 60.0
@@ -54,7 +54,7 @@ def test_a_real_time_controller_extends_the_holdable_motions():
 
 
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
-def test_an_undamped_branch_gets_no_instability_or_bifurcation_from_rounding(options):
+def test_rounding_gives_an_undamped_branch_neither_instability_nor_bifurcation(options):
     line = ("--amplitude", 5e-6, "--frequency", "200:201", "--places", 2, "--starts", 1)
     found = json_of("branches", "--damping-time", 0, *line, *options)
     smooth = max(found["branches"], key=lambda each: len(each["points"]))
@@ -62,7 +62,7 @@ def test_an_undamped_branch_gets_no_instability_or_bifurcation_from_rounding(opt
     assert smooth["events"] == []
 
 
-def test_exponents_are_printed_as_json_and_written(tmp_path):
+def test_exponents_are_printed_as_json_and_stored_in_a_file(tmp_path):
     times = ("--duration", 1.5, "--settle", 0.5)
     found = json_of("spectrum", "--amplitude", 5e-6, "--frequency", 260, *times, "--out", tmp_path / "s")
     (point,) = found["points"]

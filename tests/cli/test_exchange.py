@@ -21,7 +21,7 @@ role = "m0_velocity"
 """
 
 
-def test_a_crate_keeps_a_folder_name_that_contains_a_dot(h5_path, tmp_path):
+def test_the_name_of_a_crate_keeps_a_dot_in_the_name_of_its_folder(h5_path, tmp_path):
     folder = tmp_path / "lauf 0.5Vpp"
     folder.mkdir()
     h5_path.rename(folder / "run.h5")
@@ -101,13 +101,13 @@ def test_an_export_into_a_folder_gets_the_default_file_name(run, h5_path, folder
         (("import", "run.h5", "--mapping", "map.toml"), "run.h5 exists, and nothing is ever overwritten"),
     ],
 )
-def test_invalid_exchanges_are_refused_without_leftovers(run, h5_path, arguments, said):
+def test_invalid_exports_and_imports_are_refused_without_leftovers(run, h5_path, arguments, said):
     h5_path.with_name("map.toml").write_text("sample_rate_hz = 1000.0\n" + MAPPING)
     assert said in str(run(*arguments).exception)
     assert sorted(each.name for each in h5_path.parent.iterdir()) == ["map.toml", "run.h5"]
 
 
-def test_a_refusal_is_one_sentence_on_standard_error(vibench, h5_path, tmp_path):
+def test_the_refusal_of_an_exchange_is_one_sentence_on_standard_error(vibench, h5_path, tmp_path):
     (tmp_path / "run.csv").touch()
     result = vibench("export", "run.h5", "--to", "csv", cwd=tmp_path)
     assert (result.returncode, result.stdout) == (1, "")

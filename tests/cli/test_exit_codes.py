@@ -64,13 +64,13 @@ def test_an_incomplete_or_unknown_command_line_exits_2(vibench_here, tmp_path, w
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 
 
-def test_a_second_path_is_refused_with_the_advice_to_give_one(vibench_here, tmp_path):
+def test_a_second_path_is_refused_with_the_advice_to_give_only_one(vibench_here, tmp_path):
     said = vibench_here("analyse", "a.h5", "b.h5", cwd=tmp_path).stderr
     assert "(b.h5); give one path, such as a folder" in " ".join(said.split())
 
 
 @pytest.mark.parametrize(("error", "remark"), [("0.1%", "needs about"), ("1e-6", "is not reachable")])
-def test_a_result_that_misses_the_requested_error_is_marked_and_exits_0(output_of, error, remark):
+def test_a_result_that_misses_the_requested_error_is_marked_and_the_command_exits_0(output_of, error, remark):
     assert remark in output_of("predict", *SCENE, "--error", error, "--time", "1s")
 
 

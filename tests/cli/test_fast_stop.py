@@ -63,7 +63,7 @@ def test_the_stop_command_takes_less_than_0_1_s_of_processor_time():
     ("words", "told"),
     [(("--level", "off", "--reason", "smoke"), "off smoke"), (("--level=abort",), "abort vibench stop")],
 )
-def test_the_fast_stop_delivers_the_stop_with_its_options(words, told):
+def test_the_fast_stop_command_delivers_the_stop_with_its_options(words, told):
     with driving_program("north") as north:
         said = vibench_stop(*words)
         assert said.returncode == 0

@@ -200,7 +200,7 @@ def test_a_check_finds_a_converter_that_omits_samples(bench_with, tmp_path):
         check_bench(bench, tmp_path)
 
 
-def test_a_failed_stop_warns_that_the_output_may_be_on(bench_with, tmp_path):
+def test_after_a_failed_stop_the_error_warns_that_the_output_may_be_on(bench_with, tmp_path):
     path = bench_with("generator", FaultyDriver(AFG1022_MODEL, "stop", raise_error))
     with pytest.raises(BrokenPromise, match="THE OUTPUT MAY STILL BE ON"), open_bench(path) as bench:
         check_bench(bench, tmp_path)
@@ -233,7 +233,7 @@ def test_a_failure_during_output_ends_in_silence_with_a_recorded_reason(bench_wi
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
-def test_an_error_while_closing_states_that_the_recording_is_complete(bench_with, kind, inside, outcome):
+def test_an_error_in_closing_a_bench_states_that_the_recording_is_complete(bench_with, kind, inside, outcome):
     path = bench_with(kind, FaultyDriver(inside, "close", run_then_raise))
     code, said = outcome(path)
     assert "recorded out/dwell.h5 (the plan was carried out)" in said

@@ -86,7 +86,7 @@ def test_every_shipped_example_has_a_unique_name(output_of):
         assert len(names) == len(set(names)), line
 
 
-def test_studies_are_listed_as_toml_files(output_of):
+def test_shipped_studies_are_listed_as_toml_files(output_of):
     listed = output_of("examples", "--json")["studies"]
     assert {Path(each).suffix for each in listed} == {".toml"}
 

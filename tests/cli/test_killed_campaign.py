@@ -43,7 +43,7 @@ def test_a_killed_and_resumed_campaign_records_every_point_once(tmp_path, points
 
 
 @pytest.mark.thorough
-def test_a_resumed_sweep_stays_on_its_branch_after_a_kill(tmp_path):
+def test_a_sweep_resumed_after_a_kill_stays_on_its_branch(tmp_path):
     plan, bench, out = branches(tmp_path), slow_rig(tmp_path), tmp_path / "out"
     reached = kill_at(command(plan, bench, out), out, 4, random.Random(1))
     assert 4 <= reached < 7, "killed on the way up"

@@ -55,7 +55,7 @@ def test_a_prediction_prints_a_table_and_the_reason_for_its_method(output_of):
     assert "\n300 Hz: event driven. No stop is touched, but the transient has not decayed" in printed
 
 
-def test_points_with_equal_explanations_share_one_line(output_of):
+def test_points_with_equal_explanations_are_printed_in_one_line(output_of):
     asked = ("--amplitude", 5e-6, "--frequency", "200:244:2", "--duration", 8, "--window", 1)
     told = [line for line in output_of("predict", *asked, "--explain").splitlines() if " points, " in line]
     assert [line.split(":")[0] for line in told] == ["11 points, 200 to 220 Hz", "12 points, 222 to 244 Hz"]
@@ -72,7 +72,7 @@ def test_metres_typed_instead_of_micrometres_give_a_warning_beside_the_answer(vi
     assert warning.endswith("give 5e-06")
 
 
-def test_a_failed_point_does_not_hide_the_results_of_other_points(vibench_here, tmp_path):
+def test_a_failed_point_does_not_suppress_the_results_of_other_points(vibench_here, tmp_path):
     chatter = ("--model", "rigid:1", "--gap", 1e-9, "--amplitude", 1e-3, "--duration", 0.3, "--window", 0.01)
     ran = vibench_here("predict", *chatter, "--frequency", "100:60100:60000", "--json", cwd=tmp_path)
     assert ran.returncode == 1
@@ -139,7 +139,7 @@ def test_a_requested_error_is_reached_and_reported(output_of):
     assert " % reached in " in output_of(*asked)
 
 
-def test_start_dependence_has_the_same_label_in_table_and_json(output_of):
+def test_start_dependence_has_the_same_label_in_the_table_and_in_json(output_of):
     asked = ("predict", "--amplitude", 5e-6, "--frequency", 260, "--error", "50 %")
     (point,) = output_of(*asked, "--json")["points"]
     (row,) = [each for each in output_of(*asked).splitlines() if "chaotic" in each]

@@ -119,7 +119,7 @@ def test_the_afg1022_driver_works_over_the_socket_of_a_served_rig(serve_rig_outp
     generator.close()
 
 
-def test_rig_time_advances_without_clients(serve_rig_output):
+def test_the_time_of_a_served_rig_advances_without_clients(serve_rig_output):
     address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
     with (
         grpc.insecure_channel(address) as channel,

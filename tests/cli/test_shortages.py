@@ -95,7 +95,7 @@ def test_every_command_is_refused_if_address_space_is_too_small(vibench_here, tm
         (ImportError("x.so: cannot open shared object file: Too many open files"), "cannot open more files"),
     ],
 )
-def test_a_wrapped_memory_error_is_reported(vibench_here, tmp_path, monkeypatch, wrapped, said):
+def test_a_memory_error_in_another_exception_is_reported(vibench_here, tmp_path, monkeypatch, wrapped, said):
     def run_out_of_memory(*_arguments, **_named):
         try:
             raise wrapped

@@ -149,7 +149,7 @@ def test_an_unknown_specimen_is_reported_in_one_sentence(vibench_here, tmp_path,
     assert "gong2025" in ended.stderr
 
 
-def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(output_of, tmp_path):
+def test_the_force_of_the_nearer_stop_is_drawn_on_the_side_of_that_stop(output_of, tmp_path):
     output_of("specimen", "asymmetric", "--forces", "drawn")
     (table,) = (tmp_path / "drawn").glob("contact_forces_hertz*.csv")
     text = table.read_text(encoding="utf-8")
@@ -171,7 +171,7 @@ def test_a_gap_in_micrometres_typed_as_metres_gives_a_warning(vibench_here, tmp_
     assert "if 30 micrometres were meant, give 3e-05" in said
 
 
-def test_the_forces_of_all_laws_are_drawn(output_of, tmp_path):
+def test_the_forces_of_all_contact_laws_are_drawn(output_of, tmp_path):
     output_of("specimen", "--forces", "drawn")
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000
 

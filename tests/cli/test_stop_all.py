@@ -151,7 +151,7 @@ def test_a_program_from_before_a_restart_is_reported_until_its_bench_is_silent(v
 
 
 @pytest.mark.parametrize("given", ["", "given"])
-def test_a_program_is_found_from_every_folder(vibench_here, tmp_path, monkeypatch, given):
+def test_a_running_program_is_found_from_every_working_folder(vibench_here, tmp_path, monkeypatch, given):
     monkeypatch.delenv("VIBENCH_STATE_DIR")
     monkeypatch.setenv("XDG_STATE_HOME", given)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))

@@ -113,7 +113,7 @@ def test_a_stop_during_a_cooling_pause_ends_the_campaign(vibench_here, tmp_path,
 @pytest.mark.parametrize(
     "level", ["off", *(pytest.param(each, marks=pytest.mark.thorough) for each in ("ramp", "abort"))]
 )
-def test_a_stop_of_a_held_run_keeps_its_recording_and_ends_in_silence(vibench_here, tmp_path, level):
+def test_stopping_a_held_run_keeps_its_recording_and_ends_in_silence(vibench_here, tmp_path, level):
     with measuring_program(tmp_path, first_s=LONG_S, rest_s=0.0) as program:
         until(program, is_dwelling)
         assert vibench_here("stop", "--level", "hold", cwd=tmp_path).returncode == 0
@@ -165,7 +165,7 @@ def test_a_campaign_stopped_during_its_check_is_reported(vibench_here, tmp_path,
 
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
-def test_a_second_ctrl_c_states_that_the_output_is_off(tmp_path):
+def test_after_a_second_ctrl_c_the_command_states_that_the_output_is_off(tmp_path):
     with measuring_program(tmp_path, first_s=LONG_S, rest_s=0.0, ramp_s=5.0) as program:
         until(program, is_dwelling)
         program.send_signal(signal.SIGINT)

@@ -49,7 +49,7 @@ def test_every_command_refuses_or_warns_about_an_altered_recording_without_its_s
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("how", [pytest.param("copied over", marks=pytest.mark.slow), "sealed anew"])
-def test_a_swapped_recording_is_refused_by_every_command(folder, how):
+def test_a_recording_swapped_for_another_is_refused_by_every_command(folder, how):
     write_journal(folder)
     assert [each.split(":")[0] for each in fooled_readers(folder, "dwell.h5")] == list(READERS)
     if how == "copied over":

@@ -53,7 +53,7 @@ def wait(engine, state):
 
 @pytest.mark.thorough
 @sees_locks
-def test_a_run_can_be_held_released_and_stopped_from_another_terminal(
+def test_a_run_can_be_held_and_released_and_stopped_from_another_terminal(
     running, vibench, vibench_here, tmp_path
 ):
     seen = json.loads(vibench("watch", "--json", cwd=tmp_path).stdout)["engines"]
@@ -187,7 +187,7 @@ class TestWithoutAnEngine:
         assert check.returncode == 3
 
 
-def test_two_stop_switches_of_one_process_are_both_reached(tmp_path):
+def test_a_stop_reaches_both_of_two_runs_in_one_process(tmp_path):
     first, second = StopSwitch(), StopSwitch()
     with stop_on_signal(first, "first"), stop_on_signal(second, "second"):
         (program,) = announced_programs(Program)

@@ -292,7 +292,7 @@ def in_a_menu(bench):
 
 
 @pytest.mark.parametrize("place", [on_the_banner, on_a_plot, in_a_field, in_a_modal_dialog, in_a_menu])
-def test_esc_silences_the_drive_from_any_focus(bench, qtbot, place):
+def test_esc_silences_the_drive_whichever_widget_has_the_focus(bench, qtbot, place):
     start_dwell(bench, qtbot, place.__name__)
     focus = place(bench)
     began_s = time.monotonic()
@@ -325,7 +325,7 @@ def test_a_hold_keeps_the_drive_on_and_a_stop_ramps_it_down(bench, qtbot):
     assert "carried out" not in bench.pages[RUN].summary.sentence + said[-1]
 
 
-def test_the_live_plots_show_the_run(bench, qtbot):
+def test_the_live_plots_show_data_of_the_run(bench, qtbot):
     bench.show_page(RUN)
     start_dwell(bench, qtbot, "live")
     page = bench.pages[RUN]

@@ -15,7 +15,7 @@ class Bell(QObject):
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 12), reason="None and True are immortal from Python 3.12 on")
-def test_qt_calls_keep_the_reference_counts_of_none_and_true(qtbot):
+def test_qt_calls_do_not_change_the_reference_counts_of_none_and_true(qtbot):
     widget, bell = QWidget(), Bell()
     qtbot.addWidget(widget)
     before = sys.getrefcount(None), sys.getrefcount(True)

@@ -99,7 +99,7 @@ def test_a_sweep_is_recorded_as_planned(bench, tmp_path):
     assert {each.what: each.verdict.value for each in found.checks}["Sweep as planned"] == "passed"
 
 
-def test_noise_is_recorded_without_lost_realisations(bench, tmp_path):
+def test_noise_is_recorded_without_the_loss_of_a_realisation(bench, tmp_path):
     excitation = WhiteNoise(
         amplitude_vpp=level(bench), band_start_hz=50, band_stop_hz=600, repetition_hz=2, periods=4,
         realisations=2, settle_s=1.0,

@@ -95,13 +95,13 @@ def test_a_claim_fails_if_one_number_is_out_of_bounds():
     assert judge({2e-5: (201.5, 437.0)}, *wanted, tried=()).verdict is Verdict.FAILS
 
 
-def test_a_nan_value_meets_no_expectation():
+def test_a_measured_value_of_nan_meets_no_expectation():
     anything = Expectation("peak", "Hz", -math.inf, math.inf)
     assert judge({2e-5: (math.nan,)}, anything, tried=()).verdict is Verdict.FAILS
 
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
-def test_expectation_bounds_include_their_ends(low, width, value):
+def test_the_bounds_of_an_expectation_include_their_ends(low, width, value):
     wanted = make(no_studies, Expectation("anything", "", low, low + width))
     assert wanted.is_met_by((low,))
     assert wanted.is_met_by((low + width,))
@@ -113,12 +113,12 @@ def test_expectation_bounds_in_the_wrong_order_are_refused():
         Expectation("peak", "Hz", 2.0, 1.0)
 
 
-def test_a_measure_must_give_a_number_for_each_expectation():
+def test_the_measurement_of_a_claim_must_give_a_number_for_each_expectation():
     with pytest.raises(InvalidRequest, match="requires 1 numbers, but 2"):
         judge({2e-5: (1.0, 2.0)}, at_least("one", "", 0.0))
 
 
-def test_an_option_changes_only_its_own_setting():
+def test_an_option_of_the_paper_changes_only_its_own_setting():
     assert DAMPED.of(CASE) == replace(CASE, name=DAMPED.name, damping_time_s=3e-5)
     for alternative, changes in (
         (change("log", LogarithmOf.NORMALISED), {"logarithm_of": LogarithmOf.NORMALISED}),

@@ -20,14 +20,14 @@ def test_peaks_with_little_damping_are_at_the_natural_frequencies():
     np.testing.assert_allclose(bound_peaks(specimen, 5.0, 605.0), specimen.bound_frequencies_hz, atol=0.02)
 
 
-def test_ripples_are_not_peaks_and_missing_points_are_skipped():
+def test_small_ripples_do_not_count_as_peaks_and_missing_points_are_skipped():
     rough = resonances(200.0, 435.0) * (1.0 + 0.1 * np.sin(GRID))
     np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
     rough[3] = np.nan
     np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
 
 
-def test_the_two_highest_peaks_are_sorted_and_the_third_height_is_relative():
+def test_the_two_highest_peaks_are_sorted_and_the_height_of_the_third_is_relative():
     first, second, following = two_highest(GRID, resonances(100.0, 300.0, 500.0, heights=(2.0, 9.0, 8.0)))
     assert (first, second) == (300.0, 500.0)
     assert following == pytest.approx(2.0 / 8.0, rel=0.05)

@@ -48,7 +48,7 @@ def test_ode45_has_errors_of_the_size_of_its_tolerances():
     assert errors[2] < 1e-6
 
 
-def test_motions_computed_together_equal_motions_computed_singly():
+def test_motions_computed_together_equal_motions_computed_one_by_one():
     starts = np.array([MOVING, 2.0 * MOVING, -MOVING])
     for method in (ode45(), runge_kutta(2e-6)):
         together = textbook_states(gong2025(), DRIVE, method, 5e-4, starts)
@@ -57,7 +57,7 @@ def test_motions_computed_together_equal_motions_computed_singly():
             assert state_error(end, textbook_states(gong2025(), DRIVE, method, 5e-4, [start])[0]) < 1e-8
 
 
-def test_ode45_conserves_impact_energy_and_long_runge_kutta_steps_do_not():
+def test_ode45_conserves_energy_at_impacts_and_long_runge_kutta_steps_do_not():
     kept = [energy_ratios(ode45(), each, np.zeros(1))[0] for each in (0.03, 0.1, 0.3)]
     np.testing.assert_allclose(kept, 1.0, atol=0.01)
     mean = energy_ratios(runge_kutta(2e-5), 0.03, np.linspace(0, 2e-5, 20)).mean()

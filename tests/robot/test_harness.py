@@ -40,7 +40,7 @@ def test_the_robot_finds_numbers_that_do_not_match_the_inputs(robot):
     assert "type_value" in found
 
 
-def test_the_robot_finds_unexpected_errors_of_another_process(robot, tmp_path):
+def test_the_robot_finds_unexpected_errors_in_another_process(robot, tmp_path):
     with (tmp_path / "stderr").open("w+") as told, (tmp_path / "stderr").open() as robot.errors:
         subprocess.run([sys.executable, "-c", "print(0)"], stderr=told, stdout=told, check=True)
         robot.read_errors()

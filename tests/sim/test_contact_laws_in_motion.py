@@ -110,7 +110,7 @@ def test_a_free_oscillator_with_a_power_law_has_its_closed_form_period(exponent)
 
 
 @pytest.mark.parametrize("contact", ["power:3", "power:47"])
-def test_every_engine_gives_the_same_free_motion(contact):
+def test_every_engine_gives_the_same_motion_without_drive(contact):
     specimen, start = paper(contact), [0.0, 20e-6, -30e-6, 0.0, 0.0, 0.0]
     harmonic = integrate(specimen, STILL, 0.01, Accuracy.REFERENCE, start)
     sampled = integrate(specimen, Sampled(np.zeros(600), 51_200.0), 0.01, Accuracy.REFERENCE, start)

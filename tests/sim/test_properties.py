@@ -55,7 +55,7 @@ def noise(seed, rate=20_000.0, duration_s=0.03):
     is_upper=st.booleans(),
     drive=st.sampled_from([Harmonic(40.0, 2e-3), Harmonic(170.0, 50e-6), Harmonic(430.0, 1e-4)]),
 )
-def test_an_unreached_stop_has_no_effect(contact, place, gap_m, is_upper, drive):
+def test_a_stop_that_is_not_reached_has_no_effect(contact, place, gap_m, is_upper, drive):
     """Without an upper stop, p once passed through the lower stop while moving upwards."""
     far, none = ((gap, gap_m) if is_upper else (gap_m, gap) for gap in (1.0, math.inf))
     start = np.array([*place, 0.0, 0.0, 0.0])
@@ -114,7 +114,7 @@ def scaled_specimen(specimen, length, time, mass):
     time=st.floats(-3.0, 3.0).map(lambda power: 10.0**power),
     mass=st.floats(-6.0, 6.0).map(lambda power: 10.0**power),
 )
-def test_motion_scales_with_the_units_of_length_time_and_mass(contact, length, time, mass):
+def test_a_motion_scales_with_the_units_of_length_and_time_and_mass(contact, length, time, mass):
     specimen = paper(contact)
     scaled = scaled_specimen(specimen, length, time, mass)
     drive = Harmonic(DRIVE.frequency_hz / time, DRIVE.amplitude_m * length)

@@ -100,7 +100,7 @@ def test_observables_and_accuracy_may_be_given_as_text():
     ).starts == (study.Start.UP,)
 
 
-def test_type_hints_list_every_text_value_of_an_enum():
+def test_type_hints_list_every_value_of_an_enum_that_may_be_given_as_text():
     for case in enum_parameters():
         function, parameter, kind = case.values
         if inspect.isfunction(function):

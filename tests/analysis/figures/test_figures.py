@@ -90,7 +90,7 @@ def test_files_saved_with_a_figure_contain_its_numbers(noise_file, tmp_path):
     assert numbers(sines)["response_i"].size == found.overlay.prediction.frequency_hz.size
 
 
-def test_drawing_a_figure_twice_gives_identical_files(noise_file):
+def test_drawing_the_same_figure_twice_gives_identical_files(noise_file):
     found = result(noise_file(), Simulation.LEFT_OUT)
     drawn = [transmission_figure(found.analysis).svg for _ in range(2)]
     assert drawn[0] == drawn[1]
@@ -139,7 +139,7 @@ def test_frequencies_marked_above_a_sweep_are_within_its_range(sweep_file):
     assert not np.isfinite(places[:, 0]).any(), f"{beyond} Hz are drawn at the ends of {low:g} to {high:g} Hz"
 
 
-def test_a_sweep_finding_states_the_sweep_rate_once(sweep_file):
+def test_the_report_sentence_of_a_sweep_states_the_sweep_rate_once(sweep_file):
     found = result(sweep_file, Simulation.LEFT_OUT)
     (finding,) = sweep_findings(found)
     rate = abs(found.analysis.response.sweep_rate_hz_per_s)
@@ -222,7 +222,7 @@ def test_every_excitation_can_be_drawn_before_output(plan):
     ("largest", "expected"),
     [(5e-6, (1e6, "µm")), (0.02, (1e3, "mm")), (3.0, (1.0, "m")), (1e-12, (1e9, "nm"))],
 )
-def test_unit_prefixes_give_values_between_1_and_1000(largest, expected):
+def test_unit_prefixes_are_chosen_for_values_between_1_and_1000(largest, expected):
     factor, unit = with_prefix(largest, "m")
     assert factor == pytest.approx(expected[0])
     assert unit == expected[1]

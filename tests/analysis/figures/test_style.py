@@ -40,5 +40,5 @@ def test_axes_that_span_less_than_a_decade_show_intermediate_numbers():
     assert {"$4\\cdot10^{-5}$", "$6\\cdot10^{-5}$"} <= {text for text, *_ in _numbers(3e-5, 7e-5)}
 
 
-def test_axes_over_many_decades_show_only_powers_of_ten():
+def test_axes_that_span_many_decades_show_only_powers_of_ten():
     assert all(np.log10(float(text)) % 1 == 0 for text, *_ in _numbers(0.005, 50))

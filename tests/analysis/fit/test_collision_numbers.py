@@ -24,7 +24,7 @@ def collision_analysis(tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_unequal_gaps_are_found_although_the_specimen_file_states_equal_gaps(collision_analysis):
+def test_unequal_gaps_are_found_even_if_the_specimen_file_states_equal_gaps(collision_analysis):
     updated = update_model(collision_analysis)
     lower, upper = updated.collisions.gaps
     assert lower.low <= 35e-6 <= lower.high
@@ -43,7 +43,7 @@ def test_unequal_gaps_are_found_although_the_specimen_file_states_equal_gaps(col
 
 
 @pytest.mark.thorough
-def test_a_motion_that_contradicts_the_masses_gives_no_gap(collision_analysis):
+def test_a_motion_that_contradicts_the_described_masses_gives_no_gap(collision_analysis):
     """The motion determines m1 and the springs only relative to m0 and m2, which must be correct."""
     m0, m1, m2 = TRUE.masses
     found, why = track_recordings(collision_analysis, replace(TRUE, masses=(1.04 * m0, m1, m2)))

@@ -45,7 +45,7 @@ def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful
     assert np.all(width[:2] < 1.4 * best)
 
 
-def test_uninformative_statistics_leave_the_bounds_as_wide_as_the_prior(cases):
+def test_uninformative_statistics_leave_bounds_as_wide_as_those_of_the_prior(cases):
     wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
     assert np.median(wide) > 0.85 * 2.0
 
@@ -58,7 +58,7 @@ def test_no_fit_is_reported_for_statistics_that_no_parameters_can_produce(cases)
     assert not posterior(runs, strange, BOX, 5, ROUNDS).fits
 
 
-def test_the_true_model_is_rarely_rejected_when_few_reference_runs_exist():
+def test_the_true_model_is_rarely_rejected_even_with_few_reference_runs():
     """With the distances of the 80 regression runs as reference, two in five true runs were once rejected."""
     refused, runs, statistics = 0, 80, 60
     for seed in range(12):
@@ -70,7 +70,7 @@ def test_the_true_model_is_rarely_rejected_when_few_reference_runs_exist():
     assert refused <= 1
 
 
-def test_an_unchanged_parameter_box_is_not_sampled_again():
+def test_the_same_ranges_of_parameters_are_not_sampled_again():
     """Noise without parameters leaves the parameter box unchanged, so two sets of 60 runs suffice."""
     rng, made = np.random.default_rng(7), []
 

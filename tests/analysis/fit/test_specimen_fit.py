@@ -122,7 +122,7 @@ def test_fit_intervals_have_their_stated_coverage_and_width(true):
 
 
 @pytest.mark.thorough
-def test_fit_intervals_hold_with_scatter_from_three_realisations(true):
+def test_fit_intervals_hold_if_the_scatter_is_estimated_from_three_realisations(true):
     """Few spectral lines determine the damping, and the scatter of each line is known to 50 % only."""
     rng, held, draws = np.random.default_rng(2), [], 120
     for _ in range(draws):
@@ -146,7 +146,7 @@ def test_noise_of_any_level_neither_rejects_a_true_model_nor_makes_the_fit_diver
     assert all(each.endswith("measure longer or with more drive") for each in said)
 
 
-def test_channel_high_pass_and_delay_do_not_bias_the_fit(true):
+def test_the_high_pass_and_the_delay_of_a_channel_do_not_bias_the_fit(true):
     clean = transmission(true, np.random.default_rng(6), sd=1e-3)
     turned = 0.5 / LINES_HZ + 2 * np.pi * LINES_HZ * 20e-6
     fit = fit_specimen(replace(clean, value=clean.value * np.exp(1j * turned)), NOMINAL)
@@ -207,7 +207,7 @@ def test_a_fit_with_one_wrong_assumption_is_rejected_and_the_assumption_named_as
         assert abs(mended.value - parameter_value(other, free)) < 4 * mended.sd
 
 
-def test_indistinguishable_causes_are_named_together(true):
+def test_causes_that_cannot_be_distinguished_are_named_together(true):
     """At one level of linear motion a damper and friction have the same effect."""
     other = with_values(true, {Parameter.C0: 3.0 * parameter_value(true, Parameter.C0)})
     fit = fit_specimen(transmission(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
@@ -247,7 +247,7 @@ def test_the_reduced_chi_square_of_a_true_model_is_one_even_with_few_averages(tr
     assert fit.reduced_chi_square == pytest.approx(1.0, abs=4 / math.sqrt(lines_hz.size))
 
 
-def test_a_fit_finds_a_specimen_far_from_its_description():
+def test_a_fit_finds_the_values_of_a_specimen_far_from_its_description():
     far = with_values(NOMINAL, {name: value * 1.07 for name, value in TRUE.items()})
     fit = fit_specimen(transmission(far, np.random.default_rng(3)), NOMINAL)
     for name in LINEAR:

@@ -98,7 +98,7 @@ def test_a_fit_without_usable_statistics_gives_a_reason(noisy_dwell, specimen, s
         statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
 
 
-def test_mirrored_motion_flips_the_even_harmonics_of_its_statistics():
+def test_mirroring_a_motion_changes_the_sign_of_even_harmonics_in_its_statistics():
     rate_hz, time_s = 20_000.0, np.arange(40_000) / 20_000.0
     turn = 2 * math.pi * 250.0 * time_s
     base = np.sin(turn) + 1e-3 * np.random.default_rng(1).standard_normal(turn.size)
@@ -117,7 +117,7 @@ def test_mirrored_motion_flips_the_even_harmonics_of_its_statistics():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_statistics_determine_the_gap_of_an_untrackable_motion(noisy_dwell):
+def test_statistics_determine_the_gap_from_a_motion_that_cannot_be_tracked(noisy_dwell):
     updated = update_model(analyse_files([noisy_dwell.path], "buried", Simulation.LEFT_OUT))
     gap = {each.what: each for each in updated.collisions.determined}[Hidden.MEAN_GAP]
     assert holds(gap, 51e-6)
@@ -129,7 +129,7 @@ def test_statistics_determine_the_gap_of_an_untrackable_motion(noisy_dwell):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1700)
-def test_bounds_from_statistics_hold_on_random_specimens():
+def test_bounds_from_statistics_hold_for_random_specimens():
     """Check thirty random specimens; `--seed` and `--shard` of the benchmark select others."""
     place = Path(__file__).parents[3] / "benchmarks" / "posterior_coverage.py"
     told = subprocess.run(

@@ -29,7 +29,7 @@ def update(weak_noise):
     return update_model(analyse_files([weak_noise], "weak", Simulation.LEFT_OUT))
 
 
-def test_a_correct_description_of_a_rig_fits_its_recordings(update):
+def test_a_correctly_described_rig_fits_its_recordings(update):
     assert update.fits
     assert update.linear.reduced_chi_square < update.linear.limit
     assert update.table.mass_kg == pytest.approx(TRUE_KG, abs=3.3 * update.table.sd_kg)

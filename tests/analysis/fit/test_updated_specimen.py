@@ -90,7 +90,7 @@ def test_fitted_intervals_are_narrow_enough_to_be_useful(fitted_model):
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_frequency_is_the_frequency_of_the_first_impact(recordings, campaign):
+def test_the_onset_frequency_of_collisions_is_that_of_the_first_impact(recordings, campaign):
     (onset,) = onsets(campaign.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recordings[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
@@ -154,7 +154,7 @@ def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_o
     assert found.low <= 45e-6 <= found.high
 
 
-def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
+def test_dwells_below_and_above_the_onset_of_collisions_bound_the_gap(dwell_file):
     results = analyse_files([dwell_file("weak"), dwell_file("strong")], "dwells", Simulation.LEFT_OUT)
     dwells = [each.analysis for each in results.dwells]
     (bracket,) = brackets(dwells, gong2025())

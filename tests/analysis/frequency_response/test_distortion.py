@@ -64,7 +64,7 @@ def analyse_with(tmp_path_factory):
     return record_and_analyse
 
 
-def test_driven_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
+def test_the_driven_spectral_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
     quiet, noisy = (analyse_with(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
     driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
     np.testing.assert_array_equal(driven, quiet.excitation.excited_lines)
@@ -84,7 +84,7 @@ def test_a_square_nonlinearity_distorts_even_lines_and_a_cubic_one_odd_lines(ana
     assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
 
 
-def test_an_undistorted_response_leaves_only_the_added_noise_as_remainder(analyse_with):
+def test_the_remainder_of_an_undistorted_response_is_only_the_added_noise(analyse_with):
     found = distortion(analyse_with(np.zeros_like).response.periodic)
     # White noise of variance s^2 adds 4 s^2 / (averaged samples) to a squared amplitude.
     expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))

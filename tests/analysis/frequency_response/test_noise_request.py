@@ -30,7 +30,7 @@ def response(path, **asked):
 @pytest.mark.parametrize(
     ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]
 )
-def test_an_estimator_biased_by_noise_gives_a_remark(streamed_noise, tmp_path, estimator, biased_by, noisy):
+def test_a_biased_estimate_has_a_remark_on_the_noise(streamed_noise, tmp_path, estimator, biased_by, noisy):
     plan, base, velocity, parts = streamed_noise
     rng = np.random.default_rng(4)
     if noisy == "base":
@@ -67,7 +67,7 @@ def test_the_requested_number_of_averages_is_reached_and_hardly_exceeded(streame
     window=st.sampled_from(Window),
     overlap=st.floats(0, 0.8),
 )
-def test_the_longest_segment_still_gives_the_requested_averages(samples, averages, window, overlap):
+def test_the_longest_allowed_segment_gives_the_requested_averages(samples, averages, window, overlap):
     segment = longest_segment(samples, averages, window, overlap)
     if segment < 32:
         return
@@ -135,14 +135,14 @@ def test_an_invalid_noise_request_names_the_allowed_values(asked, said):
         ({"segment_s": 1e308}, "inf s"),
     ],
 )
-def test_a_resolution_too_fine_for_the_record_is_refused(streamed_file, asked, length):
+def test_a_frequency_resolution_too_fine_for_the_record_is_refused(streamed_file, asked, length):
     with pytest.raises(
         NotEnoughData, match=f"20 s of noise were recorded, less than two segments of the {length}"
     ):
         response(streamed_file(), **asked)
 
 
-def test_a_displacement_ratio_converts_to_the_named_quantities(streamed_file):
+def test_a_displacement_ratio_is_converted_to_the_requested_quantities(streamed_file):
     found = response(streamed_file()).frequency_response
     view = parse_view("velocity/acceleration", MagnitudeScale.DECIBEL)
     shown = view.apply(found)

@@ -141,7 +141,7 @@ def _z(found, natural_hz, damping):
 
 
 @pytest.mark.thorough
-def test_a_mode_narrower_than_a_line_keeps_its_damping_within_bounds():
+def test_the_damping_of_a_mode_narrower_than_a_spectral_line_is_within_its_bounds():
     modes = [(95.0, 0.0012), (266.0, 0.0033)]
     errors = []
     for seed in range(2):
@@ -167,7 +167,7 @@ def test_bounds_of_streamed_noise_hold_under_every_window(window):
     ("apart_hz", "shares"),
     [(2.0, (1.0, 1.0)), (4.0, (1.0, 0.4)), (2.0, (1.0, -0.7)), (4.0, (1.0, 0.6, 1.0))],
 )
-def test_close_modes_are_separated(apart_hz, shares):
+def test_modes_with_close_frequencies_are_separated(apart_hz, shares):
     modes = [(200 + apart_hz * place, 0.01, share) for place, share in enumerate(shares)]
     found = resonances(_streamed(np.random.default_rng(16), modes, 0.01), low_hz=150, high_hz=250)
     assert len(found) > 1
@@ -178,7 +178,7 @@ def test_close_modes_are_separated(apart_hz, shares):
 @pytest.mark.parametrize(
     ("shares", "seed", "draw"), [((1.0, -0.7), 77, 0), ((1.0, -0.7), 77, 3), ((1.0, 0.6, 1.0), 777, 2)]
 )
-def test_bounds_of_close_modes_hold(shares, seed, draw):
+def test_the_bounds_of_modes_with_close_frequencies_hold(shares, seed, draw):
     coverage = runpy.run_path(str(Path(__file__).parents[3] / "benchmarks" / "resonance_coverage.py"))
     (number, scene) = next(
         (number, scene)
@@ -191,7 +191,7 @@ def test_bounds_of_close_modes_hold(shares, seed, draw):
 
 
 @pytest.mark.thorough
-def test_a_poor_resonance_fit_reports_its_chi_square():
+def test_a_poor_fit_of_a_resonance_reports_its_chi_square():
     lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
     # An alternating error of 15 % on pairs of lines cannot be fitted by three modes.
     pairs = 1 + 0.15 * (-1.0) ** (np.arange(lines.value.size) // 2)
@@ -272,7 +272,7 @@ def test_bounds_of_every_mode_hold_with_two_realisations_of_noise(accelerometer)
 
 
 @pytest.mark.thorough
-def test_correlated_lines_widen_resonance_bounds():
+def test_correlated_spectral_lines_widen_the_bounds_of_a_resonance():
     """Collisions correlate lines; fits that assume independent lines cover less than 60 %."""
     frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 30
     rng, independent, together = np.random.default_rng(13), 0, 0
@@ -314,7 +314,7 @@ def test_a_resonance_in_one_realisation_only_is_rejected():
     assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
-def test_leave_one_out_fits_with_other_modes_do_not_count_as_scatter():
+def test_leave_one_out_fits_with_another_number_of_modes_do_not_count_as_scatter():
     """Seven of twelve leave-one-out fits use all modes, as the full fit does; five use this mode alone."""
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 183.2, 0.06)), low_hz=100, high_hz=300)

@@ -110,7 +110,7 @@ def test_noise_on_the_drive_biases_h1_and_noise_on_the_response_biases_h2_by_the
 
 @settings(max_examples=20, deadline=None)
 @given(power=st.floats(-6, 6))
-def test_hv_does_not_depend_on_the_unit_of_the_response(power):
+def test_the_estimator_hv_does_not_depend_on_the_unit_of_the_response(power):
     scale = 10**power
     x, extra = noise(9, 2, 4000)
     y = 0.4 * x + 0.3 * extra
@@ -121,7 +121,7 @@ def test_hv_does_not_depend_on_the_unit_of_the_response(power):
     np.testing.assert_allclose(scaled.value / scale, base.value, rtol=1e-9)
 
 
-def test_a_known_delay_is_removed_from_the_phase():
+def test_a_known_delay_is_removed_from_the_phase_of_a_transmission():
     x = noise(11, 60_003)
     result = transmissibility(x[3:], x[:-3], RATE, segment_samples=1024)
     line = 40
@@ -132,7 +132,7 @@ def test_a_known_delay_is_removed_from_the_phase():
     assert straight.settings.delay_s == 3 / RATE
 
 
-def test_gaps_reduce_the_number_of_segments_but_not_the_coherence():
+def test_gaps_in_the_samples_reduce_the_number_of_segments_but_not_the_coherence():
     x = noise(14, 200_000)
     y = 2 * x
     valid = np.ones(x.size, dtype=bool)
@@ -147,7 +147,7 @@ def test_gaps_reduce_the_number_of_segments_but_not_the_coherence():
     assert result.segments_used + touched == 399
 
 
-def test_gaps_reduce_the_effective_averages():
+def test_gaps_in_the_samples_reduce_the_effective_number_of_averages():
     """Without every second segment the half-overlapped segments are independent."""
     x = noise(15, 10_000)
     valid = np.ones(x.size, dtype=bool)
@@ -177,7 +177,7 @@ def test_an_invalid_transmission_request_names_the_allowed_values(choice, says):
         transmissibility(noise(16, 1000), noise(17, 1000), RATE, segment_samples=100, **choice)
 
 
-def test_one_segment_is_not_enough_for_a_coherence():
+def test_a_single_segment_is_not_enough_for_a_coherence():
     with pytest.raises(NotEnoughData, match="at least 2"):
         transmissibility(noise(18, 150), noise(19, 150), RATE, segment_samples=100, overlap=0.0)
     with pytest.raises(NotEnoughData, match="no whole valid segment"):
@@ -196,7 +196,7 @@ def test_channels_of_different_length_are_refused():
         transmissibility(noise(22, 1000), noise(23, 999), RATE, segment_samples=100)
 
 
-def test_a_line_without_drive_has_no_transmission_and_is_not_significant():
+def test_a_spectral_line_without_drive_has_no_transmission_and_is_not_significant():
     time = np.arange(4000) / RATE
     x = np.sin(2 * np.pi * 128 * time)
     result = transmissibility(np.zeros_like(x), x, RATE, segment_samples=1000)

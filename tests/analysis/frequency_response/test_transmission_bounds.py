@@ -48,5 +48,5 @@ def require_coverage(estimator, overlap, averages, repeats):
 
 @pytest.mark.parametrize("estimator", list(Estimator))
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
-def test_bounds_from_hann_segments_contain_the_truth_in_95_percent(estimator, overlap):
+def test_bounds_from_hann_segments_contain_the_true_value_in_95_percent_of_cases(estimator, overlap):
     require_coverage(estimator, overlap, averages=12, repeats=150)

@@ -41,7 +41,7 @@ def test_the_alarm_for_a_specimen_change_is_given_once():
     assert watch.has_changed
 
 
-def test_the_false_alarm_rate_is_within_its_bound():
+def test_the_rate_of_false_change_alarms_is_within_its_bound():
     """Lorden's bound on the false alarm rate is met; with 30 % of blocks out, alarms are frequent."""
     rng = np.random.default_rng(8)
     day = np.where(rng.random(10 * 36_000) < 0.01, OUT, WITHIN)
@@ -53,7 +53,7 @@ def test_the_false_alarm_rate_is_within_its_bound():
     assert all(often)
 
 
-def test_the_usual_residual_is_learnt_in_two_seconds():
+def test_the_usual_residual_of_the_twin_is_learnt_in_two_seconds():
     rng = np.random.default_rng(9)
     watch = ChangeWatch()
     levels = 0.9 + 0.02 * rng.standard_normal(20)
@@ -63,7 +63,7 @@ def test_the_usual_residual_is_learnt_in_two_seconds():
     assert [watch.take(2.0) for _ in range(5)][-1]
 
 
-def test_a_baseline_is_stored_and_an_unreadable_baseline_is_ignored(tmp_path, monkeypatch, virtual_rig):
+def test_a_baseline_file_is_stored_and_an_unreadable_one_is_ignored(tmp_path, monkeypatch, virtual_rig):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     path = baseline_path(virtual_rig, gong2025())
     assert path != baseline_path(virtual_rig, gong2025(gap_m=46e-6))

@@ -26,14 +26,14 @@ def impacts(spread, error_m=0.0, loss_s_per_m=0.0, count=400):
     )
 
 
-def test_differing_impacts_determine_gaps():
+def test_impacts_that_differ_determine_the_gaps():
     for gap in free_gaps(impacts(0.5, error_m=1e-7)):
         assert gap.value_m == pytest.approx(GAP_M, abs=2 * gap.sd_m)
         assert gap.sd_m < 0.3e-6
 
 
 @pytest.mark.parametrize("error_m", [0.0, 1e-7, 4e-7])
-def test_identical_impacts_determine_no_gap(error_m):
+def test_impacts_that_are_all_alike_determine_no_gap(error_m):
     """A settled motion once gave a gap of (48.0 +- 1.1) um for 45: one point determines no line."""
     alike = impacts(0.03, error_m)
     assert free_gaps(alike) == (None, None)

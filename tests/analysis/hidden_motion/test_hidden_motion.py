@@ -112,7 +112,7 @@ def test_a_motion_against_a_one_sided_stop_is_tracked_and_its_gap_identified(wor
 
 
 @pytest.mark.thorough
-def test_chattering_is_tracked_without_a_contact_model(world_recording):
+def test_chatter_between_the_stops_is_followed_without_a_contact_model(world_recording):
     """The motion has five impacts per period, most of them with hardly any flight between them."""
     one_sided = gong2025(gap_m=(30e-6, np.inf))
     recorded = world_recording(260.0, 1.5, seed=11, duration_s=2.6, specimen=one_sided)
@@ -172,7 +172,7 @@ def test_wrong_values_of_the_gaps_and_m1_are_corrected_from_the_motion(world_rec
 
 
 @pytest.mark.thorough
-def test_bounds_hold_at_a_low_sample_rate_without_noise(world_recording):
+def test_the_bounds_of_parameters_hold_at_a_low_sample_rate_without_noise(world_recording):
     """Gaps were once 1.8 bounds off, and dampers 1.2."""
     recorded = world_recording(260.0, 1.5, duration_s=3.4, noise=0.0, rate_hz=12_800.0)
     found = [each for each in estimate(recorded).parameters if each.is_determined]
@@ -238,7 +238,7 @@ def test_parameters_of_an_unstable_track_are_not_reported(world_recording):
 
 
 @pytest.mark.thorough
-def test_unconfirmed_parameters_have_no_bounds(world_recording):
+def test_parameters_that_no_track_confirms_have_no_bounds(world_recording):
     """An m0 3 % heavier than described once gave gaps of (44.0 +- 0.2) um; 45 um is true."""
     usual = gong2025()
     m0, m1, m2 = usual.masses
@@ -270,7 +270,7 @@ def test_unequal_gaps_and_a_linear_contact_law_are_identified(world_recording):
 
 
 @pytest.mark.thorough
-def test_an_invalid_track_is_left_out_with_a_reason(world_recording, described_otherwise):
+def test_a_track_that_is_invalid_is_left_out_with_a_reason(world_recording, described_otherwise):
     recorded = world_recording("noise", 10.0, seed=41)
     wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
     motion = estimate(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)

@@ -71,12 +71,12 @@ def coverage(found):
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
-def test_noise_alone_determines_no_parameter(factor):
+def test_channel_noise_alone_determines_no_parameter_of_the_specimen(factor):
     assert not estimate(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
 
 
 @pytest.mark.thorough
-def test_one_weak_sine_does_not_determine_the_dampers():
+def test_a_single_weak_sine_does_not_determine_the_dampers():
     """Bounds around the described value once missed the true value in ten of ten cases."""
     rng = np.random.default_rng(3)
     inside = []

@@ -17,6 +17,6 @@ def test_every_kind_of_excitation_has_figures_and_report_sentences():
     assert set(DRAWINGS) == set(EXCITATION_KINDS)
 
 
-def test_an_entry_for_an_unknown_kind_is_refused():
+def test_a_registry_entry_for_an_unknown_kind_of_excitation_is_refused():
     with pytest.raises(KeyError, match="chirp"):
         rows_by_kind(dict.fromkeys(Family, 1), {"chirp": 2})

@@ -25,7 +25,7 @@ def test_every_impact_is_counted_once_for_any_block_size(block):
     assert counter.count == found == 60
 
 
-def test_a_smooth_motion_with_harmonics_has_no_impacts():
+def test_no_impacts_are_counted_in_a_smooth_motion_with_harmonics():
     time_s = np.arange(int(3 * RATE)) / RATE
     velocity = 0.02 * np.sin(2 * np.pi * 260 * time_s) + 0.0008 * np.sin(2 * np.pi * 780 * time_s)
     counter = ImpactCounter(RATE)
@@ -33,7 +33,7 @@ def test_a_smooth_motion_with_harmonics_has_no_impacts():
     assert counter.count == 0
 
 
-def test_noise_alone_has_no_impacts():
+def test_no_impacts_are_counted_in_noise_alone():
     counter = ImpactCounter(RATE)
     counter.add(np.random.default_rng(3).standard_normal(int(5 * RATE)))
     assert counter.count == 0

@@ -40,7 +40,7 @@ def test_lost_samples_leave_only_their_own_envelope_columns_empty():
     assert (low[2], high[3]) == (20.0, 39.0)
 
 
-def test_fewer_samples_than_columns_are_drawn_individually():
+def test_samples_fewer_than_the_columns_of_an_envelope_are_drawn_individually():
     samples = np.array([3.0, 1.0, 2.0])
     low, high = envelope(samples, 10)
     assert np.array_equal(low, samples)
@@ -53,5 +53,5 @@ def test_an_envelope_without_columns_is_refused():
         envelope(np.zeros(5), 0)
 
 
-def test_both_edges_of_an_envelope_are_drawn_as_one_zigzag_line():
+def test_the_upper_and_lower_edge_of_an_envelope_are_drawn_as_one_zigzag_line():
     assert np.array_equal(zigzag(np.array([[0.0, 1.0]]), np.array([[2.0, 3.0]])), [[0, 2, 1, 3]])

@@ -24,7 +24,7 @@ def test_the_spectrum_matches_welch_for_any_block_size(block):
     assert np.allclose(found.amplitude_density**2, density, rtol=1e-4)
 
 
-def test_a_live_spectrum_excludes_old_samples():
+def test_a_live_spectrum_excludes_samples_older_than_its_window():
     samples = np.zeros((1, 60_000))
     samples[0, :30_000] = np.random.default_rng(2).standard_normal(30_000)
     assert live_spectra(samples, 1000).spectrum().amplitude_density.max() == 0.0

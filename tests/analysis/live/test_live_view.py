@@ -39,7 +39,7 @@ def test_time_histories_show_the_newest_seconds_in_channel_units(view):
     assert time_histories.high[3].max() == pytest.approx(3 * A0 * 2 * np.pi * 260, rel=1e-3)
 
 
-def test_live_response_curves_gain_points_during_the_run(view):
+def test_live_response_curves_get_new_points_during_the_run(view):
     history = view.history()
     assert history.frequency_hz.size >= 10
     assert np.allclose(history.frequency_hz, 260.0, atol=0.01)
@@ -86,7 +86,7 @@ def test_the_live_view_gives_levels_and_impacts(view):
     assert view.impacts == 0
 
 
-def test_overlapping_blocks_do_not_change_the_view(view):
+def test_overlapping_blocks_of_samples_do_not_change_the_live_view(view):
     before = view.next_sample
     view.add(before - 1000, volts(before - 1000, 1000))
     assert view.next_sample == before
@@ -126,7 +126,7 @@ def view_of_sweep(lead_in_s):
     return view
 
 
-def test_ramp_and_ringing_before_a_sweep_give_no_points():
+def test_the_ramp_and_the_ringing_before_a_sweep_give_no_live_points():
     history = view_of_sweep(LEAD_IN_S).history()
     assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
     assert history.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)

@@ -61,7 +61,7 @@ def test_the_density_of_a_sine_is_its_power_divided_by_the_window_bandwidth(requ
     assert found.unit == "m s-1"
 
 
-def test_the_density_of_white_noise_does_not_depend_on_window_length(request_):
+def test_the_spectral_density_of_white_noise_does_not_depend_on_the_window_length(request_):
     for stretch_s in (0.6, 2.9):
         asked = replace(request_, start=int(3 * RATE), stop=int((3 + stretch_s) * RATE))
         found = recording_spectrogram(asked)

@@ -31,7 +31,7 @@ def sine(frequency_hz, samples, first=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
-def test_a_sine_between_spectral_lines_is_found(frequency_hz):
+def test_a_sine_with_a_frequency_between_spectral_lines_is_found(frequency_hz):
     tone = drive_tone(sine(frequency_hz, look_samples(RATE)).values[0], RATE)
     assert tone.frequency_hz == pytest.approx(frequency_hz, abs=2e-3)
     assert tone.amplitude == pytest.approx(0.3, rel=1e-3)
@@ -125,7 +125,7 @@ def test_a_motion_with_the_drive_period_has_one_poincare_point():
     )
 
 
-def test_overlapping_portraits_give_each_poincare_point_once():
+def test_each_poincare_point_is_given_once_even_if_phase_portraits_overlap():
     section, kept = PoincareSection(), []
     count = portrait_samples(260.0, RATE)
     for first in range(0, 30_000, 2560):

@@ -31,7 +31,7 @@ def noise_power(acceleration, rate_hz):
     return float(np.mean(lines[slice(*(round(each) for each in BETWEEN_HZ))]))
 
 
-def test_draws_include_unrecorded_amplifier_noise(recording):
+def test_draws_of_the_twin_include_amplifier_noise_that_was_not_recorded(recording):
     """Without it the simulated base has 0.7 times the noise, and limits of weak motions are too narrow."""
     source = voltage_source(recording, specimen_of(RIG), draws=8)
     rate_hz = recording.sample_rate_hz

@@ -32,7 +32,7 @@ def test_base_displacement_matches_the_played_motion_within_0_1_percent(dwell_fi
     assert abs(np.mean(found)) < 1e-4 * 5e-6
 
 
-def test_a_gap_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_file):
+def test_a_base_motion_with_a_gap_is_refused_with_the_number_of_lost_samples(dwell_file):
     with pytest.raises(UnusableData, match="30 samples of the base's acceleration were lost"):
         motion_of(dwell_file("weak", hole=(9000, 9030)))
 
@@ -57,7 +57,7 @@ def test_the_lowest_played_frequency_sets_the_lower_band_edge(plan, lowest_hz):
     assert lowest_frequency_hz(Measurement(name="m", excitation=plan)) == lowest_hz
 
 
-def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
+def test_a_simulation_in_pieces_equals_one_simulation_of_the_whole(dwell_motions):
     base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
     base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
     velocity, impacts = shake_specimen(gong2025(), base, RATE)
@@ -66,7 +66,7 @@ def test_a_simulation_in_pieces_equals_the_whole_simulation(dwell_motions):
     np.testing.assert_allclose(velocity, whole.states[:, 3], atol=1e-9 * np.max(np.abs(velocity)))
 
 
-def test_impacts_keep_their_times_across_pieces(dwell_motions):
+def test_impacts_have_the_right_times_in_a_simulation_in_pieces(dwell_motions):
     motion = dwell_motions["strong"][0].displacement_m
     first = shake_specimen(gong2025(), motion, RATE)[1]
     # Ten seconds at rest before the motion shift the same impacts into a later piece.

@@ -90,7 +90,7 @@ def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws,
 
 
 @pytest.mark.parametrize("draws", [5, 8, 16, 48, 200])
-def test_limits_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
+def test_limits_estimated_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
     """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % would exceed the limit."""
     largest = np.random.default_rng(10).gumbel(3.7, 0.3, (20000, draws + 1))
     beyond = np.mean([each[0] > largest_of_chance(each[1:]) for each in largest])
@@ -176,7 +176,7 @@ def test_no_escape_rate_is_given_if_collisions_end_at_the_same_time_in_all_runs(
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.45])
-def test_half_of_the_draws_suffice_for_a_clear_verdict(shift):
+def test_half_of_the_draws_are_enough_for_a_clear_verdict(shift):
     """Stopping early accepts no wrong twin; `benchmarks/twin_agreement.py --stop` tests this further."""
     rng = np.random.default_rng(12)
     decided = 0

@@ -34,7 +34,7 @@ def test_the_predicted_base_amplitude_of_a_dwell_is_the_predicted_stroke_of_its_
     )
 
 
-def test_noise_is_represented_by_a_sine_of_equal_rms():
+def test_the_prediction_represents_noise_by_a_sine_of_equal_rms():
     base = base_motion(QUICK["noise"].excitation, RIG, np.array([100.0, 200.0]))
     rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[BaseQuantity.STROKE].rms
     assert base.amplitude_m == pytest.approx(np.sqrt(2) * rms_m)

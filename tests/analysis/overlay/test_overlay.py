@@ -40,7 +40,7 @@ def test_the_simulation_of_a_colliding_dwell_agrees_in_impacts_and_statistics(dw
         assert simulated.decibel == pytest.approx(measured.decibel, abs=4)
 
 
-def test_a_sweep_and_its_simulation_collide_within_1_hz(sweep_file):
+def test_collisions_in_a_sweep_and_its_simulation_begin_within_1_hz(sweep_file):
     analysis, overlay = overlay_of(sweep_file)
     assert isinstance(overlay, SweepOverlay)
     measured, simulated = analysis.collisions.regions[0], overlay.collisions.regions[0]
@@ -49,7 +49,7 @@ def test_a_sweep_and_its_simulation_collide_within_1_hz(sweep_file):
     assert np.max(np.abs(overlay.difference.decibel[before])) < 0.02
 
 
-def test_disagreements_with_the_twin_are_stated_first(sweep_file):
+def test_quantities_that_disagree_with_the_twin_are_stated_first(sweep_file):
     _, overlay = overlay_of(sweep_file)
     (curve, *_) = overlay.ensemble
     draws = 1 + 1e-3 * np.random.default_rng(1).standard_normal((9, 1))

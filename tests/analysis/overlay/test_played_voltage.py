@@ -50,7 +50,7 @@ def test_draws_keep_the_recorded_drive_within_its_uncertainty():
 
 
 @pytest.mark.parametrize("samples", [7, 1000])
-def test_short_or_noise_free_voltages_drive_the_twin_unchanged(samples):
+def test_a_short_or_noise_free_voltage_drives_the_twin_unchanged(samples):
     volts = TONE_V[20_000 : 20_000 + samples]
     rng = np.random.default_rng(7)
     np.testing.assert_array_equal(PlayedVoltage(volts, 0.0).random_voltage(rng), volts)

@@ -72,7 +72,7 @@ def test_the_similarity_interval_covers_the_true_rate():
     assert 0.87 <= covered / 200 <= 0.99
 
 
-def test_clustered_points_widen_the_similarity_interval():
+def test_clusters_of_similar_points_widen_the_similarity_interval():
     rng = np.random.default_rng(4)
     runs = np.repeat(rng.random(10) < 0.6, 10)
     mixed = rng.permutation(runs)
@@ -83,7 +83,7 @@ def test_clustered_points_widen_the_similarity_interval():
     assert widths[0] > 1.5 * widths[1]
 
 
-def test_similarity_interpolates_and_never_extrapolates():
+def test_curves_are_interpolated_for_similarity_and_never_extrapolated():
     power = SimilarityCurve(np.array([10.0, 100.0]), np.array([1.0, 100.0]), 1e-6)
     assert power.at(np.array([20.0])).response == pytest.approx([4.0])
     with pytest.raises(InvalidRequest, match="10 to 100 Hz"):

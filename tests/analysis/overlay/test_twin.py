@@ -87,7 +87,7 @@ def test_the_phase_shows_that_a_channel_is_delayed(recordings, name, late_sample
     assert shifted.agreement[0].endswith(f"disagree with the twin: {PHASE}")
 
 
-def test_json_and_figures_show_the_draws(chaotic_dwell):
+def test_the_json_document_and_the_figures_show_the_draws(chaotic_dwell):
     said = json.loads(json.dumps(result_summary(chaotic_dwell)))["simulated"]
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]

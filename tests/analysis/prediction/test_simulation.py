@@ -32,7 +32,7 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 
         ({"gap_m": -1.0}, "greater than 0"),
     ],
 )
-def test_invalid_simulations_are_refused_with_a_reason(given, said):
+def test_invalid_simulation_requests_are_refused_with_a_reason(given, said):
     with pytest.raises(ValidationError, match=re.escape(said)):
         SimulationRequest(**given)
 
@@ -127,7 +127,7 @@ def test_stated_costs_and_errors_match_the_accuracy_page():
                 assert is_about(float(row[2]), level.response_i_error)
 
 
-def test_a_higher_accuracy_is_stated_to_cost_more():
+def test_the_stated_cost_is_larger_for_a_higher_accuracy():
     levels = (Accuracy.QUICK, Accuracy.REFERENCE)
     quick, strict = (cost_sentences(SimulationRequest(accuracy=each), 2) for each in levels)
     for accuracy, said in zip(levels, (quick, strict), strict=True):

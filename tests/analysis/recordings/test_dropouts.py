@@ -83,7 +83,7 @@ def test_a_sweep_with_drop_outs_to_zero_gives_no_wrong_result(number, tmp_path):
     assert dark_recording(generator(chance), tmp_path).faults == ()
 
 
-def test_two_close_drop_outs_are_both_bridged():
+def test_two_drop_outs_close_to_each_other_are_both_bridged():
     velocity = motion(3)
     dark = with_drop_out(with_drop_out(velocity, 20_000, 12, 0.8), 20_250, 20, -0.6)
     found = find_dropouts(dark, RATE_HZ)
@@ -125,7 +125,7 @@ def test_ringing_after_an_impact_is_not_a_drop_out():
     [np.zeros(51_200), np.full(51_200, np.nan), motion(6)[:300], np.round(motion(7), 2)],
     ids=["silent", "lost", "short", "coarse"],
 )
-def test_ambiguous_signals_give_no_drop_outs(velocity):
+def test_ambiguous_signals_do_not_count_as_drop_outs(velocity):
     assert find_dropouts(velocity, RATE_HZ) == ()
 
 

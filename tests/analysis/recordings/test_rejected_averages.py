@@ -15,7 +15,7 @@ from vibench.analysis.recordings.channels import RecordedChannels
     [(-0.1, {0, 1}), (0.1, {1}), (1.0, {1})],
     ids=["before it begins", "while it is recorded", "while the next one settles"],
 )
-def test_rejected_averages_are_excluded_from_results(noise_file, seconds_after, left):
+def test_averages_rejected_by_the_operator_are_excluded_from_results(noise_file, seconds_after, left):
     with open_recording(noise_file()) as recording:
         first = next(each for each in recording.segments if each.label == "realisation")
         sample = first.start + round(seconds_after * recording.sample_rate_hz)

@@ -87,7 +87,7 @@ def test_noise_resonances_are_equal_for_any_sensor(noise_file, noise_motion, tmp
 
 
 @SENSORS
-def test_converted_samples_do_not_depend_on_where_reading_starts(dwell_motions, sensor_file, response):
+def test_integrated_samples_do_not_depend_on_where_reading_starts(dwell_motions, sensor_file, response):
     _, velocity, _ = dwell_motions["strong"]
     with open_recording(sensor_file("strong", response)) as recording:
         whole = ResponseChannel(recording).read(0, recording.samples)

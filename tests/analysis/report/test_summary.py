@@ -71,14 +71,14 @@ def test_measured_changes_of_resonances_are_reported(strong, words):
 @pytest.mark.parametrize(
     "second", [noise(0.05, 201.0), noise(10.0, 201.0, specimen="another")], ids=["level", "specimen"]
 )
-def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
+def test_recordings_of_a_single_level_or_of_two_specimens_are_not_compared(second):
     words = report(noise=(noise(0.05, 94.6, 266.2), second))
     assert "gone" not in words
     assert words.count("noise 0.05: Noise at 0.05 Vpp: resonances at 94.6, 266.2 Hz.") == 1
     assert words.count("Vpp: resonance at 201.0 Hz.") == 1
 
 
-def test_undecided_motion_is_named_and_long_lists_are_shortened():
+def test_undecided_motions_are_named_and_long_lists_are_shortened():
     assert "undecided at 1 Vpp." in report(dwells=(dwell(1.0, MotionKind.UNDECIDED),) * 2), "up and down"
     assert report(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
     many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(50))
@@ -100,7 +100,7 @@ def test_undecided_motion_is_named_and_long_lists_are_shortened():
         ([NO], "The simulation disagrees with the recording."),
     ],
 )
-def test_agreement_is_stated_for_every_mix_of_verdicts(verdicts, words):
+def test_agreement_with_the_simulation_is_stated_for_every_mix_of_verdicts(verdicts, words):
     assert summary(campaign((noise(0.05, 94.6),)), verdicts).endswith(words)
 
 

@@ -103,13 +103,13 @@ def test_a_recording_that_ended_before_its_dwell_is_refused_with_the_reason(dwel
         analyse(path)
 
 
-def test_a_dwell_with_a_gap_is_refused_with_the_number_of_lost_samples(dwell_file):
+def test_a_dwell_with_lost_samples_is_refused_with_their_number(dwell_file):
     path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
     with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
         analyse(path)
 
 
-def test_a_realisation_with_a_gap_is_excluded(noise_file):
+def test_a_realisation_with_lost_samples_is_excluded(noise_file):
     first = round(3.1 * RATE)
     found = analyse(noise_file(hole=(first, first + 10)))
     assert found.response.left_out == 1
@@ -183,7 +183,7 @@ def imported_base(unit, source):
 
 
 @pytest.mark.parametrize("case", ["small force", "sharp resonance", "base in V", "base from the drive"])
-def test_a_large_or_small_response_is_not_always_a_wrong_scale(dwell_file, case):
+def test_a_large_or_small_response_is_not_always_reported_as_a_wrong_scale(dwell_file, case):
     facts = analyse(dwell_file("weak")).facts
     match case:
         case "small force":

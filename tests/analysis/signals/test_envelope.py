@@ -11,7 +11,7 @@ from vibench.analysis.signals.envelope import envelope
     samples=arrays(np.float64, st.integers(1, 300), elements=st.floats(-1e3, 1e3)),
     bins=st.integers(1, 50),
 )
-def test_every_sample_is_within_the_envelope(samples, bins):
+def test_every_sample_of_a_signal_is_within_its_envelope(samples, bins):
     found = envelope(samples, 10.0, bins=bins)
     length = -(-samples.size // bins)
     places = np.arange(samples.size) // length

@@ -18,7 +18,7 @@ def test_a_conversion_and_its_inverse_cancel(power):
     np.testing.assert_allclose(both, 1, rtol=1e-14)
 
 
-def test_integration_at_zero_frequency_gives_nan():
+def test_the_integral_of_a_component_at_zero_frequency_is_nan():
     factor = derivative_factor(np.array([0.0, 1.0]), -1)
     assert np.isnan(factor[0])
     assert factor[1] == pytest.approx(1 / (2j * np.pi))

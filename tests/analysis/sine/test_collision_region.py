@@ -72,7 +72,7 @@ def test_a_sweep_without_impacts_has_no_collision_region():
     assert not result.is_colliding.any()
 
 
-def test_continuous_collisions_give_a_region_over_the_whole_sweep():
+def test_continuous_collisions_give_one_region_over_the_whole_sweep():
     result, _ = find_collisions(20e-6, 240.0, 300.0)
     (region,) = result.regions
     assert region.reaches_start
@@ -91,7 +91,7 @@ def laser_drop_outs(velocity, rng):
 
 
 @pytest.mark.parametrize("spoil", [ten_times_the_noise, laser_drop_outs])
-def test_noise_and_laser_drop_outs_do_not_move_the_collision_edges(spoil):
+def test_noise_and_laser_drop_outs_do_not_move_the_ends_of_a_collision_region(spoil):
     result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
     assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
@@ -201,7 +201,7 @@ def test_a_mode_ringing_at_twice_the_drive_is_not_a_collision(is_known):
     assert outcome.colliding == 0
 
 
-def test_a_short_collision_is_reported():
+def test_a_short_range_with_collisions_is_reported():
     """No collision was once reported although m1 exceeded its gap for less than 0.5 s."""
     specimen = gong2025(damping_time_s=1.28e-5, gap_m=67.4e-6)
     sweep = FastSweep(specimen, 123.5, 83.5, 6.0, 1e-6, 1)

@@ -71,7 +71,7 @@ def test_a_drifting_sensor_does_not_change_the_responses(per_s):
     assert result.drive.amplitude_m == pytest.approx(5e-6, rel=1e-8)
 
 
-def test_no_order_leaks_into_response_ii():
+def test_components_at_other_orders_do_not_leak_into_response_ii():
     """The window is not a whole number of subharmonic periods; a single-order fit would err by 1e-4."""
     parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}
     drive, base, velocity = dwell(3, parts)
@@ -157,7 +157,7 @@ def test_the_level_of_a_noise_drive_is_its_rms_in_the_band():
     assert level.rms_displacement_m == pytest.approx(np.sqrt(density * integral), rel=0.1)
 
 
-def test_distortion_of_the_base_is_stated():
+def test_the_distortion_of_the_base_motion_is_stated():
     time = np.arange(12_800) / RATE
     omega = 2 * np.pi * 260
     base = omega**2 * (np.cos(omega * time) + 4 * 0.01 * np.cos(2 * omega * time))

@@ -44,7 +44,7 @@ STEP = SegmentNote(
 )
 
 
-def test_only_bracketed_jumps_are_counted():
+def test_only_jumps_with_a_bracket_are_counted():
     steep = JUMP.model_copy(update={"how": JumpSearchEnd.STEEP})
     (jump,) = noted_jumps([JUMP, steep])
     assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")

@@ -44,7 +44,7 @@ def test_the_frequency_bounds_of_a_jump_contain_it_and_no_other_jump_is_found(de
         assert found[0].decibel == pytest.approx(decibel, abs=0.7)
 
 
-def test_a_steep_resonance_and_noise_are_not_jumps():
+def test_a_steep_resonance_and_noise_are_not_reported_as_jumps():
     resonance = 1 / np.abs(1 - (FREQUENCY_HZ / 266) ** 2 + 0.02j * FREQUENCY_HZ / 266)
     noise = np.random.default_rng(1).standard_normal(TIME_S.size)
     assert jumps(TIME_S, FREQUENCY_HZ, resonance * np.exp(0.01 * noise)) == ()
@@ -95,7 +95,7 @@ def test_the_ringing_of_a_linear_specimen_is_not_a_jump(start_hz, stop_hz, durat
     assert smooth_jumps(found, collisions(found)) == ()
 
 
-def test_a_step_between_two_irregular_ranges_is_not_a_jump():
+def test_a_step_between_two_irregular_frequency_ranges_is_not_a_jump():
     rough = np.zeros(TIME_S.size, dtype=bool)
     assert jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), rough) == ()
     half = FREQUENCY_HZ < 250
@@ -151,7 +151,7 @@ def test_a_hardening_specimen_jumps_up_and_down_at_the_folds_of_its_branch(harde
 
 
 @pytest.mark.thorough
-def test_hysteresis_needs_both_directions(hardening):
+def test_hysteresis_needs_an_up_sweep_and_then_a_down_sweep(hardening):
     _, _, (up, down) = hardening
     with pytest.raises(InvalidRequest, match="in this order"):
         hysteresis(down, up, (), ())

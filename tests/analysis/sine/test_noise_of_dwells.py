@@ -55,7 +55,7 @@ def test_bounds_of_response_i_hold_in_bench_noise(frequency_hz, tmp_path):
 
 
 @pytest.mark.thorough
-def test_bounds_include_noise_that_appears_only_during_the_drive(tmp_path):
+def test_bounds_include_noise_that_is_present_only_during_the_drive(tmp_path):
     """Amplifier noise excites the modes: Response I was once 0.234 +- 0.030; 0.107 is true."""
     for seed in range(6, 12):
         folder = tmp_path / f"{seed}"
@@ -66,7 +66,7 @@ def test_bounds_include_noise_that_appears_only_during_the_drive(tmp_path):
 
 
 @pytest.mark.thorough
-def test_bounds_include_noise_larger_than_the_drive(tmp_path):
+def test_bounds_include_noise_that_is_larger_than_the_drive(tmp_path):
     found = measure(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
     first = budgets_of(found)[1]
     assert first.value > 2 * linear(180.0)
@@ -108,7 +108,7 @@ def test_chaotic_motion_is_not_counted_as_noise(tmp_path):
 
 
 @pytest.mark.thorough
-def test_noise_also_present_in_silence_is_not_chaos(tmp_path):
+def test_noise_that_is_also_present_in_silence_is_not_called_chaos(tmp_path):
     """The surrogate test rejects linear noise for this seed, one of eight."""
     found = measure(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
     assert found.analysis.motion.verdict.kind is MotionKind.UNDECIDED

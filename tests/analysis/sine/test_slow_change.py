@@ -139,7 +139,7 @@ def test_an_unsettled_step_is_reported_or_has_a_valid_bound(tmp_path, seed):
     assert (check.verdict is Verdict.WARNING) == is_changing
 
 
-def test_a_trend_counts_as_slow_change_and_random_scatter_does_not():
+def test_a_trend_counts_as_a_slow_change_and_random_scatter_does_not():
     rng = np.random.default_rng(1)
     found = [
         slow_change(1 + 1e-3 * (rng.standard_normal(10) + 1j * rng.standard_normal(10))) for _ in range(400)
@@ -162,7 +162,7 @@ def test_bounds_of_a_mean_include_a_decay_that_noise_hides():
     assert np.mean(held) > 0.7
 
 
-def test_bounds_include_the_rest_of_a_decay_that_lasts_longer_than_the_record():
+def test_bounds_include_the_remainder_of_a_decay_that_outlasts_the_record():
     """With three times the scatter, 26 to 78 % of the bounds did not contain the settled value."""
     rng, place, held, withheld = np.random.default_rng(3), np.linspace(0.05, 0.95, 10), [], 0
     for _ in range(600):
@@ -177,7 +177,7 @@ def test_bounds_include_the_rest_of_a_decay_that_lasts_longer_than_the_record():
     assert withheld < 200
 
 
-def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
+def test_the_drift_of_a_sensor_does_not_bias_results_at_the_ends_of_a_step(tmp_path):
     """Response I of a weak step was once 0.0886 +- 0.0006; 0.0871 is true."""
     hz = 416.15
     motion, time_s = synthetic.sine(2.0, hz, A0_M), synthetic.times(2.0)
@@ -192,7 +192,7 @@ def test_sensor_drift_does_not_bias_the_ends_of_a_step(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_maximum_caused_by_a_short_fault_has_no_uncertainty(dwell):
+def test_no_uncertainty_is_stated_for_a_maximum_caused_by_a_short_fault(dwell):
     """A drop-out of 3 ms read as motion once gave 17.9 +- 2.5; 11.8 is true."""
     result = dwell(lambda time_s: np.where(np.abs(time_s - 11.0) < 0.004, 1.5, 1.0))
     assert result.analysis.motion.verdict.kind is MotionKind.UNDECIDED

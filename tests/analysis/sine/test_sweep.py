@@ -135,7 +135,7 @@ def test_the_first_and_last_intervals_of_a_sweep_also_use_neighbouring_samples()
 
 @pytest.mark.parametrize("factor", [1, 2, 5, 6])
 @pytest.mark.parametrize("blocks", [[5000], [1, 2, 3000, 1997], [70, 60, 4870]])
-def test_decimation_keeps_time_and_amplitude_for_any_block_size(factor, blocks):
+def test_decimation_preserves_times_and_amplitudes_for_any_block_size(factor, blocks):
     time = np.arange(5000)
     x = np.cos(2 * np.pi * 0.3 / factor * time + 0.4)
     decimator = Decimator(1, factor)

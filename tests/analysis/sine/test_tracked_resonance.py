@@ -44,7 +44,7 @@ def test_tracked_resonances_are_sorted_by_base_level():
     assert (found[0].mode_hz, found[1].mode_hz) == (100.5, None)
 
 
-def test_a_level_with_a_lost_resonance_is_excluded_from_the_backbone():
+def test_a_level_at_which_the_resonance_was_lost_is_excluded_from_the_backbone():
     notes = [
         note(0, 1.0, 100.0),
         lost_note(1, 3.0),
@@ -103,5 +103,5 @@ def test_softening_or_hardening_is_stated_only_beyond_the_uncertainty(strong_hz,
     assert sentence.endswith(said)
 
 
-def test_one_level_gives_no_backbone_sentence():
+def test_a_single_level_gives_no_sentence_on_the_backbone():
     assert backbone_sentence(tracked_resonances([note(0, 0.5, 100.0)])) == ""

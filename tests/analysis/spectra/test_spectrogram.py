@@ -31,7 +31,7 @@ def test_the_spectrogram_of_a_chirp_has_its_frequency_at_every_time():
     assert loudest == pytest.approx(100 + 40 * found.time_s, abs=6)
 
 
-def test_the_spectrogram_size_is_bounded_and_independent_of_blocks():
+def test_the_size_of_a_spectrogram_is_bounded_and_does_not_depend_on_blocks():
     signal = np.random.default_rng(0).standard_normal(800_000)
     whole = picture(signal)
     assert whole.amplitude.shape[1] == MOST_COLUMNS

@@ -26,7 +26,7 @@ def test_the_increase_of_the_maximum_of_a_sine_by_noise_matches_repeated_draws(n
     )
 
 
-def test_zero_noise_gives_no_bias_and_bias_scales_with_the_unit():
+def test_zero_noise_gives_no_bias_and_the_bias_scales_with_the_unit():
     motion = np.random.default_rng(2).standard_normal(500)
     assert noise_lift(motion, 0.0, 500) == (0, 0)
     assert noise_lift(1e-6 * motion, 1e-7, 500).bias == pytest.approx(

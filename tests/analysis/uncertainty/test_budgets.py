@@ -114,7 +114,7 @@ def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, wea
         assert budget.share(Cause.CHANCE) == 0.0
 
 
-def test_unstated_uncertainties_are_listed_and_not_taken_as_zero(weak):
+def test_uncertainties_that_are_not_stated_are_listed_and_not_taken_as_zero(weak):
     amplitude, _, second = budgets_of(weak)
     assert second.not_stated == (
         Cause.VIBROMETER,
@@ -162,7 +162,7 @@ def test_the_response_i_budget_of_an_aperiodic_motion_includes_the_random_error(
     assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]
 
 
-def test_each_resonance_has_a_budget_and_the_budget_of_damping_has_no_calibration(noise_file):
+def test_each_resonance_has_a_budget_and_that_of_the_damping_contains_no_calibration(noise_file):
     (noise,) = analyse_files([noise_file()], "noise", Simulation.LEFT_OUT).results
     budgets = budgets_of(noise)
     assert len(budgets) == 3 * len(noise.analysis.response.resonances) > 0

@@ -93,7 +93,7 @@ def test_response_i_of_a_weak_dwell_has_no_expected_uncertainty():
     assert 1e-6 < second.after(5.0) < 1e-3
 
 
-def test_a_rig_without_noise_figures_is_reported():
+def test_a_rig_whose_sensors_have_no_stated_noise_is_reported():
     silent = RIG.model_copy(update={"virtual": None})
     (first, *_) = expected_uncertainty(Measurement(name="weak", excitation=NOISE), silent)
     assert "the sensors' noise is not stated" in first.sentence

@@ -56,7 +56,7 @@ def test_a_plan_without_a_predictable_target_has_no_expected_recording_time():
 
 
 @pytest.mark.thorough
-def test_campaign_time_is_distributed_in_proportion_to_the_needed_times():
+def test_the_time_of_a_campaign_is_distributed_in_proportion_to_the_needed_times():
     first = plan(NOISE, Until(resonance_hz=reachable_uncertainty(50.0)), "first")
     second = plan(NOISE, Until(resonance_hz=reachable_uncertainty(100.0)), "second")
     campaign = Campaign(name="c", measurements=(first, second, plan(QUIET, None, "fixed")))

@@ -135,7 +135,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
     assert hertz[-1] > hertz[turns[0]] > hertz[turns[1]]
 
 
-def test_the_step_direction_ignores_points_closer_than_their_noise():
+def test_the_direction_of_the_next_step_ignores_points_closer_than_their_noise():
     """Two points of a noisy arc are close together, as after a halved step at a fold."""
     rng = np.random.default_rng(22)
     solver = BranchSolver(LoopSetting(98.0, np.array([1.0 + 0j])), np.array([1.0 + 0j]), 0.0, 1.0, 0.25)

@@ -67,7 +67,7 @@ def test_the_sampled_plant_model_matches_the_compiled_simulation(latency_s):
 
 
 @pytest.mark.thorough
-def test_multipliers_on_a_very_heavy_table_match_the_branch():
+def test_multipliers_on_a_very_heavy_table_match_those_of_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
     # The free table adds a multiplier of one.
@@ -78,7 +78,7 @@ def test_multipliers_on_a_very_heavy_table_match_the_branch():
 
 
 @pytest.mark.thorough
-def test_multipliers_match_the_branch_with_contacts_shorter_than_a_sample():
+def test_multipliers_match_those_of_the_branch_if_contacts_are_shorter_than_a_sample():
     stops = gong2025()
     found = impact_branch(stops, 1e-6, 97.5, (97.2, 98.7), "above")
     points = np.argsort(np.abs(found.multipliers[:, 0]))[[-1, -10]]
@@ -112,7 +112,7 @@ def test_pd_gains_on_m0_hold_the_branch_but_pd_gains_on_the_base_do_not():
 
 
 @pytest.mark.thorough
-def test_the_designed_gains_have_a_lower_cost_than_gains_of_zero_or_twice_their_size():
+def test_the_designed_gains_have_a_lower_cost_than_zero_or_doubled_gains():
     """The cost is simulated with the noises that the design assumes."""
     model, rng = plant(specimen=LINEAR), np.random.default_rng(5)
     step, volt = model.step
@@ -140,7 +140,7 @@ def test_the_designed_gains_have_a_lower_cost_than_gains_of_zero_or_twice_their_
 
 
 @pytest.mark.thorough
-def test_a_feedback_law_whose_delay_destabilises_motions_is_reported():
+def test_a_feedback_law_whose_delay_makes_motions_unstable_is_reported():
     late = plant(2e-3)
     hold = branch_hold(late, design_law(late), 3e-6, 94.0, (90.0, 112.0))
     found = branch()

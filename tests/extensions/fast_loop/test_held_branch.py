@@ -25,7 +25,7 @@ def note(number, stability, multiplier):
 POINTS = [point(number, hertz) for number, hertz in enumerate(HERTZ)]
 
 
-def test_stability_notes_are_assigned_to_their_points_in_any_order():
+def test_notes_on_stability_are_assigned_to_their_points_in_any_order():
     # Point 2 gave no result, and the run ended before point 3 was tested.
     notes = [note(1, Stability.STABLE, 0.96), note(0, Stability.UNSTABLE, 1.1), note(2, Stability.OPEN, None)]
     found = held_branch([*POINTS, *notes])

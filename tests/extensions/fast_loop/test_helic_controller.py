@@ -189,7 +189,7 @@ def test_a_command_refused_by_the_board_silences_it_with_its_message(playing_boa
 
 
 @pytest.mark.thorough
-def test_a_tripped_safety_gate_ends_the_run(board_and_rig, tmp_path):
+def test_a_safety_gate_that_trips_ends_the_run(board_and_rig, tmp_path):
     board, rig = board_and_rig
     plan = BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118

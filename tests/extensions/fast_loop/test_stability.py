@@ -95,7 +95,7 @@ def test_the_stability_of_a_held_motion_follows_from_base_and_m0(index):
         assert (low > 1.0) if size > 1.0 else (high < 1.0)
 
 
-def test_noise_alone_gives_no_stability_verdict():
+def test_channel_noise_alone_gives_no_stability_verdict():
     rng = np.random.default_rng(4)
     motion = np.cos(2 * np.pi * np.arange(24_000) / 100)
     for _ in range(20):

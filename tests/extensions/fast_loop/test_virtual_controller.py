@@ -110,7 +110,7 @@ def test_returned_fourier_coefficients_match_the_played_signal(wired):
     assert complex(*block.m0[0]) == pytest.approx(0.25, abs=1e-4)
 
 
-def test_a_feedback_law_acts_on_samples_and_its_internal_state(wired):
+def test_a_feedback_law_acts_on_the_samples_and_on_its_internal_state(wired):
     feedback = LoopFeedback(step=((0.5,),), inlet=((0.0, 1.0),), output=(2.0,), direct=(0.0, -1.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.0, 0.0),), feedback=feedback)
     wired.tell("play", program=program)
@@ -142,7 +142,7 @@ def test_without_its_host_the_controller_goes_silent_and_states_the_reason(wired
     assert "sent no request for 0.5 s" in told.reason
 
 
-def test_an_unstable_law_is_ended_by_the_controller():
+def test_the_controller_stops_an_unstable_feedback_law():
     wired = WiredController(gain=1.0)
     feedback = LoopFeedback(step=((0.0,),), inlet=((0.0, 0.0),), output=(0.0,), direct=(1.3, 0.0))
     program = LoopProgram(frequency_hz=100, reference_v=((0.1, 0.0),), feedback=feedback)

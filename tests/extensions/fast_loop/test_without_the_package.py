@@ -109,7 +109,7 @@ def test_a_branch_recording_is_refused_with_a_readable_message_without_its_packa
 
 
 @pytest.mark.thorough
-def test_the_window_lists_tests_that_do_not_need_the_missing_package(run):
+def test_the_window_lists_only_tests_that_need_no_missing_package(run):
     code = (
         "from vibench.gui.pages.test.test_page import shipped_tests\n"
         "print(*sorted({each.measurement.excitation.kind for each in shipped_tests()}))"

@@ -128,14 +128,14 @@ def test_a_process_busy_with_a_dropped_request_is_ended_and_the_next_request_run
     qtbot.waitUntil(lambda: not Path(f"/proc/{pid}").exists(), timeout=5000)
 
 
-def test_worker_memory_is_limited(background, qtbot):
+def test_the_memory_of_a_worker_process_is_limited(background, qtbot):
     answers, errors = [], []
     background.ask(hungry, answers.append, errors.append, 0)
     qtbot.waitUntil(lambda: bool(answers or errors), timeout=100_000)
     assert re.search(r"needs more than 6 GB of memory", str(errors[0]))
 
 
-def test_a_job_ends_only_after_its_result_was_delivered(background, qtbot):
+def test_a_job_counts_as_ended_only_after_its_result_was_delivered(background, qtbot):
     answers, seen = [], []
 
     def take(answer):

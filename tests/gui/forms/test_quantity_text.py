@@ -25,7 +25,7 @@ from vibench.gui.forms.quantity_edit import QuantityEdit, parse_quantity, quanti
         (" 7 ", "", 7.0),
     ],
 )
-def test_common_number_formats_are_parsed(text, unit, value):
+def test_numbers_in_common_formats_are_parsed(text, unit, value):
     assert parse_quantity(text, unit) == value
 
 
@@ -33,13 +33,13 @@ def test_common_number_formats_are_parsed(text, unit, value):
     ("text", "unit"),
     [("5 Hz", "s"), ("fast", "Hz"), ("1.2.3", "V"), ("5 G", "m/s²"), ("5 g", "m"), ("", "s")],
 )
-def test_wrong_units_and_words_are_refused(text, unit):
+def test_a_quantity_with_a_wrong_unit_or_word_is_refused(text, unit):
     with pytest.raises(ConfigurationError, match=r"number|unit"):
         parse_quantity(text, unit)
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["", "Hz", "m", "s", "Vpp", "m/s²"]))
-def test_displayed_text_parses_to_the_same_number(value, unit):
+def test_displayed_text_is_parsed_to_the_same_number(value, unit):
     assert parse_quantity(quantity_text(value, unit), unit) == value
 
 

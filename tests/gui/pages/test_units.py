@@ -180,7 +180,7 @@ def test_lists_of_numbers_are_read_in_the_displayed_unit(closing):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
-def test_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
+def test_the_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
     choose_units(full_window, OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))

@@ -19,7 +19,7 @@ from vibench.gui.plots.axis import (
 )
 
 
-def test_decades_have_labels_at_one_two_and_five():
+def test_each_decade_of_an_axis_has_labels_at_one_two_and_five():
     (_, major), (_, minor) = logarithmic_ticks(log10(10), log10(2000))
     assert [round(10**value) for value in major] == [10, 20, 50, 100, 200, 500, 1000, 2000]
     assert round(10 ** minor[0]) == 30
@@ -34,7 +34,7 @@ def test_an_axis_of_less_than_a_decade_is_labelled_at_round_numbers():
     ("value", "text"),
     [(10, "10"), (100, "100"), (1000, "1k"), (20000, "20k"), (1e-9, "10⁻⁹"), (2e-5, "2·10⁻⁵")],
 )
-def test_tick_numbers_have_common_formats(value, text):
+def test_the_numbers_at_ticks_have_common_formats(value, text):
     assert number_text(value) == text
 
 

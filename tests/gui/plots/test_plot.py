@@ -97,7 +97,7 @@ def test_a_short_axis_has_at_least_two_numbers(reach):
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
 
 
-def test_unit_changes_ignore_closed_plots(qtbot):
+def test_a_change_of_units_ignores_closed_plots(qtbot):
     closed = Plot("a plot", TIME, PlotAxis("x", "m"), LIGHT).with_legend()
     closed.curve(curve_style(0), "5 µm").setData([0.0, 1.0], [0.0, 1.0])
     closed.close()
@@ -237,7 +237,7 @@ def test_pictures_and_numbers_are_copied_and_saved_without_overwriting(plot, qap
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
 @pytest.mark.parametrize("ending", ["csv", "svg", "png"])
-def test_failed_saving_leaves_no_file(plot, tmp_path, ending):
+def test_saving_a_plot_that_fails_leaves_no_file(plot, tmp_path, ending):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
     plot.show()
     import resource

@@ -42,7 +42,7 @@ def test_a_stripe_thinner_than_a_pixel_is_visible(plot, qapp):
     assert seen == pytest.approx(5.0, abs=0.04)
 
 
-def test_a_wide_stripe_covers_its_band_and_no_more(plot, qapp):
+def test_a_wide_stripe_covers_exactly_its_band(plot, qapp):
     plot.stripes(RED).show_bands([(2.0, 4.0), (3.0, 5.0)])
     seen = red_columns(plot, qapp)
     assert (min(seen), max(seen)) == pytest.approx((2.0, 5.0), abs=0.05)

@@ -33,7 +33,7 @@ def read(tip):
 
 
 @pytest.mark.parametrize("kind", [ElidedLabel, SentenceLabel])
-def test_labels_show_markup_as_plain_text(closing, kind):
+def test_labels_show_markup_in_foreign_text_as_plain_text(closing, kind):
     label = closing(kind(HOSTILE))
     label.setToolTip(HOSTILE)
     assert label.text() == SHOWN

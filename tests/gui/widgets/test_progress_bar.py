@@ -10,7 +10,7 @@ WORDS = "ramping up as far as the first tenth, 11:22:33 left"
 
 
 @pytest.mark.parametrize("number", range(3))
-def test_long_text_is_elided_and_complete_in_the_tooltip(qapp, number):
+def test_long_text_in_a_progress_bar_is_elided_and_complete_in_the_tooltip(qapp, number):
     card = WatchCard(LIGHT)
     bar = (ProgressBar("share"), TimedBar("bar", "points"), card.progress)[number]
     bar.setValue(0)

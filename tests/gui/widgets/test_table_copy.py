@@ -23,7 +23,7 @@ def clipboard():
     return QGuiApplication.clipboard().text()
 
 
-def test_copying_a_table_takes_the_selected_rows_or_all_rows(table, qtbot):
+def test_copying_a_table_copies_the_selected_rows_or_else_all_rows(table, qtbot):
     qtbot.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     whole = "used\tquantity\tlimit\n12 %\tstroke\t10 mm\n3 %\tforce\t20 N"
     assert clipboard() == whole

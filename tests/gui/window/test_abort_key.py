@@ -42,7 +42,7 @@ def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, closing, abo
     assert not dialog.isVisible()
 
 
-def test_other_keys_do_not_abort(qtbot, closing, abort_signals):
+def test_other_keys_do_not_abort_a_run(qtbot, closing, abort_signals):
     field = closing(QLineEdit())
     qtbot.keyClicks(field, "stop 123")
     assert abort_signals == []

@@ -35,7 +35,7 @@ def test_the_copy_button_puts_the_whole_message_on_the_clipboard(closing):
     assert QGuiApplication.clipboard().text() == "FAULT: [LimitExceeded] noise: the stroke would be 5 mm"
 
 
-def test_dismissed_messages_remain_in_details(closing):
+def test_dismissed_messages_remain_in_the_details(closing):
     strip = closing(MessageStrip())
     strip.say(Notice(NoticeKind.INFO, "first"))
     button(strip, "Dismiss").click()
@@ -47,7 +47,7 @@ def test_dismissed_messages_remain_in_details(closing):
     assert details.toPlainText() == "INFO: second\n\nINFO: first"
 
 
-def test_a_message_disappears_after_success_and_remains_in_details(closing):
+def test_a_message_disappears_after_a_success_and_remains_in_the_details(closing):
     strip = closing(MessageStrip())
     for kind in NoticeKind:
         strip.say(Notice(kind, "Nothing is armed."))
@@ -58,7 +58,7 @@ def test_a_message_disappears_after_success_and_remains_in_details(closing):
 
 
 @pytest.mark.thorough
-def test_messages_do_not_move_clickable_widgets(window, qapp):
+def test_messages_that_appear_do_not_move_clickable_widgets(window, qapp):
     """The page moved down and put "Check bench" in the place of "Find instruments"."""
 
     def places():

@@ -101,7 +101,7 @@ def test_edits_of_test_and_campaign_can_be_undone(window, qtbot):
     assert selection.campaign == before
 
 
-def test_settings_are_edited_in_one_form_and_kept(window, qapp, tmp_path):
+def test_all_settings_are_edited_in_one_form_and_stored(window, qapp, tmp_path):
     dialog = SettingsDialog(window.context, window)
     points = qapp.font().pointSize()
     dialog.form.form.show_content(

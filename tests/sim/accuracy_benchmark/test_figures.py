@@ -31,7 +31,7 @@ def test_an_accuracy_level_without_improvement_is_reported_as_such(state_errors,
     assert [level.accuracy.value for level, _ in found.without_gain] == without
 
 
-def test_accuracy_levels_that_cannot_differ_are_not_reported_as_bringing_no_improvement():
+def test_accuracy_levels_that_cannot_differ_are_not_reported_as_useless():
     assert benchmark(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
     assert benchmark(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
     assert "conditions (3.2% at `quick`)" in benchmark(None, None, None, regime=Regime.CHAOTIC).advice

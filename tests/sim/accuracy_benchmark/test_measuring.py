@@ -29,7 +29,7 @@ def test_every_accuracy_level_meets_its_stated_accuracy(motion):
         assert state_error(found, truth) <= level.promise
 
 
-def test_higher_accuracy_levels_improve_periodic_motion_and_not_chaos():
+def test_higher_accuracy_levels_improve_periodic_motions_but_not_chaotic_ones():
     periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error
@@ -48,6 +48,6 @@ def test_chaotic_scatter_exceeds_differences_between_accuracy_levels():
     assert "`quick` is sufficient" in chaotic.advice
 
 
-def test_a_motion_of_another_kind_than_declared_is_refused():
+def test_a_motion_that_is_not_of_the_declared_kind_is_refused():
     with pytest.raises(ArithmeticError, match="is called periodic"):
         settled_state(Motion(Regime.PERIODIC, "hertz", 260.0, 5e-6))

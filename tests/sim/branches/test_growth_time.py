@@ -13,7 +13,7 @@ PERIODS = 12
 
 
 @pytest.mark.thorough
-def test_the_distance_from_an_unstable_motion_grows_by_a_factor_of_e_in_one_growth_time():
+def test_the_distance_from_an_unstable_motion_grows_e_fold_in_one_growth_time():
     specimen = hardening()
     found = next(shoot_branches(specimen, FrequencyPath((3e-6,)), 95.0, 125.0, MotionSearch(2, 1)))
     branch = found.branch

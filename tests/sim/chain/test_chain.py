@@ -37,7 +37,7 @@ def test_an_impossible_number_of_cells_is_refused_with_a_readable_message(cells)
         chain_of(gong2025(), cells)
 
 
-def test_a_chain_refuses_rigid_stops_and_names_the_cell():
+def test_a_chain_with_rigid_stops_is_refused_with_the_number_of_the_cell():
     soft = gong2025()
     rigid = Specimen(soft.masses, soft.stiffnesses, soft.dampings, soft.gap_m, RigidStops(0.8))
     with pytest.raises(ValueError, match=r"^Cell 2 has rigid stops, .* such as hunt_crossley:0\.5\.$"):

@@ -119,7 +119,7 @@ def test_a_unit_cell_of_two_equal_cells_has_the_folded_bands_of_one_cell():
 
 @given(seed=st.integers(0, 10_000), cells=st.integers(1, 4))
 @settings(max_examples=25, deadline=None)
-def test_waves_of_unequal_cells_propagate_in_bands_and_decay_in_gaps(seed, cells):
+def test_waves_in_chains_of_unequal_cells_propagate_in_bands_and_decay_in_gaps(seed, cells):
     random = np.random.default_rng(seed)
     unit = Chain(
         tuple(

@@ -24,7 +24,7 @@ def drifts(contact, cells, duration_s):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("cells", [2, 4])
-def test_undamped_hertz_chains_have_small_unbiased_energy_errors(cells):
+def test_undamped_chains_with_hertz_contacts_have_small_energy_errors_without_bias(cells):
     found = drifts("hertz", cells, 0.5)
     assert np.abs(found).max() < 2e-5
     assert found.min() < 0.0 < found.max()
@@ -33,7 +33,7 @@ def test_undamped_hertz_chains_have_small_unbiased_energy_errors(cells):
 @pytest.mark.parametrize(
     ("contact", "bound"), [("power:5", 3e-5), ("power:3", 3e-5), ("linear_gap:2e5", 1e-6)]
 )
-def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
+def test_undamped_chains_with_other_contact_laws_keep_their_energy(contact, bound):
     assert np.abs(drifts(contact, 3, 0.5)).max() < bound
 
 

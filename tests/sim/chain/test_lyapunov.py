@@ -46,6 +46,6 @@ def test_a_duration_that_can_give_no_error_is_refused_with_a_readable_message(du
         chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=duration_s)
 
 
-def test_an_exponent_of_too_many_windows_is_refused():
+def test_an_exponent_that_needs_too_many_windows_is_refused():
     with pytest.raises(ValueError, match=r"of 1 cells are not allowed: they need .* Shorten the run"):
         chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=1e9)

@@ -34,7 +34,7 @@ def test_the_response_of_a_cell_to_another_within_a_window_stays_below_its_bound
                     assert relative[i, j] <= bounds[abs(i - j)] * (1.0 + 1e-6) + 1e-15
 
 
-def test_the_coupling_of_neighbours_grows_with_the_3rd_or_6th_power_of_time():
+def test_the_coupling_of_neighbouring_cells_grows_with_the_3rd_or_6th_power_of_time():
     for damping_time_s, order in ((2e-5, 3.0), (0.0, 6.0)):
         between = markov_between(chain_of(gong2025(damping_time_s=damping_time_s), 2))
         coarse, fine = (cross_answers(between, window)[1] for window in (1e-6, 0.5e-6))

@@ -54,7 +54,7 @@ def test_mirrored_collisions_are_mirrored_to_the_last_bit():
 
 
 @pytest.mark.parametrize(("speed", "drive"), [(1e-6, DRIVE), (0.1, Harmonic(50_000.0, 1e-9))])
-def test_unpredictable_collisions_are_resolved_in_steps(speed, drive):
+def test_collisions_that_cannot_be_predicted_are_resolved_in_steps(speed, drive):
     start = at_stop(speed)
     state, _ = follow_run(start, 1e-4, STANDARD, drive)
     by_steps, _ = follow_run(start, 1e-4, 1e-11, drive)

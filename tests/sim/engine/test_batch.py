@@ -110,7 +110,7 @@ def test_a_motion_that_ends_in_contact_continues_from_that_state():
     assert scaled_error(on_stop.motion, exact.final_state) < 1e-3
 
 
-def test_a_motion_does_not_depend_on_its_batch():
+def test_a_motion_does_not_depend_on_the_other_motions_of_its_batch():
     drives, starts = random_scenes(20, 3)
     periods = [1 + 13 * k for k in range(20)]
     together = follow(SPECIMEN, drives, starts, periods)
@@ -137,7 +137,7 @@ def observe_alone(specimen, drive, start, periods):
 
 
 @pytest.mark.parametrize("specimen", [SPECIMEN, gong2025(gap_m=(30e-6, 60e-6))])
-def test_peaks_and_lines_of_a_batch_match_those_of_single_motions(specimen: Specimen):
+def test_peaks_and_spectral_lines_in_a_batch_match_those_of_single_motions(specimen: Specimen):
     drives, starts = random_scenes(60, 11)
     starts = [start for start in starts if -specimen.gaps_m[0] < start[1] - start[2] < specimen.gaps_m[1]]
     drives, peaks, lines = drives[: len(starts)], [], []
@@ -190,7 +190,7 @@ def test_peaks_of_a_batch_without_contact_have_a_closed_form():
         (replace(SPECIMEN, contact=Hertz(1e300)), STANDARD, False),
     ],
 )
-def test_only_lightly_damped_specimens_with_hertz_stops_are_batchable(specimen: Specimen, tolerance, follows):
+def test_batches_need_a_lightly_damped_specimen_with_hertz_stops(specimen: Specimen, tolerance, follows):
     assert is_batchable(specimen, tolerance) is follows
 
 

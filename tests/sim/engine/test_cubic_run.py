@@ -87,7 +87,7 @@ def test_standard_accuracy_differs_from_reference_accuracy_by_no_more_than_promi
     assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
 
 
-def test_a_run_ends_at_the_first_impact_that_cannot_be_stored():
+def test_a_run_ends_at_the_first_impact_for_which_there_is_no_room():
     specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
     _, whole = advance(specimen, pieces, 2e-5)
     run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)

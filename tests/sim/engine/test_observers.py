@@ -39,7 +39,7 @@ def test_peaks_and_spectral_lines_of_a_run_match_its_samples(law, tolerance):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_observers_do_not_change_the_motion(law):
+def test_observing_peaks_and_lines_does_not_change_the_motion(law):
     drive = Harmonic(260.0, 5e-6)
     motions = []
     for watch in Watch:

@@ -25,7 +25,7 @@ def test_the_error_of_a_correlated_mean_matches_the_closed_form(memory):
     assert np.mean([each.correlation_length for each in found]) == pytest.approx(correlated, rel=0.35)
 
 
-def test_block_means_scatter_within_their_stated_errors():
+def test_the_means_of_blocks_scatter_as_their_stated_errors_predict():
     means = [block_mean(autoregression(0.8, 4096, seed)) for seed in range(150)]
     scores = [each.mean / each.standard_error for each in means]
     assert 0.8 < np.std(scores) < 1.3

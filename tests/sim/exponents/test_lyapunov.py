@@ -32,7 +32,7 @@ def test_the_exponent_without_impacts_is_the_slowest_decay_rate(contact):
     assert found.local_exponents_per_s[50:].mean() == pytest.approx(found.exponent_per_s, abs=0.05)
 
 
-def test_exponents_agree_with_the_statements_of_the_paper_on_chaos():
+def test_exponents_agree_with_what_the_paper_states_on_chaos():
     # Paper, section 3.1 and Fig. 10: above 100 per second with collisions at 5 um; about zero at 1 um.
     colliding = lyapunov_exponent(gong2025(), CHAOS)
     assert colliding.verdict is ExponentVerdict.CHAOTIC

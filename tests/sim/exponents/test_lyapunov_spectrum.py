@@ -34,7 +34,7 @@ def test_the_sum_of_exponents_equals_the_trace_of_the_damping(contact, drive):
 
 
 @pytest.mark.parametrize(("accuracy", "allowed"), [(Accuracy.QUICK, 1e-2), (Accuracy.STANDARD, 1e-4)])
-def test_the_sum_of_exponents_is_within_the_error_of_each_accuracy(accuracy, allowed):
+def test_the_sum_of_exponents_is_within_the_stated_error_of_each_accuracy_level(accuracy, allowed):
     found = lyapunov_spectrum(gong2025(), LARGE, accuracy, duration_s=2.0, settle_s=0.2)
     assert found.sum_per_s == pytest.approx(damping_trace(gong2025()), rel=allowed)
 

@@ -36,7 +36,7 @@ def test_lasting_chaos_is_reported_for_the_whole_run():
     assert found.since == 0
 
 
-def test_a_contact_free_final_motion_begins_after_the_last_impact():
+def test_a_final_motion_without_contact_begins_after_the_last_impact():
     impacts = np.where(np.arange(COUNT) < 250, 3, 0)
     found = settling(a_run(noise(2.0), impacts=impacts, is_quiet=True), np.ones(6))
     assert found.motion is FinalMotion.QUIET
@@ -80,7 +80,7 @@ def test_a_periodic_motion_that_turns_chaotic_is_not_reported_as_settled():
     assert settling(a_run(growth), np.ones(6)).motion is FinalMotion.THROUGHOUT
 
 
-def test_no_end_of_chaos_is_found_in_noise_around_zero():
+def test_no_end_of_chaos_is_found_in_an_exponent_that_scatters_around_zero():
     found = [settling(a_run(noise(0.0, seed)), np.ones(6)).motion for seed in range(40)]
     assert found.count(FinalMotion.SETTLED) == 0
 

@@ -47,7 +47,7 @@ def test_finite_differences_converge_to_the_tangent_map(contact, gap_m):
 
 
 @pytest.mark.parametrize("contact", ELASTIC)
-def test_phase_space_volume_shrinks_by_the_damping_alone(contact):
+def test_the_volume_in_phase_space_shrinks_by_the_damping_alone(contact):
     # Liouville: elastic forces do not contribute to the divergence of the flow.
     specimen = gong2025(contact=contact)
     tangent, _, _ = run_with_tangent(specimen)
@@ -93,7 +93,7 @@ def test_a_higher_accuracy_level_gives_a_tangent_map_closer_to_the_reference(con
         assert standard < 0.2 * quick
 
 
-def test_an_impact_shrinks_phase_space_volume_by_restitution_squared():
+def test_an_impact_shrinks_the_volume_in_phase_space_by_the_square_of_the_restitution():
     specimen = gong2025(contact="rigid:0.8")
     tangent, _, impacts = run_with_tangent(specimen)
     rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))

@@ -186,7 +186,7 @@ def test_independent_points_of_one_specimen_are_computed_in_batches(said, lanes)
     assert ("SIMD" in estimate_map(plan, 1).sentence) is lanes
 
 
-def test_settling_in_a_batch_does_not_depend_on_other_scenes():
+def test_the_settling_of_a_scene_does_not_depend_on_other_scenes_of_its_batch():
     plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
     scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
     together = [each.prediction for each in solve_scenes(scenes, Question.MOTION)]
@@ -211,7 +211,7 @@ def test_a_periodic_motion_has_the_same_responses_in_batches(frequency_hz, ampli
     assert beside.response_ii == pytest.approx(alone.response_ii, rel=1e-5)
 
 
-def test_a_map_along_one_quantity_keeps_one_state_per_drive_period():
+def test_a_map_along_one_quantity_stores_one_state_per_drive_period():
     plan = Map(frequency_hz=Range(start=120.0, stop=130.0, points=3), amplitude_m=2e-5, chain=("up", "down"))
     results = solve_map(plan, workers=1)
     section, period = results.values("section_p"), results.values("period")
@@ -240,7 +240,7 @@ def test_random_initial_states_are_refused_if_the_map_varies_the_initial_state(o
             asked(plan)
 
 
-def test_a_map_with_an_error_target_keeps_the_errors_of_its_points():
+def test_a_map_with_an_error_target_stores_the_errors_of_its_points():
     plan = Map(
         frequency_hz=Range(start=120, stop=140, points=3),
         amplitude_m=Range(start=1e-6, stop=2e-5, points=2),
@@ -253,7 +253,7 @@ def test_a_map_with_an_error_target_keeps_the_errors_of_its_points():
     assert "error_estimate" not in {column.name for column in plan.model_copy(update={"error": None}).columns}
 
 
-def test_a_diagram_with_an_error_target_keeps_one_state_per_drive_period():
+def test_a_diagram_with_an_error_target_stores_one_state_per_drive_period():
     plan = Map(frequency_hz=Range(start=120, stop=140, points=3), amplitude_m=2e-5, error=0.01, chain=["up"])
     results = solve_map(plan)
     assert np.all(np.isfinite(results.arrays["section_x"][:, 0]))

@@ -60,7 +60,7 @@ def test_every_map_cell_is_computed_or_filled_in_once():
     st.floats(9, 40),
     st.sampled_from([2, 4, 8]),
 )
-def test_map_features_wider_than_the_lattice_are_filled_in_correctly(shape, centre, radius, coarse):
+def test_regions_of_a_map_wider_than_the_lattice_spacing_are_filled_correctly(shape, centre, radius, coarse):
     codes = disc(shape, centre, radius)
     known, plan = refine(codes, coarse)
     is_wrong = fill_codes(codes, known, plan) != codes
@@ -68,7 +68,7 @@ def test_map_features_wider_than_the_lattice_are_filled_in_correctly(shape, cent
     assert is_wrong.sum() <= 4
 
 
-def test_a_thin_region_of_a_map_is_refined_completely_once_found():
+def test_a_thin_region_of_a_map_is_refined_completely_once_a_point_of_it_is_found():
     codes = np.zeros((65, 65), dtype=np.int64)
     columns = np.arange(65)
     codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
@@ -110,7 +110,7 @@ def test_the_audit_of_a_map_finds_wrongly_filled_cells():
     assert (sum(audit.gained), sum(audit.lost)) == (audit.wrong, audit.wrong)
 
 
-def test_unaudited_filled_cells_widen_the_share_intervals():
+def test_filled_cells_that_were_not_audited_widen_the_intervals_of_shares():
     unaudited = Audit(filled=30, audited=0, wrong=0, gained=(0.0, 0.0), lost=(0.0, 0.0))
     shares = unaudited.corrected_shares((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
     assert [each.share for each in shares] == [0.9, 0.1]

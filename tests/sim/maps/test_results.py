@@ -38,7 +38,7 @@ def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
 
 
-def test_shares_of_a_map_match_its_points_corrected_by_the_audit(adaptive):
+def test_the_shares_of_a_map_are_those_of_its_points_corrected_by_the_audit(adaptive):
     assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
     audit, cells = adaptive.audit, adaptive.plan.grid.size
     for number, motion in enumerate(adaptive.motions):
@@ -122,7 +122,7 @@ def test_a_basin_boundary_of_known_dimension_has_the_right_exponent():
     assert rough.exponent == pytest.approx(1.0 - np.log(2.0) / np.log(3.0), abs=0.12)
 
 
-def test_a_random_basin_map_has_no_uncertainty_exponent():
+def test_no_uncertainty_exponent_is_determined_for_a_random_basin_map():
     labels = np.random.default_rng(3).integers(0, 2, (200, 200))
     assert uncertainty_exponent(labels) is None
     assert uncertainty_exponent(np.zeros((64, 64), dtype=np.int64)) is None

@@ -19,7 +19,7 @@ def energy(specimen, state):
     return stored_energy(specimen, state) + 0.4 * specimen.contact.stiffness * pressed**2.5
 
 
-def test_phase_does_not_drift_over_a_million_periods():
+def test_the_phase_of_a_motion_does_not_drift_over_a_million_periods():
     specimen, drive = paper(contact="linear"), Harmonic(256.0, 1e-6)
     start = integrate(specimen, drive, 2.0).final_state
     late = integrate(specimen, drive, 2.0, start_time_s=4096.0).final_state

@@ -51,7 +51,7 @@ def test_the_responses_match_the_trajectory(contact, drive):
     assert response.impacts == np.count_nonzero(run.impacts.times_s > 0.4)
 
 
-def test_an_unfinished_run_gives_no_response():
+def test_a_run_that_did_not_reach_its_end_has_no_response():
     response = steady_response(gong2025(), Harmonic(130.0, 20e-6), max_impact_rate_hz=1.0)
     assert response.outcome is Outcome.TOO_MANY_IMPACTS
     assert np.isnan(response.response_i)

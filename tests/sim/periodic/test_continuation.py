@@ -105,7 +105,7 @@ def test_an_undefined_residual_ends_the_branch_with_a_reason():
     assert last.point[-1] == pytest.approx(0.5, abs=1e-5)
 
 
-def test_repeated_kinks_end_the_branch_soon():
+def test_a_branch_with_repeated_kinks_ends_soon():
     points = list(trace(Sawtooth(), np.array([0.0, -0.1]), 1.0, (-1.0, 1.0), ArcSteps()))
     assert points[-1].end is ArcEnd.STEP_TOO_SHORT
     assert points[-1].point[-1] == pytest.approx(0.0, abs=1e-3)

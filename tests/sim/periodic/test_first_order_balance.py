@@ -89,7 +89,7 @@ def test_the_duffing_resonance_lies_on_its_backbone():
     assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # quarter period behind the sine drive
 
 
-def test_slopes_of_the_condensed_model_match_differences_over_frequency():
+def test_derivatives_of_the_condensed_model_match_finite_differences_over_frequency():
     structure, harmonics, omega, step = structure_of(gong2025()), np.array([0, 1, 2, 7]), 1500.0, 0.01
     before, here, after = (condense(structure, omega + d, harmonics) for d in (-step, 0.0, step))
     slope = (after.compliance - before.compliance) / (2.0 * step)

@@ -32,7 +32,7 @@ def test_floquet_multipliers_without_a_spring_match_the_modes():
     "spring",
     [PowerSpring(0.5, ((3, 0.4),)), GapSpring(30.0, 1.0, 0.6, 0.6), GapSpring(30.0, 1.5, 0.6, math.inf)],
 )
-def test_perturbations_match_an_independent_integrator(spring):
+def test_the_evolution_of_perturbations_matches_an_independent_integrator(spring):
     structure = oscillator()
     motion = Motion(0.2, np.array([1, 3]), np.array([1.0 - 0.2j, 0.1j]))
 
@@ -58,7 +58,7 @@ def test_the_transition_matrix_of_a_mirrored_motion_is_that_of_half_a_period_squ
     np.testing.assert_allclose(transition(structure, spring, motion), half @ half, rtol=1e-6)
 
 
-def test_the_volume_of_perturbations_shrinks_by_damping_only():
+def test_the_volume_spanned_by_perturbations_shrinks_by_damping_only():
     # Liouville: det = exp(-tr(M^-1 C) T), independent of the contact.
     specimen = gong2025(damping_time_s=3e-5)
     motion = Motion(130.0, np.array([1, 3]), np.array([50e-6 + 0j, 5e-6j]))

@@ -78,7 +78,7 @@ def test_the_largest_displacement_matches_the_exact_orbit(exact_orbit):
     assert found.response_i[3] == pytest.approx(largest / drive.amplitude_m, rel=1e-5)
 
 
-def test_drive_power_equals_damping_power(exact_orbit):
+def test_the_power_of_the_drive_equals_the_power_of_damping(exact_orbit):
     specimen, drive, _, _ = exact_orbit
     found = balance_of(exact_orbit, 401)
     omega = 2.0 * math.pi * drive.frequency_hz
@@ -112,7 +112,7 @@ def test_harmonic_balance_without_a_spring_gives_the_exact_linear_response(kept)
     assert found.response_i == pytest.approx(found.response_ii, rel=1e-8)
 
 
-def test_a_motion_that_does_not_reach_the_stops_is_linear():
+def test_a_balanced_motion_that_does_not_reach_the_stops_is_the_linear_one():
     specimen = gong2025()
     found = balance(structure_of(specimen), spring_of(specimen), 60.0, 1e-6)
     assert found.left_out == 0.0
@@ -120,7 +120,7 @@ def test_a_motion_that_does_not_reach_the_stops_is_linear():
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 47])
-def test_balance_with_one_harmonic_is_the_analytical_solution_of_the_paper(exponent):
+def test_harmonic_balance_with_one_harmonic_is_the_analytical_solution_of_the_paper(exponent):
     structure, spring = structure_of(gong2025()), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
     (state,) = first_order_states(structure, spring, 60.0, 5e-6)
     found = balance(structure, spring, 60.0, 5e-6, BalanceOptions(fewest=1, most=1))
@@ -137,7 +137,7 @@ def test_balance_with_one_harmonic_is_the_analytical_solution_of_the_paper(expon
         GapSpring(100.0, 1.5, 0.5, 0.8, loss=0.3, beside=40.0),
     ],
 )
-def test_the_jacobian_and_both_slopes_are_the_derivatives_of_the_residual(spring):
+def test_the_jacobian_and_both_parameter_derivatives_are_those_of_the_residual(spring):
     structure = two_masses(0.03)
     problem = BalanceProblem(structure, spring, harmonics_up_to(7, HarmonicSet.ALL))
     unknowns = np.random.default_rng(5).normal(size=problem.size)

@@ -51,7 +51,7 @@ def test_a_complex_pair_is_on_the_unit_circle_at_a_neimark_sacker_point(upward_b
         assert np.abs(orbit.floquet_multipliers[on_circle].imag).min() > 0.1
 
 
-def test_perturbations_decay_at_stable_and_grow_at_unstable_points(upward_branch):
+def test_perturbations_decay_at_stable_and_grow_at_unstable_points_of_a_branch(upward_branch):
     for is_stable in (True, False):
         place = int(np.flatnonzero(upward_branch.is_stable == is_stable)[-1])
         drive = Harmonic(float(upward_branch.frequencies_hz[place]), 5e-6)

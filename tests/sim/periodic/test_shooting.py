@@ -36,7 +36,7 @@ def test_the_product_of_the_floquet_multipliers_follows_from_the_damping(frequen
         assert np.abs(orbit.floquet_multipliers - value).min() < 1e-7
 
 
-def test_the_orbit_without_contact_is_the_linear_response():
+def test_the_periodic_orbit_without_contact_is_the_linear_response():
     specimen, drive = gong2025(contact="linear"), Harmonic(266.0, 5e-6)
     orbit = periodic_orbit(specimen, drive, start=np.zeros(6))
     linear = np.abs(base_transmissibility(specimen, 266.0)[0])
@@ -46,7 +46,7 @@ def test_the_orbit_without_contact_is_the_linear_response():
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
-def test_the_largest_p_between_rigid_stops_is_the_gap_within_the_stated_error(restitution):
+def test_the_largest_p_between_rigid_stops_equals_the_gap_within_the_stated_error(restitution):
     orbit = periodic_orbit(gong2025(3e-5, contact=f"rigid:{restitution}"), Harmonic(130.0, 20e-6))
     assert orbit.impacts > 0
     difference = abs(orbit.response_i[3] - 45e-6 / 20e-6)
@@ -76,7 +76,7 @@ def test_the_derivative_of_the_period_map_matches_that_of_a_linear_flow():
     np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
 
 
-def test_a_chaotic_section_has_no_period_and_a_settled_orbit_has_period_one():
+def test_a_chaotic_poincare_section_has_no_period_and_that_of_a_settled_orbit_period_one():
     drive = Harmonic(130.0, 20e-6)
     section = stroboscopic_section(SPECIMEN, drive, 300)
     assert smallest_period(section, state_scales(SPECIMEN, drive)) == 1

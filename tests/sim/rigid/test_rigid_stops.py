@@ -196,7 +196,7 @@ def bound_motion(specimen, drive, state, begin_s, end_s):
     return (expm(system * (end_s - begin_s)) @ np.concatenate([state[[0, 2, 3, 5]], base]))[:4]
 
 
-def test_m1_and_m2_move_as_one_body_during_sticking():
+def test_m1_and_m2_move_as_one_body_while_they_stick():
     specimen = rigid(0.0)
     run = integrate(specimen, STICKING, 0.1, sample_rate_hz=1e5)
     first, last = held_stretch(run, specimen.gap_m)
@@ -205,7 +205,7 @@ def test_m1_and_m2_move_as_one_body_during_sticking():
     np.testing.assert_allclose(run.states[last][[0, 2, 3, 5]], expected, rtol=1e-9)
 
 
-def test_m1_is_released_when_the_contact_force_vanishes():
+def test_m1_is_released_from_a_rigid_stop_when_the_contact_force_vanishes():
     specimen = rigid(0.0)
     run = integrate(specimen, STICKING, 0.1, sample_rate_hz=1e6)
     first, last = held_stretch(run, specimen.gap_m)

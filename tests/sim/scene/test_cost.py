@@ -59,7 +59,7 @@ def test_the_computing_time_of_scenes_is_within_the_estimated_factor(ledger, con
     assert np.count_nonzero(held) >= SCENES - 3
 
 
-def test_a_scene_plan_states_cost_uncertainty_and_source(ledger):
+def test_a_scene_plan_states_its_cost_with_the_uncertainty_and_the_source(ledger):
     scene = Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(3.0, 1.0))
     assert "too few such runs" in plan_scene(scene).explain()
     for _ in range(FEWEST):

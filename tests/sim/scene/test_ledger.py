@@ -95,7 +95,7 @@ def test_costs_of_unused_kinds_of_run_adapt_to_a_slower_machine(ledger):
     assert 1.2 < ledger.expected_time(kinds[5], 1.0).time_s < 2.6
 
 
-def test_one_outlier_changes_a_cost_estimate_little(ledger):
+def test_a_single_outlier_changes_a_cost_estimate_only_a_little(ledger):
     for _ in range(10):
         ledger.learn(KIND, 1.0, 1.0)
     ledger.learn(KIND, 1.0, 100.0)

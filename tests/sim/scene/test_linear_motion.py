@@ -51,7 +51,7 @@ def test_the_transient_has_decayed_at_the_stated_time():
     assert motion.transient_share(0.5 * when_s) > 1e-5
 
 
-def test_contact_is_excluded_only_if_a_bound_proves_it():
+def test_contact_is_excluded_only_if_a_bound_on_the_motion_proves_it():
     quiet, loud = Harmonic(200.0, 1e-6), Harmonic(200.0, 1e-4)
     for contact in ("hertz", "linear_gap", "rigid:0.8"):
         specimen = gong2025(contact=contact)
@@ -62,6 +62,6 @@ def test_contact_is_excluded_only_if_a_bound_proves_it():
     assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))
 
 
-def test_overflowing_parameters_are_refused_with_a_readable_message():
+def test_parameters_that_cause_an_overflow_are_refused_with_a_readable_message():
     with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
         linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

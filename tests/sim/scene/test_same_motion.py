@@ -101,7 +101,7 @@ def test_a_chaotic_motion_that_may_turn_into_another_is_not_called_final(kinds, 
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_merged_runs_have_the_larger_uncertainty(order):
+def test_runs_merged_into_one_motion_have_the_larger_of_their_uncertainties(order):
     calm, burst = reached_motion(TORUS, None, 1.0, 0.001), reached_motion(CHAOS, None, 1.0, 0.02)
     errors = {id(calm): 1e-6, id(burst): 0.04}
     assert _error([calm, burst][::order], lambda each: errors[id(each)]) == 0.04

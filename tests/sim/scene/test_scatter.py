@@ -22,7 +22,7 @@ def test_the_scatter_of_a_gumbel_maximum_is_found():
     assert found.relative == pytest.approx(truth, rel=0.05)
 
 
-def test_too_few_blocks_give_no_scatter():
+def test_no_scatter_is_estimated_from_too_few_blocks():
     assert window_scatter(np.random.default_rng(5).uniform(1.0, 2.0, 3), 3) is None
 
 

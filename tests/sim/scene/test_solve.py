@@ -94,7 +94,7 @@ def test_whole_cycles_of_a_periodic_motion_are_skipped(integrated):
     assert found.duration_s == pytest.approx(30.0)
 
 
-def test_no_part_of_chaos_is_skipped(integrated):
+def test_no_part_of_a_chaotic_motion_is_skipped(integrated):
     solve_scene(Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(30.0, 5.0)))
     assert sum(each.length_s for each in integrated) >= 30.0
 
@@ -126,7 +126,7 @@ def test_chaotic_runs_from_other_initial_states_are_within_the_stated_error():
     assert np.count_nonzero(outside) < 8
 
 
-def test_a_torus_is_distinguished_from_chaos():
+def test_a_motion_on_a_torus_is_distinguished_from_chaos():
     found = solve_scene(scene_of("power:3", 225.0, 5e-6, duration=AutomaticDuration()))
     assert found.motion is MotionKind.QUASI_PERIODIC
     assert found.scatter < 1e-3
@@ -201,7 +201,7 @@ def test_chaos_that_ends_during_the_averaging_of_its_exponent_gets_no_negative_e
             assert each.lyapunov_per_s is None or each.lyapunov_per_s > 3.0 * each.lyapunov_error_per_s
 
 
-def test_a_diverging_motion_has_an_outcome_and_no_response():
+def test_a_diverging_motion_has_an_outcome_but_no_response():
     """The initial state is so far out that the contact force overflows."""
     begins_far = Given((0.0, 1e300, -1e300, 0.0, 0.0, 0.0))
     scene = scene_of("power:7", 130.0, 20e-6, start=begins_far, duration=FixedDuration(0.1, 0.05))

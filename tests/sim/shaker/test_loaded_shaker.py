@@ -137,7 +137,7 @@ def stored_energy(specimen, state):
     return 0.5 * (kinetic + elastic + SHAKER.coil_inductance_h * state["current"] ** 2)
 
 
-def test_the_amplifier_clips_at_its_largest_voltage():
+def test_the_output_of_the_amplifier_is_clipped_at_its_largest_voltage():
     table = loaded_shaker(amplifier=replace(AMPLIFIER, clip_v=5.0))
     drive = tones(5.0, [100.0])
     motion = table.move(drive, np.zeros(SECOND))
@@ -185,13 +185,13 @@ def test_a_motion_that_is_not_finite_raises_an_error_that_states_its_time():
         table.move(drive, np.zeros(100))
 
 
-def test_states_at_step_ends_are_kept_only_on_request():
+def test_the_states_at_the_ends_of_steps_are_kept_only_on_request():
     table = loaded_shaker()
     assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
     assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
 
 
-def test_two_consecutive_simulations_equal_the_whole():
+def test_two_consecutive_simulations_equal_one_simulation_of_the_whole():
     drive = tones(0.7, [260.0])
     whole, parts = loaded_shaker(), loaded_shaker()
     expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
@@ -211,7 +211,7 @@ def test_replaying_the_recorded_coil_voltage_reproduces_the_table_motion():
     assert driven.structure["limited_steps"] == 0
 
 
-def test_one_simulation_call_equals_a_series_of_blocks():
+def test_one_simulation_of_a_voltage_equals_a_simulation_in_blocks():
     drive, block = tones(0.7, [266.0])[:9500], 1000
     whole, stepwise = loaded_shaker(), loaded_shaker()
     motion = whole.move(drive, block=block)

@@ -40,7 +40,7 @@ def test_the_force_of_a_sum_of_three_powers_lies_between_its_lowest_and_highest_
     assert sum_ <= max(third, seventh) * (1 + 1e-12)
 
 
-def test_a_high_power_law_is_finite_and_negligible_below_its_reference():
+def test_a_law_of_high_power_is_finite_and_negligible_below_its_reference():
     spring = spring_of(gong2025(contact="power:201"))
     near, far = spring.force(np.array([46e-6, 1e-9]), np.zeros(2))
     assert near == pytest.approx(HERTZ.stiffness * 1e-9, rel=1e-2)

@@ -10,7 +10,7 @@ from vibench.sim.specimen.modes import modal_form, state_matrix
 DAMPINGS = st.floats(0.0, 1e-2)
 
 
-def test_at_zero_frequency_all_masses_follow_the_base():
+def test_all_masses_follow_the_base_at_zero_frequency():
     np.testing.assert_allclose(base_transmissibility(gong2025(), 0.0), [[1.0, 1.0, 1.0, 0.0]], atol=1e-14)
 
 
@@ -51,7 +51,7 @@ def test_the_modes_rebuild_any_state_and_its_time_derivative(first, second, thir
     assert (form.rates.real <= 0.0).all()
 
 
-def test_the_decay_rates_add_up_to_the_trace_of_the_damping():
+def test_the_decay_rates_of_the_modes_add_up_to_the_trace_of_the_damping():
     form = modal_form(gong2025(damping_time_s=3e-5))
     assert 2.0 * form.rates.real.sum() == pytest.approx(-390.081, abs=1e-3)
 
@@ -103,7 +103,7 @@ def test_strongly_overdamped_modes_are_separated(damping_time_s):
     )
 
 
-def test_a_slow_mode_is_separated_from_fast_decays():
+def test_a_slow_mode_is_separated_from_quickly_decaying_modes():
     specimen = dataclasses.replace(gong2025(), dampings=(1e4, 0.3, 3e6))
     rates = modal_form(specimen).rates
     system, _ = state_matrix(specimen)

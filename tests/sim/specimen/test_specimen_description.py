@@ -210,7 +210,7 @@ def test_a_random_specimen_round_trips_through_its_file(tmp_path):
         ),
     ],
 )
-def test_booleans_and_texts_are_not_accepted_as_numbers(tmp_path, given, instead):
+def test_booleans_and_texts_are_not_accepted_as_numbers_of_a_specimen(tmp_path, given, instead):
     file = write_file(tmp_path, WHOLE.replace(given, instead))
     write_file(tmp_path, f'model = "{file.name}"\nname = "heir"\n', "heir.toml")
     for each in (file, tmp_path / "heir.toml"):

@@ -114,7 +114,7 @@ def test_a_motion_with_one_contact_per_period_is_not_reported_as_start_dependent
     assert solve_in_batch(scene).memory is StartMemory.KEPT
 
 
-def test_transients_are_computed_singly():
+def test_points_observed_during_a_transient_are_computed_singly():
     # m1 has more than a hundred impacts per period, whose errors add up during the transient.
     state = (-4.911e-05, -5.537e-05, 9.979e-06, -0.02334, 0.01178, 0.03798)
     drive, length = Harmonic(105.98, 3.15e-07), FixedDuration(2.5, 1.0)

@@ -20,7 +20,7 @@ def test_grid_positions_match_numpy_unravel_index(axes):
 
 @settings(deadline=None, max_examples=30)
 @given(axes)
-def test_grid_neighbours_differ_by_one_step_along_one_ordered_axis(axes):
+def test_neighbouring_grid_points_differ_by_one_step_along_one_ordered_axis(axes):
     shape, ordered = zip(*axes, strict=True)
     grid = Grid(shape, ordered)
     for number in range(grid.size):

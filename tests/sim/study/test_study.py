@@ -27,7 +27,7 @@ def test_the_default_specimen_of_a_study_is_gong2025():
     assert (study.models, study.damping_times_s, study.gaps_m) == (("hertz",), (2e-5,), (45e-6,))
 
 
-def test_unvaried_values_of_a_study_come_from_its_specimen():
+def test_values_that_a_study_does_not_vary_come_from_its_specimen():
     own = {"model": "asymmetric", "dampings_ns_per_m": [0.5, 0.01, 0.3], "contact": "rigid:0.7"}
     study = Study(**LEAST, specimen=own)
     scene = study.scene((0,) * 6, Rest())

@@ -52,7 +52,7 @@ IEPE = {"ai_excit_src": ExcitationSource.INTERNAL, "ai_excit_val": 0.002}
         ("Dev2/ai0:4", {}, {}, 60e3, "50000"),
     ],
 )
-def test_settings_that_a_device_lacks_are_refused_with_the_allowed_values(
+def test_settings_that_a_device_does_not_have_are_refused_with_the_allowed_values(
     task, channels, options, settings, rate_hz, allowed
 ):
     channel = task.ai_channels.add_ai_voltage_chan(channels, **options)
@@ -104,7 +104,7 @@ def test_missing_inputs_and_invalid_combinations_are_refused(task, names, code):
         task.ai_channels.add_ai_voltage_chan(names)
 
 
-def test_later_channels_of_a_list_may_leave_out_the_device(task):
+def test_the_device_may_be_left_out_after_the_first_channel_of_a_list(task):
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0, ai2")
     assert task.channel_names == ["Dev1/ai0", "Dev1/ai2"]
 

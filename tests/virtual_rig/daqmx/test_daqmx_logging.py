@@ -68,7 +68,7 @@ def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
     assert len(task.read(10)) == 2
 
 
-def test_outputs_are_not_logged(daq, tmp_path):
+def test_the_logging_of_outputs_is_refused(daq, tmp_path):
     output = daq.outputs("Dev1/ao0", 1)
     with daq_error(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS):
         logging(output, tmp_path / "x")

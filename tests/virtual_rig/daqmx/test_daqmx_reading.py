@@ -41,7 +41,7 @@ def test_no_sample_is_lost_or_repeated_between_reads_of_any_size(task, samples):
         np.testing.assert_allclose(block, closed_form((1, 2, 3), number * samples, samples), atol=1e-7)
 
 
-def test_samples_have_the_requested_layout(task, daq):
+def test_samples_are_read_in_the_requested_layout(task, daq):
     by_channel, by_scan = np.empty((3, 10)), np.empty((10, 3))
     interpreter = task._interpreter
     interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_CHANNEL.value, by_channel)
@@ -78,7 +78,7 @@ def test_polling_for_samples_advances_the_simulated_time(task):
     assert len(task.read(READ_ALL_AVAILABLE)[0]) >= 100
 
 
-def test_polling_for_the_end_advances_the_simulated_time(daq):
+def test_polling_for_the_end_of_a_task_advances_the_simulated_time(daq):
     task = daq.inputs("Dev1/ai1", 1000, samples=500)
     task.start()
     questions = 0
@@ -145,7 +145,7 @@ def test_a_committed_task_stays_reserved_after_a_stop(task, daq):
     rival.start()
 
 
-def test_stopping_a_task_stops_the_conversion(task, daq):
+def test_stopping_a_task_stops_its_conversion(task, daq):
     task.read(10)
     assert len(daq.world.conversions) == 1
     task.stop()

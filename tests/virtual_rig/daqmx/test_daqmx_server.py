@@ -20,7 +20,7 @@ def restart(daq):
     daq.server.faults.add(None)()
 
 
-def test_messages_of_many_megabytes_are_accepted(daq):
+def test_messages_of_many_megabytes_are_accepted_by_the_server(daq):
     task = daq.inputs("Dev1/ai1:2", 100e3)
     assert np.shape(task.read(400_000)) == (2, 400_000)
 

@@ -58,7 +58,7 @@ def test_a_timeout_returns_the_samples_so_far(task, clock):
     assert task.in_stream.avail_samp_per_chan == 0
 
 
-def test_a_partial_read_of_two_channels_fills_both_rows_from_the_start(clock):
+def test_a_partial_read_of_two_channels_fills_both_rows_from_their_beginning(clock):
     task = clock.daq.inputs("Dev1/ai1:2", 1000)
     task.start()
     clock.advance(0.05)

@@ -112,7 +112,7 @@ def test_a_buffer_can_be_rewritten_while_it_repeats(pair):
     assert np.all(heard[-1000:] == 1.0)
 
 
-def test_stopping_silences_the_output_at_once(pair, daq):
+def test_stopping_a_task_silences_its_output_at_once(pair, daq):
     inputs, outputs = pair
     play(pair, np.ones(1000))
     inputs.read(500)
@@ -143,7 +143,7 @@ def test_a_software_timed_output_holds_its_value(daq):
     assert inputs.read() == 1.25
 
 
-def test_two_outputs_play_one_row_of_samples_each(daq):
+def test_each_of_two_outputs_plays_one_row_of_samples(daq):
     task = daq.outputs("Dev2/ao0:1", 10.0)
     task.timing.cfg_samp_clk_timing(10000, samps_per_chan=200)
     rows = np.stack([ramp(200), -ramp(200)])

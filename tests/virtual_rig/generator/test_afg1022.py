@@ -138,14 +138,14 @@ def test_the_peak_limit_is_10_v_into_an_open_circuit_and_5_v_into_50_ohm():
     assert errors(device) == [-221]
 
 
-def test_declaring_another_load_changes_the_displayed_voltage_and_not_the_output():
+def test_declaring_another_load_changes_the_displayed_voltage_but_not_the_output():
     device = generator(b"VOLT 2;:OUTP:IMP INF")
     assert ask(device, "VOLT?") == "4.0E+00"
     device.execute(b"OUTP:IMP 150")
     assert float(ask(device, "VOLT?")) == pytest.approx(3.0)
 
 
-def test_phase_is_given_in_radians_and_kept_in_whole_degrees():
+def test_a_phase_is_given_in_radians_and_stored_in_whole_degrees():
     device = generator(b"PHAS:ADJ 31.9DEG")
     assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
     device.execute(f"PHAS:ADJ {math.radians(31):.12g}".encode())
@@ -164,16 +164,16 @@ def test_channels_with_locked_frequency_share_one_frequency():
     assert ask(device, "SOUR1:FREQ?") == "3.33E+02"
 
 
-def test_several_queries_in_one_message_answer_in_one_line():
+def test_several_queries_in_one_message_are_answered_in_one_line():
     assert ask(generator(), "*OPC?;SOUR1:FREQ?;VOLT?") == "1;1.0E+06;1.0E+00"
 
 
-def test_reset_selects_a_sine_of_1_mhz_and_1_v_with_the_output_off():
+def test_a_reset_selects_a_sine_of_1_mhz_and_1_v_with_the_output_off():
     device = generator(b"OUTP ON;:FUNC RAMP;:FREQ 5;:VOLT 3;:VOLT:OFFS 1;:OUTP2 ON", b"*RST")
     assert ask(device, "OUTP?;:OUTP2?;:FUNC?;:FREQ?;:VOLT?;:VOLT:OFFS?") == "0;0;SIN;1.0E+06;1.0E+00;0.0E+00"
 
 
-def test_the_event_register_distinguishes_kinds_of_error_and_clears_when_read():
+def test_the_event_register_distinguishes_kinds_of_error_and_is_cleared_when_read():
     device = generator()
     assert ask(device, "*ESR?") == "128"  # power on
     device.execute(b"NONSENSE")
@@ -182,7 +182,7 @@ def test_the_event_register_distinguishes_kinds_of_error_and_clears_when_read():
     assert ask(device, "*ESR?;*ESR?") == "17;0"
 
 
-def test_the_error_queue_overflows_at_its_end_and_clears_with_cls():
+def test_the_error_queue_reports_an_overflow_at_its_end_and_is_cleared_by_cls():
     device = generator(*[b"NONSENSE"] * 30)
     assert errors(device) == [-113] * 19 + [-350]
     device.execute(b"NONSENSE;*CLS")
@@ -203,7 +203,7 @@ class TestQuirks:
         assert reply == b"9.9E+37\xa6\xb8\n"
         assert reply.decode("gbk").strip() == "9.9E+37Ω"
 
-    def test_an_unknown_query_answers_an_empty_line_and_queues_minus_102(self):
+    def test_an_unknown_query_is_answered_by_an_empty_line_and_queues_error_minus_102(self):
         device = generator(unknown_is_syntax_error=True)
         assert device.execute(b"VOLT:LIM?").data == b"\n"
         assert errors(device) == [-102]

@@ -17,7 +17,7 @@ def test_only_the_first_unit_of_a_line_starts_at_the_scpi_root():
     assert [unit.starts_line for unit in found] == [True, False, True, False]
 
 
-def test_separators_inside_quotes_are_ignored():
+def test_separators_of_commands_inside_quotes_are_ignored():
     (unit,) = units(b"TEXT \"a;b,c\n\",'d,e'\n")
     assert unit.parameters == (b'"a;b,c\n"', b"'d,e'")
 
@@ -37,7 +37,7 @@ def test_a_message_ends_at_the_newline_after_its_block(data, after):
 
 
 @given(st.binary(min_size=1, max_size=300), st.data())
-def test_no_message_ends_before_it_is_complete(data, draw):
+def test_a_message_does_not_end_before_it_is_complete(data, draw):
     message = b"DATA EMEM," + as_block(data) + b"\n"
     cut = draw.draw(st.integers(0, len(message) - 1))
     assert message_end(message[:cut]) is None

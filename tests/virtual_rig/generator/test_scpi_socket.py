@@ -32,7 +32,7 @@ def instrument(server):
     resources.close()
 
 
-def test_a_session_answers_queries_and_accepts_settings(instrument):
+def test_a_socket_session_answers_queries_and_accepts_settings(instrument):
     assert instrument.query("*IDN?").startswith("TEKTRONIX,AFG1022,")
     instrument.write("SOUR1:FREQ 1.5kHz")
     assert float(instrument.query("SOUR1:FREQ?")) == 1500

@@ -153,13 +153,13 @@ def test_the_rms_of_the_terminal_noise_is_that_of_its_density_up_to_nyquist(seed
     assert noise.std() == pytest.approx(expected, rel=0.03)
 
 
-def test_a_fast_generator_clock_raises_every_frequency():
+def test_a_generator_clock_that_runs_fast_raises_every_frequency():
     terminal = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0)
     rig = Rig("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON", terminal)
     assert rig.render(5000) == pytest.approx(sine_means(1.0, 1000.1, 0.0, 5000), abs=1e-9)
 
 
-def test_the_phase_has_not_drifted_after_ten_hours():
+def test_the_phase_of_the_output_has_not_drifted_after_ten_hours():
     rig = Rig("FREQ 333.333333;:VOLT 2;:PHAS:INIT;:OUTP ON")
     rig.time_s = 36_000.0
     expected = sine_means(1.0, 333.333333, 0.0, 500, phase=2 * np.pi * ((333.333333 * 36_000) % 1.0))
@@ -252,7 +252,7 @@ def test_a_waveform_mean_over_whole_points_is_the_mean_of_its_codes(first, count
     assert mean(TABLE, (first + 1e-12) / 37, count / 37) == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_lowest_and_highest_codes_are_minus_one_and_plus_one():
+def test_the_lowest_and_the_highest_code_mean_minus_one_and_plus_one():
     table = Table(np.array([0, TOP_CODE], dtype=np.uint16), TOP_CODE)
     values = table.mean(np.array([0.1, 0.6]), np.zeros(2))
     assert values.tolist() == [-1.0, 1.0]
@@ -280,7 +280,7 @@ def test_a_day_at_25_mhz_shifts_the_phase_by_less_than_a_millionth_of_a_cycle(fr
 
 
 @given(first=FREQUENCIES, second=FREQUENCIES, time_s=TIMES)
-def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
+def test_a_change_of_frequency_does_not_change_the_phase(first, second, time_s):
     before = SteadyPhase(first, 0.3)
     after = SteadyPhase.with_phase(second, before.phase(time_s), time_s)
     # 25 million cycles within a second have an error of 4e-9 cycles in double precision.

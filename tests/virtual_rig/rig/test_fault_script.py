@@ -149,7 +149,7 @@ class TestEffects:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)
 
-    def test_a_fault_ends_during_continuous_retries(self, scripted):
+    def test_a_fault_ends_in_time_during_continuous_retries(self, scripted):
         with open_bench(scripted(fault("overrun", 0.1, for_s=2.0))) as bench:
             failures = 0
             for _ in range(10):

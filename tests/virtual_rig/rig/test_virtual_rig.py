@@ -163,7 +163,7 @@ def test_a_rig_on_an_address_in_use_is_refused_and_starts_nothing():
     assert "C060606" not in serials_on_the_bus()
 
 
-def test_an_overrun_fails_every_kind_of_read(switch_on):
+def test_every_kind_of_read_fails_after_an_overrun(switch_on):
     program = switch_on(RIG)
     task = program.task()
     task.start()

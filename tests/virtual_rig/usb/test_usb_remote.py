@@ -41,18 +41,18 @@ def proxy(rig):
     device.close()
 
 
-def test_the_proxy_has_the_descriptors_of_the_device(rig, proxy):
+def test_the_usb_proxy_has_the_descriptors_of_the_device(rig, proxy):
     assert proxy.identification == rig.cable.identification
 
 
-def test_the_proxy_passes_bulk_and_control_transfers_unchanged(rig, proxy):
+def test_the_usb_proxy_passes_bulk_and_control_transfers_unchanged(rig, proxy):
     proxy.bulk_out(bytes([1, 1, 254, 0, 5, 0, 0, 0, 1, 0, 0, 0]) + b"*OPC?\0\0\0")
     proxy.bulk_out(bytes([2, 2, 253, 0, 64, 0, 0, 0, 0, 0, 0, 0]))
     assert proxy.bulk_in(64, 1000)[12:14] == b"1\n"
     assert proxy.control(3, 5, 2) == bytes([0x81, 0])
 
 
-def test_the_proxy_raises_the_errors_of_a_timeout_and_of_a_stall(proxy):
+def test_the_usb_proxy_raises_the_errors_of_a_timeout_and_of_a_stall(proxy):
     with pytest.raises(TimeoutError):
         proxy.bulk_in(64, 1000)
     with pytest.raises(BrokenPipeError):

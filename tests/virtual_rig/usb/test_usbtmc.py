@@ -133,6 +133,6 @@ def test_a_malformed_transfer_or_trigger_stalls_the_endpoint(start):
 
 
 @pytest.mark.parametrize("request_number", [1, 5, 64, 99, 128, 160])
-def test_an_unsupported_class_request_stalls(request_number):
+def test_an_unsupported_class_request_stalls_the_endpoint(request_number):
     with pytest.raises(BrokenPipeError):
         Host().control(request_number)

@@ -42,7 +42,7 @@ def test_a_signal_queued_in_parts_plays_without_a_gap():
     assert np.concatenate([first, output.render(3, 6)]) == pytest.approx([1, 1, 2, 2, 3, 3, 4, 4, 0])
 
 
-def test_an_analogue_output_counts_its_unplayed_steps():
+def test_an_analogue_output_counts_the_samples_not_yet_played():
     output = AnalogueOutput()
     output.queue(np.ones(4), GRID_RATE_HZ / 2, 0)
     assert [output.queued_samples(step) for step in (0, 1, 2, 7, 8, 9)] == [4, 4, 3, 1, 0, 0]

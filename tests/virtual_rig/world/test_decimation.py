@@ -40,7 +40,7 @@ def test_a_sine_in_the_pass_band_keeps_amplitude_and_phase(ratio, delay_steps, c
 
 @pytest.mark.parametrize("ratio", [2.0, 4.0, 62.0, 2.32, 7.9])
 @pytest.mark.parametrize("cycles_per_sample", [0.56, 0.6, 0.75, 0.95])
-def test_aliases_are_suppressed_by_more_than_80_db(ratio, cycles_per_sample):
+def test_aliases_are_suppressed_by_more_than_80_db_in_decimation(ratio, cycles_per_sample):
     samples, _ = decimated_sine(ratio, 0.0, cycles_per_sample)
     assert 20 * np.log10(np.max(np.abs(samples))) < -80
 

@@ -39,7 +39,7 @@ def test_an_iepe_sensor_shows_signal_and_bias_only_with_excitation(configured, e
     assert clips is overloads
 
 
-def test_an_open_input_reads_zero_unless_excitation_is_on():
+def test_an_open_input_reads_zero_unless_its_excitation_is_on():
     assert np.all(stage(OPEN_INPUT).pass_on(signals(SINE))[0] == 0)
     assert stage(OPEN_INPUT, iepe_current_a=0.002).pass_on(signals(SINE))[1]
 
@@ -54,7 +54,7 @@ def test_a_voltage_divider_reduces_the_input_voltage():
     assert volts == pytest.approx(SINE / 10)
 
 
-def test_ac_coupling_is_3_db_down_at_its_cut_off_frequency():
+def test_the_gain_of_ac_coupling_is_3_db_down_at_its_cut_off_frequency():
     time_s = STEP_S * np.arange(819_200)
     volts, _ = stage(SOURCE, Coupling.AC).pass_on(signals(np.sin(2 * np.pi * AC_CUT_HZ * time_s)))
     assert np.max(np.abs(volts[-204_800:])) == pytest.approx(np.sqrt(0.5), rel=1e-3)

@@ -21,7 +21,7 @@ def test_a_noise_stream_can_return_zero_samples():
     assert NoiseStream(1, "here").draw(17, 0).shape == (0,)
 
 
-def test_noise_is_white_gaussian_of_unit_variance():
+def test_noise_is_white_and_gaussian_with_unit_variance():
     count = 400_000
     noise = NoiseStream(3, "here").draw(0, count)
     spread = 5 / np.sqrt(count)

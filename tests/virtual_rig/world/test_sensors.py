@@ -45,7 +45,7 @@ def test_a_steady_velocity_gives_the_voltage_set_by_the_decoder_range():
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
 
-def test_velocity_beyond_full_scale_is_clipped():
+def test_a_velocity_beyond_full_scale_is_clipped():
     volts = vibrometer().volts(np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
     assert np.min(volts) == -FULL_SCALE_V
     assert np.count_nonzero(volts == -FULL_SCALE_V) > 190

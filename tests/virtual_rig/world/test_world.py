@@ -101,7 +101,7 @@ def test_two_simulated_rigs_agree_bit_for_bit_for_any_block_size(sizes):
     assert np.array_equal(np.concatenate([sampler.read(size) for size in sizes], axis=1), whole)
 
 
-def test_a_different_seed_gives_different_noise():
+def test_a_different_seed_of_a_rig_gives_different_noise():
     other = changed(RIG, virtual={"seed": 2})
     one, two = (World(rig, Silence()).sample(INPUTS, 51_200.0).read(2000) for rig in (RIG, other))
     for row in range(4):
@@ -155,7 +155,7 @@ def test_the_simulation_advances_only_as_far_as_requested():
     assert world.time_s == pytest.approx(0.26, abs=STEP_S)
 
 
-def test_advances_shorter_than_a_step_add_up():
+def test_advances_shorter_than_a_time_step_add_up():
     world = World(QUIET, Silence())
     for _ in range(1000):
         world.advance(0.3 * STEP_S)
@@ -202,7 +202,7 @@ def test_a_disconnected_channel_reads_zero_until_reconnected():
     assert levels == pytest.approx([0.5, 0.0, 0.5], abs=1e-3)
 
 
-def test_a_requested_drop_out_affects_the_vibrometer_alone():
+def test_a_requested_drop_out_affects_only_the_vibrometer():
     world = World(QUIET, Tone(260.0, 1.0))
     sampler = world.sample(INPUTS, 51_200.0)
     world.disturb_response(0.01, 1.0)

@@ -105,7 +105,7 @@ def test_markers_read_the_value_of_every_curve(overlaid):
     assert float(first[3]) == pytest.approx(20 * np.log10(expected[1] / expected[0]), abs=0.01)
 
 
-def test_removed_curves_are_no_longer_drawn_or_listed(overlaid):
+def test_curves_that_were_removed_are_no_longer_drawn_or_listed(overlaid):
     overlaid.curves.setCurrentRow(0)
     overlaid._remove()
     assert [each.source for each in overlaid.curves.curves] == ["half"]

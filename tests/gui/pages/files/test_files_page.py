@@ -120,7 +120,7 @@ def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "Length") == "10 s"
 
 
-def test_columns_and_fields_show_their_texts_on_the_smallest_screen(page):
+def test_no_text_of_a_column_or_field_is_cut_off_on_the_smallest_screen(page):
     page.resize(860, 560)
     table, fonts = page.table, page.fontMetrics()
     for column in range(1, len(HEADINGS)):
@@ -206,7 +206,7 @@ def test_the_view_can_be_zoomed_panned_and_reset_by_keys(show_file, qtbot):
     assert page.time_histories.view_s == pytest.approx((0.0, 10.0))
 
 
-def test_zoom_and_pan_are_limited_to_the_recording_and_to_a_few_samples(show_file):
+def test_zoom_and_pan_stay_within_the_recording_and_show_at_least_a_few_samples(show_file):
     page = show_file("whole.h5")
     page.time_histories.show_range(-50.0, 100.0)
     assert page.time_histories.view_s == (0.0, 10.0)
@@ -245,7 +245,7 @@ def test_a_campaign_shows_its_progress_and_its_recordings(page):
     assert model.rowCount() == 4
 
 
-def test_selected_recordings_can_be_sent_to_compare(page, folder, qtbot):
+def test_selected_recordings_can_be_sent_to_the_compare_page(page, folder, qtbot):
     page.table.selectAll()
     with qtbot.waitSignals([page.context.comparison_requested, page.context.page_requested]):
         page._compare.click()
@@ -285,7 +285,7 @@ def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(show_file, 
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_opening_by_path_reads_the_recording_once(show_file, folder, wait_for, monkeypatch):
+def test_opening_a_recording_by_its_path_reads_it_once(show_file, folder, wait_for, monkeypatch):
     page, read = show_file("stopped.h5"), []
 
     def counted(path):
@@ -325,7 +325,7 @@ def test_time_histories_name_channels_and_units(show_file):
     assert [plot.up.labelText for plot in page.time_histories.plots] == ["V", "m/s²", "mm/s"]
 
 
-def test_a_late_file_list_keeps_the_current_selection(page, shared_context, wait_for):
+def test_a_file_list_that_arrives_late_keeps_the_current_selection(page, shared_context, wait_for):
     page.table.selectAll()
     chosen = page.table.chosen_paths()
     assert len(chosen) > 1
@@ -357,7 +357,7 @@ def test_an_impossible_folder_name_is_refused(page, typed):
     assert page._folder_line.text() == str(page._folder)
 
 
-def test_deleted_files_disappear_from_the_list(shared_context, record, tmp_path, wait_for, closing):
+def test_deleted_files_disappear_from_the_list_of_files(shared_context, record, tmp_path, wait_for, closing):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
     page = closing(FilesPage(shared_context))

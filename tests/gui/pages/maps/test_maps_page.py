@@ -55,7 +55,7 @@ def test_a_map_is_drawn_and_every_point_has_a_kind(page, wait_for):
 
 
 @pytest.mark.thorough
-def test_the_visible_part_can_be_refined(page, wait_for):
+def test_the_visible_part_of_a_map_can_be_refined(page, wait_for):
     compute_map(page, wait_for)
     page.map.plot.setXRange(110.0, 120.0, padding=0.0)
     page.map.plot.setYRange(-5.2, -5.0, padding=0.0)

@@ -37,7 +37,7 @@ def test_a_sweep_beyond_the_range_of_the_generator_is_refused():
         with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2), RIG)
 
 
-def test_entries_can_be_moved_and_removed():
+def test_entries_of_a_campaign_can_be_moved_and_removed():
     other = DWELL.model_copy(update={"name": "other"})
     campaign = with_measurement(with_measurement(None, DWELL), other)
     assert names(move_up(campaign, 1)) == ("other", "dwell")

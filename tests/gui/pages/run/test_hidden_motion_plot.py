@@ -84,7 +84,7 @@ def test_a_lost_track_is_shown_as_a_gap_with_its_reason(picture):
     assert all(is_empty(curve) for curve in picture.forecast)
 
 
-def test_the_plot_is_empty_without_a_twin(picture):
+def test_the_plot_of_hidden_motion_is_empty_without_a_twin(picture):
     picture.show_status(status())
     picture.show_status(EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED))
     assert is_empty(picture.tracked)
@@ -124,7 +124,7 @@ def test_response_ii_is_drawn_beside_its_prediction(context):
     assert set(plot.measured) <= set(plot.predicted)
 
 
-def test_a_full_history_still_shows_new_points(context):
+def test_a_live_history_that_is_full_still_shows_new_points(context):
     plot = sweep_history(context.theme)
     rows = np.arange(7 * 50.0).reshape(7, 50) + 1.0
     for columns in (rows[:, :40], rows[:, 10:]):

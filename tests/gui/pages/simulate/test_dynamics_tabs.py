@@ -156,7 +156,7 @@ def test_chain_waves_need_no_simulation_and_missing_recordings_are_reported(page
     assert view.simulator.background.workers[0].process.is_alive()
 
 
-def test_invalid_inputs_disable_the_find_button(page):
+def test_the_find_button_is_disabled_while_inputs_are_invalid(page):
     view = page.branches
     view.form.form.show_content({"method": "first-order"})
     assert not view._begin.isEnabled()

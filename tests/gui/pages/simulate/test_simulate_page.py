@@ -53,7 +53,7 @@ def test_a_simulation_completes_and_is_drawn(page, wait_for):
     assert page.is_done
 
 
-def test_cancelling_is_immediate_and_keeps_partial_results(page, wait_for):
+def test_cancelling_a_simulation_is_immediate_and_keeps_partial_results(page, wait_for):
     simulate(page, step_hz=0.05)
     wait_for(lambda: page.progress.done > 0, 60.0)
     page.simulator.cancel()
@@ -147,7 +147,7 @@ def test_coexisting_motions_are_shown_as_dots_and_table_rows_with_shares(page):
     assert not page.motions.isVisible()
 
 
-def test_failed_points_are_reported_at_the_end(page):
+def test_failed_points_are_reported_at_the_end_of_a_simulation(page):
     said = []
     page.context.noticed.connect(said.append)
     page._grow((Trouble("a at 300 Hz: a contact made no progress"),))
@@ -155,14 +155,14 @@ def test_failed_points_are_reported_at_the_end(page):
     assert "no progress" in said[-1].what
 
 
-def test_curves_can_be_sent_to_compare(page, qtbot):
+def test_simulated_curves_can_be_sent_to_the_compare_page(page, qtbot):
     page._grow((point("a", 100.0), point("a", 200.0)))
     with qtbot.waitSignal(page.context.prediction_made) as made:
         page._compare.click()
     assert {each.name for each in made.args[0]} >= {"model a, 5 µm, Response I, predicted"}
 
 
-def test_plots_show_units(page):
+def test_the_plots_of_a_simulation_show_units(page):
     assert all(plot.accessibleName() for plot in page.plots.plots)
     assert "1/s" in page.plots.exponents.up.labelText
     assert "µm" in page.plots.motion.up.labelText

@@ -70,7 +70,7 @@ def test_every_exceeded_limit_is_among_the_reasons(page):
     assert all(check.complaint() in said for check in passed)
 
 
-def test_renaming_a_test_does_not_repeat_the_prediction(page, qtbot):
+def test_the_prediction_is_not_repeated_when_a_test_is_renamed(page, qtbot):
     page.context.selection.choose_rig(RIG)
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
     page.form.show_value(Measurement(name="before", excitation=plan))

@@ -27,7 +27,7 @@ def choose(form, word):
     box.activated.emit(place)
 
 
-def test_kinds_are_grouped_below_headings_and_explained(form):
+def test_kinds_of_excitation_are_grouped_below_headings_and_explained(form):
     box = form.form.editors["excitation"].kind_choice
     flags = [box.model().item(place).flags() for place in range(box.count())]
     headings = [box.itemText(n) for n, each in enumerate(flags) if not each & Qt.ItemFlag.ItemIsEnabled]
@@ -40,7 +40,7 @@ def test_kinds_are_grouped_below_headings_and_explained(form):
     assert box.currentData() == form.value.excitation.kind
 
 
-def test_selecting_a_heading_keeps_the_kind(form):
+def test_selecting_a_heading_does_not_change_the_kind_of_excitation(form):
     box = form.form.editors["excitation"].kind_choice
     kind = form.value.excitation.kind
     box.setCurrentIndex(box.findText("STEPS"))
@@ -48,7 +48,7 @@ def test_selecting_a_heading_keeps_the_kind(form):
 
 
 @pytest.mark.parametrize("word", EXCITATION_KINDS)
-def test_a_new_kind_gets_a_name_and_values_within_the_rig(form, word):
+def test_a_newly_chosen_excitation_gets_a_name_and_values_within_the_limits_of_the_rig(form, word):
     choose(form, "dwell" if word != "dwell" else "white_noise")
     choose(form, word)
     assert form.value is not None, form.complaint
@@ -57,7 +57,7 @@ def test_a_new_kind_gets_a_name_and_values_within_the_rig(form, word):
     assert seen.is_allowed, [each.complaint() for each in seen.checks if not each.is_kept]
 
 
-def test_each_kind_remembers_its_own_duration(form):
+def test_each_kind_of_excitation_remembers_its_own_duration(form):
     choose(form, "sine_sweep")
     choose(form, "dwell")
     form.form.editors["excitation"].form.editors["duration_s"].widget.show_content(3.0)
