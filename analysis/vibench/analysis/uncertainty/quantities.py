@@ -158,11 +158,11 @@ def of_one_draw(found: DwellResponse) -> Contribution:
     window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
     if blocks < _FEWEST_BLOCKS:
-        return Contribution(Cause.CHANCE, None, "the window is too short to determine random error")
+        return Contribution(Cause.CHANCE, None, "the window is too short to determine the random error")
     largest = np.max(window[: window.size // blocks * blocks].reshape(blocks, -1), axis=1)
     largest = largest[largest > 0.0]
     if largest.size < _FEWEST_BLOCKS:
-        return Contribution(Cause.CHANCE, None, "drop-outs leave too little to determine random error")
+        return Contribution(Cause.CHANCE, None, "drop-outs leave too little to determine the random error")
     off = np.abs(largest / np.median(largest) - 1)
     if np.max(off) > max(BURST * np.median(off), _ALIKE):
         return Contribution(Cause.CHANCE, None, "a burst in the window sets the largest |x|; find its cause")

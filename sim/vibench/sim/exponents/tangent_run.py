@@ -63,9 +63,7 @@ def block_mean(values: ArrayLike) -> BlockedMean:
     """
     series = np.asarray(values, dtype=np.float64)
     if series.ndim != 1 or len(series) == 0 or not bool(np.all(np.isfinite(series))):
-        raise ValueError(
-            f"A series of shape {series.shape} has no mean here: give one row of finite numbers."
-        )
+        raise ValueError(f"A series of shape {series.shape} is not allowed: give one row of finite numbers.")
     mean = float(series.mean())
     variances, correlations, counts = _levels(series - mean)
     if len(counts) == 0 or variances[0] == 0.0:

@@ -451,7 +451,7 @@ def _confirm_chaos(found: ScenePrediction, exponent: "LyapunovEstimate") -> Scen
         return replace(
             found,
             motion=MotionKind.UNDECIDED,
-            ended="small changes grew, but the exponent is zero within its error",
+            ended="perturbations grew, but the exponent is zero within its error",
         )
     chaos = exponent.transient
     return replace(

@@ -149,8 +149,8 @@ FOUND_NUMBERS = {
     "period": _of_motion("found_period", WHOLE, "drive periods after which this motion repeats"),
     "response_i": _of_motion("found_response_i", REAL, "Response I of this motion"),
     "response_ii": _of_motion("found_response_ii", REAL, "Response II of this motion"),
-    "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
-    "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
+    "relative_i": _of_motion("found_relative_i", REAL, "Response I of p in this motion"),
+    "relative_ii": _of_motion("found_relative_ii", REAL, "Response II of p in this motion"),
     "error_estimate": _of_motion("found_error", REAL, "estimated relative error of this motion's responses"),
     "starts": _of_motion("found_starts", WHOLE, "number of starts that reach this motion"),
 }

@@ -199,7 +199,7 @@ class TransmissibilityPlot(QWidget):
         super().__init__()
         up = PlotAxis("|x / U|", scale=Scale.LOGARITHMIC)
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
-        self.magnitude.with_hint("Motion of m0 / motion of the base, with bounds, appears while a test runs.")
+        self.magnitude.with_hint("The transmission with its bounds appears while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
         shade = LineStyle(lambda theme: theme.traces[0], fill_opacity=0.25)
         self._band = self.magnitude.band(shade, MEASURED)
