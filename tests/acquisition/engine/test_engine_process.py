@@ -364,7 +364,7 @@ class TestMissingViewers:
     @pytest.mark.thorough
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
     @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-    def test_killing_or_freezing_a_viewer_gives_silence_and_a_recording(self, shipped_rig, tmp_path, number):
+    def test_killing_or_freezing_a_viewer_ends_the_run_in_silence(self, shipped_rig, tmp_path, number):
         config = tmp_path / "rig.json"
         config.write_text(shipped_rig.model_dump_json())
         viewer = subprocess.Popen(

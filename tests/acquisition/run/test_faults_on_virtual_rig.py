@@ -70,7 +70,7 @@ def test_a_device_used_by_another_program_is_named_before_output(laboratory):
     assert terminal_v(virtual) < 1e-2
 
 
-def test_after_a_pulled_usb_cable_the_error_advises_to_switch_the_amplifier_off(laboratory, tmp_path):
+def test_the_error_after_a_pulled_usb_cable_advises_switching_the_amplifier_off(laboratory, tmp_path):
     virtual, connected = laboratory()
     pull = when_recording(virtual.faults.pull_usb_cable)
     with pytest.raises(InstrumentLost, match="amplifier") as failure, bench_on(connected) as bench:

@@ -40,7 +40,7 @@ def test_lost_samples_leave_only_their_own_envelope_columns_empty():
     assert (low[2], high[3]) == (20.0, 39.0)
 
 
-def test_samples_fewer_than_the_columns_of_an_envelope_are_drawn_individually():
+def test_samples_are_drawn_individually_if_an_envelope_has_more_columns():
     samples = np.array([3.0, 1.0, 2.0])
     low, high = envelope(samples, 10)
     assert np.array_equal(low, samples)

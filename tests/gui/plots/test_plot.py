@@ -237,7 +237,7 @@ def test_pictures_and_numbers_are_copied_and_saved_without_overwriting(plot, qap
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
 @pytest.mark.parametrize("ending", ["csv", "svg", "png"])
-def test_saving_a_plot_that_fails_leaves_no_file(plot, tmp_path, ending):
+def test_a_failure_to_save_a_plot_leaves_no_file(plot, tmp_path, ending):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
     plot.show()
     import resource

@@ -76,7 +76,7 @@ def test_the_derivative_of_the_period_map_matches_that_of_a_linear_flow():
     np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
 
 
-def test_a_chaotic_poincare_section_has_no_period_and_that_of_a_settled_orbit_period_one():
+def test_a_chaotic_poincare_section_has_no_period_and_a_settled_one_has_period_one():
     drive = Harmonic(130.0, 20e-6)
     section = stroboscopic_section(SPECIMEN, drive, 300)
     assert smallest_period(section, state_scales(SPECIMEN, drive)) == 1

@@ -252,7 +252,7 @@ def test_a_waveform_mean_over_whole_points_is_the_mean_of_its_codes(first, count
     assert mean(TABLE, (first + 1e-12) / 37, count / 37) == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_lowest_and_the_highest_code_mean_minus_one_and_plus_one():
+def test_the_lowest_and_the_highest_code_stand_for_minus_one_and_plus_one():
     table = Table(np.array([0, TOP_CODE], dtype=np.uint16), TOP_CODE)
     values = table.mean(np.array([0.1, 0.6]), np.zeros(2))
     assert values.tolist() == [-1.0, 1.0]

@@ -120,7 +120,7 @@ def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "Length") == "10 s"
 
 
-def test_no_text_of_a_column_or_field_is_cut_off_on_the_smallest_screen(page):
+def test_columns_and_fields_are_wide_enough_on_the_smallest_screen(page):
     page.resize(860, 560)
     table, fonts = page.table, page.fontMetrics()
     for column in range(1, len(HEADINGS)):
