@@ -64,6 +64,7 @@ from .results.compared_recording import (
     compare_recording as compare_recording,
     level_of_drive as level_of_drive,
     recorded_response as recorded_response,
+    recorded_specimen as recorded_specimen,
 )
 from .results.measurement_analysis import analyse as analyse
 from .results.spectral_functions import scan_files as scan_files, spectral_functions as spectral_functions

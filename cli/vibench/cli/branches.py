@@ -42,7 +42,7 @@ def branches(
     ] = None,
     like: Annotated[
         Path | None,
-        option("Use frequency range and level of this stepped sine or sweep; also draw it.", "RECORDING.h5"),
+        option("Use range, level and specimen of this stepped sine or sweep; draw it too.", "RECORDING.h5"),
     ] = None,
     resonance: Annotated[
         str | None,
@@ -65,7 +65,7 @@ def branches(
         measured, drive = _drive(amplitude, frequency, like)
     else:
         measured, drive = _resonance(amplitude, frequency, like, resonance)
-    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, like, **drive)
     if holdable is not None:
         lowest_hz = request.start if request.along is Parameter.FREQUENCY else request.frequency_hz
         if request.resonance_band_hz is not None:

@@ -13,7 +13,7 @@ from vibench.analysis.dynamics import (
     chain_runs,
     write_chain,
 )
-from vibench.sim import USUAL_SPECIMEN, Parameter, count_text
+from vibench.sim import Parameter, count_text
 from vibench.sim.chain import MOST_CELLS
 
 from .dynamics_answer import compute_parts, keep, leave, print_answer, room_for
@@ -52,11 +52,12 @@ def chain(
     as_json: AsJson = False,
 ) -> None:
     """Simulate a chain of cells: band gaps, transmission, energy, impacts and exponents of each cell."""
-    first, *others = specimen or (USUAL_SPECIMEN,)
+    first, *others = specimen or (None,)
     request = specimen_request(
         options,
         first,
         amplitude,
+        recording,
         others=tuple(read_specimen(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),

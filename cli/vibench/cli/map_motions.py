@@ -7,9 +7,15 @@ import typer
 
 from vibench.acquisition import file_path, load_toml
 from vibench.analysis import InvalidRequest, recorded_response
-from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
+from vibench.analysis.dynamics import (
+    BranchDiagram,
+    map_caption,
+    motion_words,
+    read_diagram,
+    specimen_difference,
+)
 from vibench.analysis.report import SHOWN, ImageKind
-from vibench.sim import Observable
+from vibench.sim import Observable, Parameter
 from vibench.sim.maps import (
     KickStability,
     Map,
@@ -82,13 +88,14 @@ def map_motions(
         raise InvalidRequest(
             "--like needs a map over frequency_hz and amplitude_m; give ranges for these two"
         )
-    diagram = None if branches is None else read_diagram(branches)
+    diagram = None if branches is None else _branches_along(request, branches)
     if only_estimate:
         estimate = estimate_map(request, workers)
         print_json(estimate.to_dict()) if as_json else console.print(estimate.sentence)
         return
     room_for_folder(out)
     levels = [recorded_response(path) for path in like or ()]
+    print_warnings(filter(None, (each.difference(request.scene((0, 0, 0)).specimen) for each in levels)))
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
@@ -103,6 +110,24 @@ def map_motions(
         print_result(results, stability)
         console.print("The figure:", bold(drawn[0].resolve()))
     complain_about_points(request, list(results.failures()), results.done)
+
+
+def _branches_along(request: Map, path: Path) -> BranchDiagram:
+    """Return branches to overlay; refuse another parameter, and warn of another drive or specimen."""
+    diagram = read_diagram(path)
+    along = diagram.request.along
+    if [each.axis for each in request.varying] != [along]:
+        raise InvalidRequest(
+            f"--branches {path} contains branches over {along}; give a map with a range of {along} only"
+        )
+    scene, theirs = request.scene((0, 0, 0)), diagram.request
+    ours = scene.drive.frequency_hz, scene.drive.amplitude_m
+    own_m_or_hz = ours[0] if along is Parameter.FREQUENCY else ours[1]
+    if theirs.resonance_band_hz is not None or theirs.path.drive(own_m_or_hz) != ours:
+        print_warnings([f"the drive of the map is not that of the branches ({theirs.title})"])
+    difference = specimen_difference(scene.specimen, theirs.chosen_specimen, path.name)
+    print_warnings([difference] if difference else [])
+    return diagram
 
 
 def _ends(given: float | Range) -> tuple[float, ...]:

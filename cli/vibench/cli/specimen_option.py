@@ -1,9 +1,10 @@
 """Options of several commands: the specimen, and parameters that replace its values."""
 
+from pathlib import Path
 from typing import Annotated, TypeVar
 
-from vibench.analysis import InvalidRequest
-from vibench.analysis.dynamics import SpecimenChoice
+from vibench.analysis import InvalidRequest, recorded_specimen
+from vibench.analysis.dynamics import SpecimenChoice, specimen_difference
 from vibench.sim import SpecimenTable, UnknownSpecimenError, load_specimen, usual_specimen
 from vibench.sim.study import plausibility_warnings
 
@@ -31,13 +32,31 @@ def read_specimen(specimen: str | None) -> SpecimenTable:
 
 
 def specimen_request(
-    options: RequestOptions[Choice], specimen: str | None, amplitude: str | None, **others: object
+    options: RequestOptions[Choice],
+    specimen: str | None,
+    amplitude: str | None,
+    measured: Path | None,
+    **others: object,
 ) -> Choice:
-    """Return a request with a specimen; warn about implausible amplitudes and gaps.
+    """Return a request with a specimen, by default that of the recording or the paper's.
 
-    ``amplitude`` is the text of the option, already checked. Raises InvalidRequest for other invalid options.
+    Print warnings of implausible amplitudes and gaps, and of differences from the recording's specimen.
+    Raises InvalidRequest for other invalid options.
+
+    Parameters
+    ----------
+    amplitude
+        Text of the option, already checked.
+    measured
+        Recording whose drive the request simulates.
     """
-    request = options.request(described=read_specimen(specimen), **others)
+    recorded = None if measured is None else recorded_specimen(measured)
+    described = read_specimen(specimen) if specimen is not None or recorded is None else recorded
+    request = options.request(described=described, **others)
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])
     print_warnings(plausibility_warnings(ends_m, request.chosen_specimen.gaps_m))
+    if measured is not None:
+        known = None if recorded is None else recorded.specimen()
+        difference = specimen_difference(request.chosen_specimen, known, measured.name)
+        print_warnings([difference] if difference else [])
     return request

@@ -32,7 +32,7 @@ def spectrum(
             "--amplitude and --frequency were both given as ranges; give one of them as one number"
         )
     drive = axis_fields(a, f) | {"step": a.step or f.step or 1.0}
-    request = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
+    request = specimen_request(options, options.typed.get("specimen"), amplitude, None, **drive)
     from vibench.analysis.report import exponent_spectrum_figure
 
     room_for(FILE, out)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.analysis import synthetic_recordings as synthetic
+from vibench.acquisition.plan import SteppedSine
 from vibench.analysis import (
     FrequencyResponseRequest,
     NotEnoughData,
@@ -16,8 +18,9 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
 from vibench.analysis.report import write_report
-from vibench.analysis.report._report import draw_branches
+from vibench.analysis.report._report import draw_branches, draw_maps
 from vibench.cli.__main__ import app
+from vibench.sim.maps import open_map
 
 
 def comparison(path):
@@ -83,6 +86,75 @@ def test_the_like_option_takes_frequency_range_and_level_from_a_recording(steppe
         assert point["amplitude_m"] == pytest.approx(path.drive(point["frequency_hz"])[1], rel=1e-9)
     refused = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), "--amplitude", "1e-6"])
     assert "the recording defines the amplitude" in str(refused.exception)
+
+
+@pytest.fixture
+def narrow_file(monkeypatch, tmp_path):
+    """Stepped sine whose bench describes a gap of 30 um instead of 45 um."""
+    monkeypatch.setitem(synthetic.BENCH, "specimen", {**synthetic.BENCH["specimen"], "gap_m": 3e-5})
+    motions = [synthetic.sine(2.0, each, 1e-6) for each in (150.0, 180.0)]
+    parts = [
+        synthetic.Part("step", 2.5 * n + 1.0, 2.5 * n + 1.5, {"frequency_hz": each, "direction": "up"})
+        for n, each in enumerate((150.0, 180.0))
+    ]
+    plan = SteppedSine(amplitude_vpp=0.05, frequencies_hz=(150.0, 180.0), settle_s=1.0, record_s=0.5)
+    velocity = np.concatenate([synthetic.response_of(each)[0] for each in motions])
+    return synthetic.write_recording(
+        tmp_path, plan, synthetic.joined(motions), velocity, parts, name="narrow"
+    )
+
+
+@pytest.mark.parametrize(
+    "command", [("branches", "--like"), ("chain", "--cells", "1", "--duration", "0.1", "--recording")]
+)
+def test_a_recording_also_defines_the_specimen(command, narrow_file):
+    command = (*command, str(narrow_file), "--json")
+    options = ("--method", "balance", "--places", "2") if command[0] == "branches" else ()
+    alike = CliRunner().invoke(app, [*command, *options])
+    assert alike.exit_code == 0, alike.output
+    assert json.loads(alike.stdout)["options"]["described"]["gap_m"] == 3e-5
+    assert "specimen" not in alike.stderr
+    named = CliRunner().invoke(app, [*command, *options, "--specimen", "gong2025"])
+    assert json.loads(named.stdout)["options"]["described"]["gap_m"] == 45e-6
+    warning = " ".join(named.stderr.split())
+    assert "The simulated specimen is not the one described in narrow.h5: gaps" in warning
+    assert "[4.5e-05, 4.5e-05] m instead of gaps [3e-05, 3e-05] m." in warning
+
+
+def test_a_map_and_a_report_state_another_specimen_than_the_recordings(narrow_file, diagram, tmp_path):
+    plan = tmp_path / "map.toml"
+    level = "{ start = 1e-7, stop = 1e-5, points = 2 }"
+    plan.write_text(
+        f"frequency_hz = {{ start = 140, stop = 190, points = 2 }}\namplitude_m = {level}\n", "utf-8"
+    )
+    mapped = ["map", str(plan), "--out", str(tmp_path / "map"), "--like", str(narrow_file)]
+    result = CliRunner().invoke(app, mapped)
+    assert "not the one described in narrow: gaps [4.5e-05" in " ".join(result.stderr.split())
+    results = analyse_files((narrow_file,), "steps", Simulation.LEFT_OUT)
+    (branches,) = draw_branches(results, [diagram])
+    (motions,) = draw_maps(results, [open_map(tmp_path / "map" / "map.h5")])
+    for drawn in (branches, motions):
+        assert "not the one described in narrow: gaps [4.5e-05" in drawn.caption
+
+
+def test_branches_of_another_parameter_are_not_drawn_into_a_map(diagram, tmp_path):
+    kept = write_diagram(diagram, tmp_path / "b.h5")
+    plan = tmp_path / "map.toml"
+    plan.write_text("frequency_hz = 160\namplitude_m = { start = 1e-7, stop = 1e-5, points = 2 }\n", "utf-8")
+    refused = CliRunner().invoke(
+        app, ["map", str(plan), "--out", str(tmp_path / "m"), "--branches", str(kept)]
+    )
+    assert "contains branches over frequency; give a map with a range of frequency only" in str(
+        refused.exception
+    )
+    plan.write_text("frequency_hz = { start = 150, stop = 180, points = 2 }\ngap_m = 3e-5\n", "utf-8")
+    drawn = CliRunner().invoke(app, ["map", str(plan), "--out", str(tmp_path / "m"), "--branches", str(kept)])
+    warnings = " ".join(drawn.stderr.split())
+    assert "the drive of the map is not that of the branches (hertz, recorded level, shooting)" in warnings
+    assert (
+        "not the one described in b.h5: gaps [3e-05, 3e-05] m instead of gaps [4.5e-05, 4.5e-05] m"
+        in warnings
+    )
 
 
 @pytest.mark.thorough

@@ -29,10 +29,13 @@ from ._dynamics_file import (
 )
 from ._map_words import (
     MOTION_CLASSES as MOTION_CLASSES,
-    RecordedLevel as RecordedLevel,
     map_caption as map_caption,
     motion_classes as motion_classes,
     motion_words as motion_words,
+)
+from ._recorded_level import (
+    RecordedLevel as RecordedLevel,
+    specimen_difference as specimen_difference,
 )
 from ._specimen_choice import (
     ContactWord as ContactWord,

@@ -1,14 +1,10 @@
 """Texts of a map: classes and names of motions, and a caption."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
 from vibench.sim import MotionKind, SpecimenTable, count_text, shipped_specimens, usual_specimen
 from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
-from ..comparison.curve import Curve
 from ..signals.arrays import Reals
 
 MOTION_CLASSES = (
@@ -25,17 +21,6 @@ MOTION_CLASSES = (
 """Classes of motions in a map, and their colours."""
 NO_NUMBERS = ("name", "about", "sources")
 """Keys of a specimen's description that have no influence on its motion."""
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedLevel:
-    """Base amplitude and Response I of a recording over frequency."""
-
-    name: str
-    pairs: Sequence[tuple[float, float]]
-    """Frequency [Hz] and amplitude of the base [m]."""
-    measured: Sequence[Curve]
-    """Curves of Response I of m0."""
 
 
 def motion_classes(results: MapResults) -> Reals:
@@ -96,7 +81,7 @@ def _specimen_words(specimen: SpecimenTable) -> str:
     """Return a specimen's name, and its differences from the shipped specimen of that name or the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
-        f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
+        f"{key} = {value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
         for key, value in specimen
         if key not in NO_NUMBERS and value not in (None, getattr(shipped, key))
     ]
@@ -113,10 +98,11 @@ def _consts(plan: Map) -> list[str]:
     ]
 
 
-def _value_words(value: object) -> str:
+def value_words(value: object) -> str:
+    """Return a value of a specimen as text."""
     match value:
         case tuple():
-            return f"[{', '.join(_value_words(each) for each in value)}]"
+            return f"[{', '.join(value_words(each) for each in value)}]"
         case float():
             return f"{value:g}"
         case _:

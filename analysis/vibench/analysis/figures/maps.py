@@ -61,10 +61,11 @@ def map_figure(
         else:
             usual = "duration" if results.plan.is_basin else "response_i"
             figure, title = _map(results, shown or usual, levels), "Map of motions"
+        differences = [each.difference(results.plan.scene((0, 0, 0)).specimen) for each in levels]
     return style.DrawnFigure(
         name="map",
         title=f"{title}: {', '.join(each.long_name for each in results.plan.varying)}",
-        caption=map_caption(results),
+        caption=" ".join(filter(None, (map_caption(results), *differences))),
         figure=figure,
         tables=(motion_table(results.motions),),
     )

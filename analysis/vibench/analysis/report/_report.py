@@ -13,7 +13,7 @@ from vibench.sim import Parameter
 from vibench.sim.maps import MapResults
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
-from ..dynamics import BranchDiagram, RecordedLevel
+from ..dynamics import BranchDiagram, RecordedLevel, specimen_difference
 from ..errors import NotEnoughData
 from ..figures.branches import branches_figure
 from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
@@ -24,7 +24,7 @@ from ..hidden_motion import HiddenMotion
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult
 from ..recordings.checks import Verdict
-from ..recordings.facts import RecordingFacts
+from ..recordings.facts import RecordingFacts, known_specimen
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from ..results.compared_recording import drive_level
 from ..sine.stepped_response import lost_levels, tracked_resonances
@@ -172,14 +172,20 @@ def _count(count: int, noun: str) -> str:
 
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
     """Draw each map, with levels and Response I of stepped sines and sweeps on it."""
-    levels = [
-        RecordedLevel(each.analysis.facts.name, level, tuple(_curves(each, CurveKind.RESPONSE_I)))
-        for each in results.in_order
-        if len(level := drive_level(each)) > 1
-    ]
+    levels = _recorded_levels(results, CurveKind.RESPONSE_I)
     for number, found in enumerate(maps, start=1):
         drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())
         yield replace(drawn, name=f"map_{number}")
+
+
+def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[RecordedLevel]:
+    """Return level, responses and specimen of each stepped sine and sweep."""
+    return [
+        RecordedLevel(facts.name, level, tuple(_curves(each, *kinds)), known_specimen(facts.bench))
+        for each in results.in_order
+        for facts in (each.analysis.facts,)
+        if len(level := drive_level(each)) > 1
+    ]
 
 
 def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
@@ -190,8 +196,8 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each branch diagram, with the results of stepped sines and sweeps if it is over frequency."""
-    levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
+    """Draw each branch diagram; if over frequency, with the results of stepped sines and sweeps."""
+    levels = _recorded_levels(results)
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
             yield replace(_backbones(results, diagram), name=f"branches_{number}")
@@ -199,9 +205,8 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
         if diagram.request.along is not Parameter.FREQUENCY or not levels:
             yield replace(branches_figure(diagram), name=f"branches_{number}")
             continue
-        curves = [curve for result, _ in levels for curve in _curves(result)]
-        drawn = branches_figure(diagram, curves)
-        sentences = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
+        drawn = branches_figure(diagram, [curve for level in levels for curve in level.measured])
+        sentences = " ".join(_level_sentence(diagram, each) for each in levels)
         yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {sentences}")
 
 
@@ -210,15 +215,15 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]
     bands = [each.measurement.excitation.band_hz for each in facts]
-    near = [
-        each.feedback
-        for each, band in zip(facts, bands, strict=True)
-        if band[0] < high_hz and low_hz < band[1]
-    ]
-    tracked = [each for notes in near for each in tracked_resonances(notes)]
-    drawn = branches_figure(diagram, tracked=tracked)
-    sentences = [_lost_sentence(diagram, level) for notes in near for level in lost_levels(notes)]
-    return replace(drawn, caption=" ".join((drawn.caption, *sentences)))
+    near = [each for each, band in zip(facts, bands, strict=True) if band[0] < high_hz and low_hz < band[1]]
+    drawn = branches_figure(
+        diagram, tracked=[track for each in near for track in tracked_resonances(each.feedback)]
+    )
+    sentences = [_lost_sentence(diagram, level) for each in near for level in lost_levels(each.feedback)]
+    for each in near:
+        recorded = known_specimen(each.bench)
+        sentences.append(specimen_difference(diagram.request.chosen_specimen, recorded, each.name))
+    return replace(drawn, caption=" ".join(filter(None, (drawn.caption, *sentences))))
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
@@ -234,19 +239,21 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
     return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
 
 
-def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
-    """State the ratio of a recording's base amplitude to that of the branches, where both have values."""
+def _level_sentence(diagram: BranchDiagram, level: RecordedLevel) -> str:
+    """State how base amplitude and specimen of a recording differ from those of the branches."""
     request = diagram.request
     ratios = [
         amplitude / request.path.drive(frequency)[1]
-        for frequency, amplitude in level
+        for frequency, amplitude in level.pairs
         if request.start <= frequency <= request.stop
     ]
-    name = result.analysis.facts.name
+    name, difference = level.name, level.difference(request.chosen_specimen)
     if not ratios:
-        return f"The drive of {name} was outside of the frequencies of the branches."
-    low, high = np.min(ratios), np.max(ratios)
-    return f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
+        text = f"The drive of {name} was outside of the frequencies of the branches."
+    else:
+        low, high = np.min(ratios), np.max(ratios)
+        text = f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
+    return f"{text} {difference}".rstrip()
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from vibench.acquisition import open_recording
+from vibench.sim import SpecimenTable
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin, sorted_curve
 from ..comparison.recording_curves import predicted_curves
@@ -19,6 +20,7 @@ from ..kinds.analyses import ANALYSES, family_of
 from ..kinds.analysis_kind import AnyResult
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.checks import Verdict
+from ..recordings.facts import described_specimen, known_specimen
 from ..sine.stepped_response import SteppedResponse
 from ..sine.sweep import SweepResponse
 from ..tables import Tabular
@@ -105,11 +107,18 @@ def recorded_response(path: Path, kinds: Collection[CurveKind] = (CurveKind.RESP
         is_at_one_frequency = "frequency_hz" in (recording.plan.get("excitation") or {})
         if is_at_one_frequency or family_of(recording.plan) in {"noise", "dwell"}:
             raise NotEnoughData(_NO_LEVEL.format(path.name))
+        specimen = known_specimen(recording.bench)
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     measured = [
         each for each in found.curves if each.origin is CurveOrigin.MEASURED and each.response in kinds
     ]
-    return RecordedLevel(path.stem, level_of_drive(found), measured)
+    return RecordedLevel(path.stem, level_of_drive(found), measured, specimen)
+
+
+def recorded_specimen(path: Path) -> SpecimenTable | None:
+    """Return the specimen described in a recording; None if it describes none."""
+    with open_recording(path) as recording:
+        return described_specimen(recording.bench) if recording.bench.get("specimen") else None
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:

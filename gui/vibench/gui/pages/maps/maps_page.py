@@ -201,6 +201,7 @@ class MapsPage(Page):
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
         self._is_stale = False
+        self._levels: list[RecordedLevel] = []
         self._mapped = DisplayedResult(lambda: self.form.value, self.map)
         self._moved = DisplayedResult(lambda: self._motion_request, self.motion)
         self.displayed_results = (self._mapped, self._moved)
@@ -245,6 +246,7 @@ class MapsPage(Page):
         self.map.clear()
         self._mapped.show(request)
         self._validate()
+        self._compare_specimens()
         self.simulator.begin(request)
 
     def begin_in_sight(self) -> None:
@@ -278,7 +280,20 @@ class MapsPage(Page):
     def add_recordings(self, paths: object) -> None:
         """Draw the base levels of recordings on the map, if they have a level over frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
-            self.context.background.ask(recorded_response, self.map.show_level, _ignore, Path(path))
+            self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
+
+    def _show_level(self, level: RecordedLevel) -> None:
+        self._levels.append(level)
+        self.map.show_level(level)
+        self._compare_specimens()
+
+    def _compare_specimens(self) -> None:
+        """Warn if the specimen of the map is not the one of a recording drawn on it."""
+        if self.form.value is not None:
+            for level in self._levels:
+                difference = level.difference(self.form.value.chosen_specimen)
+                if difference:
+                    self.context.warn(difference)
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
         for part in parts:
