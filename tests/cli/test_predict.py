@@ -49,6 +49,17 @@ def test_a_requested_lyapunov_exponent_is_given_with_its_error(output_of):
     assert 0 < point["lyapunov_error_per_s"] < 30
 
 
+def test_chaos_is_stated_with_the_time_for_which_it_was_observed(output_of):
+    asked = ("--specimen", "linear_gap", "--amplitude", 19e-6, "--frequency", 168.2, "--duration", 2)
+    printed = output_of("predict", *asked, "--window", 1, "--budget", 0)
+    assert "Chaotic over 2 s; --duration auto tests whether the chaos lasts." in printed
+    printed = " ".join(output_of("spectrum", *asked, "--settle", 1).split())
+    assert "chaotic over 1.97 s, possibly a transient" in printed
+    assert "1 chaotic while observed" in printed
+    (point,) = output_of("spectrum", *asked, "--settle", 1, "--json")["points"]
+    assert (point["verdict"], round(point["observed_s"], 2)) == ("chaotic", 1.97)
+
+
 def test_a_prediction_prints_a_table_and_the_reason_for_its_method(output_of):
     printed = output_of("predict", "--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT)
     assert "Responses I and II" in printed

@@ -136,6 +136,7 @@ def predict(
         print_json(document)
     else:
         _print_result(points, Observable.LYAPUNOV in request.observe)
+        _print_duration(points, request)
         _print_target(points, request.error)
     if explain:
         (errors if as_json else console).print(paragraph(_explanation(request, points, taken_s)))
@@ -243,6 +244,13 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
     motions = _motions_table(points)
     if motions is not None:
         print_table(motions)
+
+
+def _print_duration(points: Sequence[ScenePrediction], study: Study) -> None:
+    """State the time for which points with a fixed duration are known to be chaotic."""
+    is_fixed = study.target is None and study.duration_s != AUTO
+    if is_fixed and any(each.motion is MotionKind.CHAOTIC for each in points):
+        console.print(f"Chaotic over {study.duration_s:g} s; --duration auto tests whether the chaos lasts.")
 
 
 def _print_target(points: Sequence[ScenePrediction], error: float | None) -> None:

@@ -67,7 +67,7 @@ def _print_result(found: ExponentSpectrum) -> None:
         )
         console.print(
             f"{place}: {six}; sum {each.sum_per_s:.9g}; dimension {each.dimension:.3g} "
-            f"({each.dimension_low:.3g} to {each.dimension_high:.3g}); {each.verdict}"
+            f"({each.dimension_low:.3g} to {each.dimension_high:.3g}); {each.observation}"
         )
     if step > 1:
         console.print(f"one in {step} points is shown (of {len(found.points)}); --json or --out gives all")

@@ -44,7 +44,7 @@ _WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
 _SPECTRUM_COLUMNS = (
     "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
-    "dimension_low dimension_high impact_rate_hz blocks elapsed_s"
+    "dimension_low dimension_high impact_rate_hz blocks observed_s elapsed_s"
 )
 _SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
 _CHAIN_COLUMNS = (

@@ -94,8 +94,8 @@ class SpectrumPoint:
 
     DOCUMENT: ClassVar = (
         "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
-        "dimension_low dimension_high verdict motion source blocks impact_rate_hz outcome elapsed_s "
-        "sum_difference"
+        "dimension_low dimension_high verdict observed_s motion source blocks impact_rate_hz outcome "
+        "elapsed_s sum_difference"
     )
 
     frequency_hz: float
@@ -112,6 +112,8 @@ class SpectrumPoint:
     dimension_low: float
     dimension_high: float
     verdict: str
+    observed_s: float
+    """Time over which the exponents are averaged; chaos may end later."""
     motion: str
     source: str
     blocks: int
@@ -119,6 +121,12 @@ class SpectrumPoint:
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
+
+    @property
+    def observation(self) -> str:
+        """Verdict with the time for which it holds, in words."""
+        later = ", possibly a transient" if self.verdict == "chaotic" else ""
+        return f"{self.verdict} over {self.observed_s:.3g} s{later}"
 
     @property
     def sum_difference(self) -> float:
@@ -145,6 +153,7 @@ def point_of(
         dimension_low=low if is_known else math.nan,
         dimension_high=high if is_known else math.nan,
         verdict=found.verdict.name.lower(),
+        observed_s=found.end_time_s - found.since_s,
         motion=found.motion.value,
         source=found.source.value,
         blocks=int(found.blocks.min()),
@@ -188,7 +197,7 @@ class ExponentSpectrum(Tabular):
             check = f"sums of exponents differ from the damping rate {self.points[0].dampers_per_s:.6g} 1/s "
             check += f"by at most {self.largest_sum_difference:.1g} of this value"
         points = count_text(len(self.points), "point")
-        return f"{points} in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
+        return f"{points} in {self.elapsed_s:.1f} s, {chaotic} chaotic while observed; {check}."
 
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
