@@ -5,7 +5,7 @@ This module does not need pyvisa, so plans can be checked without that library.
 
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import NamedTuple, Self, cast
 
 import numpy as np
@@ -36,7 +36,7 @@ class ArbitraryCodes(NamedTuple):
 
 @dataclass(frozen=True)
 class GeneratorModel:
-    """Limits of one generator model, and the class in `vibench.acquisition.drivers` that drives it."""
+    """Limits of one generator model, and the class that drives it (``"module:Class"``)."""
 
     name: str
     driver: str
@@ -62,8 +62,7 @@ class GeneratorModel:
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open a generator and return its driver; pyvisa is not loaded before this call."""
-        driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
-        return cast("GeneratorDriver", driver).open(config)
+        return cast("GeneratorDriver", resolve_name(self.driver)).open(config)
 
     def amplitude_range_vpp(self, config: GeneratorConfig) -> tuple[float, float]:
         """Return the smallest and largest amplitude setting of this bench, peak to peak [V]."""
@@ -146,7 +145,7 @@ AFG1022_MODEL = GeneratorModel(
     # Tektronix AFG1022 specification, as the IVI driver tkafg1k checks it. Drivers and measurements agree on
     # a peak of 10 V, thus 20 Vpp; the IVI driver allows twice that. The stricter limit is used.
     name="AFG1022",
-    driver="AFG1022X",
+    driver="vibench.acquisition.drivers:AFG1022X",
     open_range_vpp=(2e-3, 20.0),
     lowest_hz=1e-6,
     highest_hz={Shape.SINE: 25e6, Shape.EDIT_MEMORY: 10e6},
@@ -158,7 +157,7 @@ AFG1022_MODEL = GeneratorModel(
 KEYSIGHT_33500B_MODEL = GeneratorModel(
     # Keysight 33500B data sheet, 20 MHz models; without a filter, waveforms play at up to 62.5 MSa/s.
     name="Keysight 33500B",
-    driver="Keysight33500B",
+    driver="vibench.acquisition.drivers:Keysight33500B",
     open_range_vpp=(2e-3, 20.0),
     lowest_hz=1e-6,
     highest_hz={Shape.SINE: 20e6, Shape.EDIT_MEMORY: 62.5e6 / 65_536},
