@@ -77,6 +77,12 @@ def test_an_unknown_driver_is_refused_with_the_known_drivers():
         plug_in(PlugInKind.GENERATOR, "afg")
 
 
+def test_an_error_does_not_ask_for_a_package_that_is_installed():
+    pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
+    with pytest.raises(ConfigurationError, match=r"'lines' is not in vibench\.generators; installed are afg"):
+        plug_in(PlugInKind.GENERATOR, "lines")
+
+
 def test_a_configuration_with_a_missing_driver_is_refused_before_opening():
     with pytest.raises(
         ConfigurationError, match=r"generator\.driver = 'plain_scpi' is not installed; give one of afg1022x"

@@ -71,10 +71,12 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 def missing_package(name: str) -> str | None:
     """Return a sentence that names the package to install for a name such as ``"branch_continuation"``.
 
-    Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration.
+    Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration, or
+    the extension is installed.
     """
     folder = FOUND_IN.get(name)
-    if folder is None:
+    installed = (row.module for rows in _installed_plug_ins(tuple(sys.path)).values() for row in rows)
+    if folder is None or any(module.startswith(f"vibench_{folder}") for module in installed):
         return None
     package = f"vibench-{folder.replace('_', '-')}"
     return (
