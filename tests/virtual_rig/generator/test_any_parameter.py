@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.keysight_33500b import Keysight33500B
+from vibench.acquisition.instruments import PlugInKind, plug_in, plug_in_names
 
 PARAMETERS = (
     *(
@@ -29,9 +28,12 @@ PARAMETERS = (
 )
 
 
-@pytest.mark.parametrize("kind", [AFG1022, Keysight33500B])
-def test_every_command_handles_any_parameter_without_failing(kind):
-    generator = kind(lambda: 0.0)
+VENDORS = [each for each in plug_in_names(PlugInKind.VIRTUAL_INSTRUMENT) if each.startswith("0x")]
+
+
+@pytest.mark.parametrize("vendor", VENDORS)
+def test_every_command_handles_any_parameter_without_failing(vendor):
+    generator = plug_in(PlugInKind.VIRTUAL_INSTRUMENT, vendor)(lambda: 0.0)
     for command in generator.commands:
         header = command.header.translate(str.maketrans("#", "1", "[]")).encode()
         for mark in (b"", b"?"):

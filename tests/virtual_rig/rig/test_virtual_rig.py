@@ -148,9 +148,10 @@ def test_a_rig_that_is_switched_off_has_no_address():
         VirtualRig(RIG).daq_address  # noqa: B018 - asking is the test
 
 
-def test_a_generator_that_is_not_on_usb_cannot_be_simulated():
-    generator = RIG.generator.model_copy(update={"resource": "GPIB0::10::INSTR"})
-    with pytest.raises(ConfigurationError, match=r"GPIB0::10::INSTR.*is a USB device"):
+@pytest.mark.parametrize("resource", ["GPIB0::10::INSTR", "USB0::0x1234::0x0001::C1::INSTR"])
+def test_a_generator_that_is_not_on_usb_or_unknown_cannot_be_simulated(resource):
+    generator = RIG.generator.model_copy(update={"resource": resource})
+    with pytest.raises(ConfigurationError, match=rf"{resource}.*is a USB device"):
         VirtualRig(RIG.model_copy(update={"generator": generator}))
 
 

@@ -35,11 +35,13 @@ class PlugInKind(StrEnum):
     DRIVE = "vibench.drives"
     """Source that plays instead of the generator, named after its table in the hardware configuration."""
     VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
-    """Simulation of such a source, named after the same table of the hardware configuration."""
+    """Simulation of such a source, named after the same table of the hardware configuration, or of a USB
+    generator, named after its vendor number: ``0x0699``."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
+_SIMULATED = "vibench.virtual_rig.generator"
 # Listed here, not in package metadata: a checkout with other drivers then needs no new installation
 # (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
@@ -58,6 +60,8 @@ OURS = tuple(
         (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:transducer"),
         (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:transducer"),
         (PlugInKind.SENSOR, "transducer", f"{_SENSORS}:transducer"),
+        (PlugInKind.VIRTUAL_INSTRUMENT, "0x0699", f"{_SIMULATED}.afg1022:AFG1022"),
+        (PlugInKind.VIRTUAL_INSTRUMENT, "0x0957", f"{_SIMULATED}.keysight_33500b:Keysight33500B"),
     )
 )
 

@@ -1,6 +1,6 @@
 """The complete virtual rig: a generator on the USB bus, a DAQ server, and the analogue world between them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
-from vibench.acquisition.instruments import PlugInKind, plug_in as load_plug_in
+from vibench.acquisition.instruments import (
+    PlugInKind,
+    missing_package,
+    plug_in as load_plug_in,
+    plug_in_names,
+)
 from vibench.acquisition.recording import DiskTrouble, trouble_disks
 from vibench.acquisition.rig import Rig, Role, VirtualConfig
 
@@ -16,7 +21,6 @@ from ..daqmx.devices import catalogue_with
 from ..daqmx.rig import OnDemandPace, Pace, WallPace
 from ..daqmx.server import LOOPBACK, DaqServer, token_for
 from ..generator.afg1022 import AFG1022
-from ..generator.keysight_33500b import Keysight33500B
 from ..generator.scpi_instrument import Quirks, ScpiSocket
 from ..generator.terminal_voltage import Terminal
 from ..usb.bus import plug_in, unplug, usb_service
@@ -28,10 +32,6 @@ from .fault_script import DISK_FAULTS, FaultScript, PlayedFault, RigFaults, load
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
 """Rig time added by each repeated disk failure [s], so that the fault can end while a program retries."""
-
-
-GENERATORS: Mapping[int, type[AFG1022]] = {0x0699: AFG1022, 0x0957: Keysight33500B}
-"""The simulated generators, by vendor number in their USB address."""
 
 
 class DiskFaults(Enum):
@@ -84,8 +84,8 @@ class VirtualRig:
         """Token that calls from other computers need; None on loopback."""
         self._pace: Pace = WallPace(virtual.speed) if virtual.pace == "wall" else OnDemandPace()
         # Generator and world refer to each other, so the clock looks up ``world`` at each call.
-        usb_ids, serial = _address(rig.generator.resource)
-        self.generator = GENERATORS[usb_ids[0]](
+        simulated, usb_ids, serial = _simulated_generator(rig.generator.resource)
+        self.generator = simulated(
             lambda: self.world.time_s,
             serial=serial,
             quirks=quirks,
@@ -216,17 +216,19 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
     return script
 
 
-def _address(resource: str) -> tuple[tuple[int, int], str]:
-    """Return vendor, product and serial number of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
+def _simulated_generator(resource: str) -> tuple[type[AFG1022], tuple[int, int], str]:
+    """Return class, USB numbers and serial number of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
     fields = resource.split("::")
     try:
         ids = int(fields[1], 0), int(fields[2], 0)
     except (IndexError, ValueError):
         ids = 0, 0
-    if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS or ids[0] not in GENERATORS:
-        raise ConfigurationError(
-            f"generator.resource = {resource!r}: the virtual generator is a USB device; "
-            "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
-            "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
-        )
-    return ids, fields[3]
+    kind, vendor = PlugInKind.VIRTUAL_INSTRUMENT, f"{ids[0]:#06x}"
+    is_usb = fields[0].startswith("USB") and len(fields) >= _USB_RESOURCE_FIELDS
+    if is_usb and (vendor in plug_in_names(kind) or missing_package(vendor)):
+        return load_plug_in(kind, vendor), ids, fields[3]
+    raise ConfigurationError(
+        f"generator.resource = {resource!r}: the virtual generator is a USB device; "
+        "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
+        "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
+    )
