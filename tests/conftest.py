@@ -36,9 +36,8 @@ except ImportError as error:
 else:
     collect_ignore_glob = []
     pytest_plugins = ["pytestqt.plugin"]
-HAS_EXTENSIONS = find_spec("vibench_fast_loop") is not None
-if not HAS_EXTENSIONS:
-    collect_ignore_glob.append("extensions/*")
+MISSING = [each for each in ("fast_loop", "more_drivers") if find_spec(f"vibench_{each}") is None]
+collect_ignore_glob += [f"extensions/{each}/*" for each in MISSING]
 
 
 def pytest_report_header() -> str:
@@ -48,8 +47,8 @@ def pytest_report_header() -> str:
         window = (
             f"the window's tests were NOT RUN: Qt cannot be loaded ({QT_MISSING}); docs/gui.md names packages"
         )
-    missing = "; those of extensions were NOT RUN: pip install -e extensions/fast_loop"
-    return window if HAS_EXTENSIONS else window + missing
+    missing = (f"; those of {each} were NOT RUN: pip install -e extensions/{each}" for each in MISSING)
+    return window + "".join(missing)
 
 
 LONG = (
@@ -95,10 +94,10 @@ LONG = (
     "tests/acquisition/bench/test_bench.py",
     "tests/acquisition/drivers/test_daqmx_output.py",
     "tests/acquisition/contract/test_plug_ins.py",
-    "tests/acquisition/drivers/test_sound_card.py",
+    "tests/extensions/more_drivers/test_sound_card.py",
     "tests/acquisition/control/test_noise_controller.py",
     "tests/cli/test_bench_new.py",
-    "tests/acquisition/drivers/test_file_player.py",
+    "tests/extensions/more_drivers/test_file_player.py",
     "tests/acquisition/check/test_bench_report.py",
     "tests/sim/study/test_cluster.py",
     "tests/virtual_rig/rig/test_virtual_rig.py",

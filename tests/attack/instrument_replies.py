@@ -137,15 +137,16 @@ def mutant(chance: random.Random, played: Callable[[random.Random], bytes]) -> C
 def prepare(text: str) -> Callable[[], None]:
     """Build the bench, make an instrument odd, and return the witness, which is called at the end."""
     from vibench.acquisition import save_toml
-    from vibench.acquisition.drivers import _daqmx, _sound_card
+    from vibench.acquisition.drivers import _daqmx
     from vibench.acquisition.rig import load_rig
     from vibench.virtual_rig.generator.afg1022 import AFG1022
     from vibench.virtual_rig.world.world import World
+    from vibench_more_drivers import sound_card
 
     odd = json.loads(text)
     os.environ |= {"VIBENCH_STATE_DIR": str(Path.cwd() / "state"), "VIBENCH_LOCK_DIR": str(Path.cwd())}
     # A hung server times out sooner than usual; a card that is late on a busy computer, later.
-    _daqmx.CALL_DEADLINE_S, _sound_card._LATEST_S = 15.0, 60.0
+    _daqmx.CALL_DEADLINE_S, sound_card._LATEST_S = 15.0, 60.0
     rig = _slow(load_rig(ROOT / "hardware_configs" / f"{RIGS[odd['kind']]}.toml"))
     made: list[Any] = []
     for each in (AFG1022, World):
@@ -314,11 +315,11 @@ def _serve(rig: Any, held: ExitStack) -> Any:
 def _plug_card_in(rig: Any, odd: dict[str, Any]) -> Any:
     from datetime import UTC, datetime
 
-    from vibench.acquisition.drivers import SoundCardDigitizer
     from vibench.acquisition.rig import KnobSheet, save_knob_sheet
     from vibench.virtual_rig.world.world import World
+    from vibench_more_drivers.sound_card import SoundCardDigitizer
 
-    from ..acquisition.drivers import portaudio
+    from ..extensions.more_drivers import portaudio
 
     simulated = portaudio.card_rig(rig)
     audio, opened = portaudio.simulated(), []

@@ -3,6 +3,7 @@
 import re
 import shlex
 import signal
+from importlib.metadata import EntryPoints
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
 from vibench.acquisition.bench.instrument_list import InstrumentList
 from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.first_day.configured import QUESTIONS, configure, value_in, with_answer
-from vibench.acquisition.instruments import FoundDevice
+from vibench.acquisition.instruments import FoundDevice, _guarded
 from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app
 from vibench.cli.bench_new import _configure, _confirm_wire, _operator_at_terminal
@@ -194,7 +195,8 @@ def test_a_wrong_gain_is_found_with_an_output_of_5_mv_and_nothing_larger(tmp_pat
     assert "two per cent" not in page
 
 
-def test_the_only_instrument_found_is_the_default_answer(tmp_path):
+def test_an_instrument_that_is_the_only_one_found_is_the_default_answer(tmp_path):
+    pytest.importorskip("vibench_more_drivers", reason="pip install -e extensions/more_drivers brings it")
     only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
     assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
@@ -257,7 +259,18 @@ def test_only_questions_with_contradictory_answers_are_repeated(tmp_path):
     assert ".draft" not in wrong[0]
 
 
+def test_a_generator_whose_driver_is_in_a_missing_package_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(_guarded, "entry_points", EntryPoints)
+    monkeypatch.syspath_prepend(tmp_path)
+    only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
+    said = r"MY5::0::INSTR': .*'0x0957' needs vibench-more-drivers, which is not installed: run 'pip install"
+    with pytest.raises(ConfigurationError, match=said):
+        configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_broken_third_party_package_does_not_end_the_procedure(tmp_path, monkeypatch):
+    pytest.importorskip("vibench_more_drivers", reason="pip install -e extensions/more_drivers brings it")
     metadata = tmp_path / "somebody-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")

@@ -10,12 +10,12 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, open_bench, run_measurement
 from vibench.acquisition.check.admission import check_bench
-from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer, FilePlayer
+from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer
 from vibench.acquisition.errors import BrokenPromise, DataLost
 from vibench.acquisition.instruments import Block, SensorFacts
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.recording import RecordingState, open_recording
-from vibench.acquisition.rig import load_rig
+from vibench.acquisition.rig import digitizer_driver, load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 GROUPS = {"generator": "vibench.generators", "digitizer": "vibench.digitizers", "sensor": "vibench.sensors"}
@@ -168,6 +168,7 @@ def test_invalid_samples_end_a_check_or_a_run_with_a_readable_message(bench_with
 
 
 def test_missing_samples_are_reported_and_prevent_playback(bench_with, outcome, tmp_path):
+    pytest.importorskip("vibench_more_drivers", reason="pip install -e extensions/more_drivers brings it")
     left = [20]
 
     def skips(found, *given):
@@ -184,7 +185,8 @@ def test_missing_samples_are_reported_and_prevent_playback(bench_with, outcome, 
     played = rig.daq.model_copy(
         update={"driver": "file", "options": {"recording": str(tmp_path / "out" / "dwell.h5")}}
     )
-    player = FilePlayer.open(rig.model_copy(update={"daq": played}))
+    rig = rig.model_copy(update={"daq": played})
+    player = digitizer_driver(rig).open(rig)
     player.start()
     with pytest.raises(DataLost, match="missing samples cannot be played back"):
         deque(iter(lambda: player.read(5120), None), maxlen=0)

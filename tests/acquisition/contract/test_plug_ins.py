@@ -212,7 +212,7 @@ def test_contract_options_do_not_clash_with_options_of_a_project(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-DRIVERS = ("afg1022x", "daqmx", "keysight33500b")
+DRIVERS = ("afg1022x", "daqmx")
 SENSORS = sorted(row.name for row in OURS if row.group == PlugInKind.SENSOR)
 """Names of our sensors, which are part of a shipped virtual bench, as are the drivers."""
 

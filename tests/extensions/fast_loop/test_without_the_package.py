@@ -1,7 +1,6 @@
 """Without vibench-fast-loop its plans, benches and recordings are refused with a sentence that names it."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,36 +13,10 @@ from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench_fast_loop.branch_continuation import BranchContinuation
 
 ROOT = Path(__file__).resolve().parents[3]
-PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
 SENTENCE = (
     "needs vibench-fast-loop, which is not installed: run 'pip install extensions/fast_loop' in the "
     "folder of vibench's sources"
 )
-
-
-@pytest.fixture(scope="module")
-def path_without_package(tmp_path_factory):
-    """Return a module search path with all installed packages except vibench-fast-loop."""
-    folder = tmp_path_factory.mktemp("packages")
-    for path in Path(pytest.__file__).parents[1].iterdir():
-        if not path.name.startswith(("vibench_fast_loop", "_vibench")):
-            (folder / path.name).symlink_to(path)
-    return os.pathsep.join(map(str, (*(ROOT / each for each in PORTIONS), folder)))
-
-
-@pytest.fixture
-def run(path_without_package, tmp_path):
-    def run(*arguments):
-        return subprocess.run(
-            [sys.executable, "-S", *map(str, arguments)],
-            cwd=tmp_path,
-            env={**os.environ, "PYTHONPATH": path_without_package},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-
-    return run
 
 
 @pytest.fixture

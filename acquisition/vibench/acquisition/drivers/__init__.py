@@ -1,4 +1,4 @@
-"""Drivers: Tektronix AFG1022 and Keysight 33500B over VISA, NI-DAQmx inputs and outputs, sound cards, files.
+"""Drivers: Tektronix AFG1022 over VISA, NI-DAQmx inputs and outputs.
 
 Each one implements a protocol of `vibench.acquisition.instruments`: every setting is read back, a refused
 setting becomes an error with advice, and outputs are switched off after any error. Only this package imports

@@ -8,21 +8,22 @@ from ._daqmx import (
 from ._daqmx_output import (
     DaqmxOutput as DaqmxOutput,
 )
-from ._file_player import (
-    FilePlayer as FilePlayer,
-)
 from ._generator_limits import (
     AFG1022_MODEL as AFG1022_MODEL,
-    FILE_GENERATOR as FILE_GENERATOR,
-    KEYSIGHT_33500B_MODEL as KEYSIGHT_33500B_MODEL,
     NO_GENERATOR as NO_GENERATOR,
+    ArbitraryCodes as ArbitraryCodes,
+    GeneratorModel as GeneratorModel,
+    NoGenerator as NoGenerator,
+    Shape as Shape,
 )
-from ._keysight_33500b import (
-    Keysight33500B as Keysight33500B,
+from ._overload import (
+    overload_ranges as overload_ranges,
+    require_playable as require_playable,
 )
-from ._sound_card import (
-    SoundCardDigitizer as SoundCardDigitizer,
-    SoundCardOutput as SoundCardOutput,
+from ._scpi import (
+    SWITCH as SWITCH,
+    Number as Number,
+    Word as Word,
 )
 from ._visa_link import (
     Link as Link,

@@ -154,20 +154,6 @@ AFG1022_MODEL = GeneratorModel(
     burst_cycles=(1, 50_000),
     usb_ids=((0x0699, 0x0353),),
 )
-KEYSIGHT_33500B_MODEL = GeneratorModel(
-    # Keysight 33500B data sheet, 20 MHz models; without a filter, waveforms play at up to 62.5 MSa/s.
-    name="Keysight 33500B",
-    driver="vibench.acquisition.drivers:Keysight33500B",
-    open_range_vpp=(2e-3, 20.0),
-    lowest_hz=1e-6,
-    highest_hz={Shape.SINE: 20e6, Shape.EDIT_MEMORY: 62.5e6 / 65_536},
-    memory_points=(8, 65_536),
-    top_code=65_534,
-    burst_cycles=(1, 100_000_000),
-    # The product numbers of models (one or two channels, 20 or 30 MHz) are taken from public programs.
-    usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
-    longest_sweep_s=500.0,  # linear sweeps may last longer, logarithmic sweeps may not
-)
 
 
 _NOTHING_VPP = 1e-6
@@ -264,4 +250,3 @@ class NoGenerator:
 
 
 NO_GENERATOR = NoGenerator("no function generator")
-FILE_GENERATOR = NoGenerator("a recording", "the recording contains what was played")

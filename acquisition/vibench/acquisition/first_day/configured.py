@@ -27,7 +27,7 @@ from ..host.printable import printable
 from ..host.schema import schema_line
 from ..host.shipped import shipped_folder
 from ..host.toml_file import complaints, from_toml
-from ..instruments import PlugInKind, plug_in_names
+from ..instruments import PlugInKind, missing_package, plug_in_names
 from ..rig import Channel, GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
 from ..stopping.stop import StopSwitch
 
@@ -267,8 +267,8 @@ def configure(
     while True:
         for question in questions:
             text = _valid_answer(text, question, question.choices(seen), ask, note, refuse)
-        text = _with_driver(_with_product(text, seen, note), note)
         try:
+            text = _with_driver(_with_product(text, seen, note), note)
             from_toml(tomllib.loads(text), Rig, target)
             break
         except ConfigurationError as error:
@@ -356,6 +356,8 @@ def _driver_of(resource: str) -> str | None:
         with suppress(AcquisitionError):  # skip drivers of broken packages
             if ids in generator_driver(config).describe(config).usb_ids:
                 return name
+    if missing := missing_package(f"{ids[0]:#06x}"):
+        raise ConfigurationError(f"generator.resource = {resource!r}: the USB vendor {missing}")
     return None
 
 

@@ -9,7 +9,6 @@ from ..errors import ConfigurationError, MissingLibrary
 EXTRAS: Mapping[str, tuple[str, ...]] = {
     "figures": ("matplotlib",),
     "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
-    "sound": ("sounddevice",),
     "gui": ("PySide6", "pyqtgraph"),
 }
 """Names of the modules that each extra of `pyproject.toml` installs."""

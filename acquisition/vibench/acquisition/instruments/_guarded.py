@@ -41,33 +41,27 @@ class PlugInKind(StrEnum):
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
-_SIMULATED = "vibench.virtual_rig.generator"
 # Listed here, not in package metadata: a checkout with other drivers then needs no new installation
 # (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
     EntryPoint(name, target, kind)
     for kind, name, target in (
         (PlugInKind.GENERATOR, "afg1022x", f"{_DRIVERS}:AFG1022_MODEL"),
-        (PlugInKind.GENERATOR, "keysight33500b", f"{_DRIVERS}:KEYSIGHT_33500B_MODEL"),
         (PlugInKind.GENERATOR, "none", f"{_DRIVERS}:NO_GENERATOR"),
-        (PlugInKind.GENERATOR, "file", f"{_DRIVERS}:FILE_GENERATOR"),
-        (PlugInKind.DIGITIZER, "file", f"{_DRIVERS}:FilePlayer"),
         (PlugInKind.DIGITIZER, "daqmx", f"{_DRIVERS}:DaqmxDigitizer"),
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
-        (PlugInKind.DIGITIZER, "soundcard", f"{_DRIVERS}:SoundCardDigitizer"),
-        (PlugInKind.OUTPUT, "soundcard", f"{_DRIVERS}:SoundCardOutput"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),
         (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:transducer"),
         (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:transducer"),
         (PlugInKind.SENSOR, "transducer", f"{_SENSORS}:transducer"),
-        (PlugInKind.VIRTUAL_INSTRUMENT, "0x0699", f"{_SIMULATED}.afg1022:AFG1022"),
-        (PlugInKind.VIRTUAL_INSTRUMENT, "0x0957", f"{_SIMULATED}.keysight_33500b:Keysight33500B"),
+        (PlugInKind.VIRTUAL_INSTRUMENT, "0x0699", "vibench.virtual_rig.generator.afg1022:AFG1022"),
     )
 )
 
 
 FOUND_IN: Mapping[str, str] = MappingProxyType(
     dict.fromkeys(("branch_continuation", "controller", "lines"), "fast_loop")
+    | dict.fromkeys(("0x0957", "file", "keysight33500b", "soundcard"), "more_drivers")
 )
 """Names that vibench's extensions provide, each with the folder of its extension in ``extensions``."""
 

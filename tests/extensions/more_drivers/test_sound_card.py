@@ -9,16 +9,14 @@ import pytest
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
 from vibench.acquisition.bench.result import Verdict
 from vibench.acquisition.check.bench_report import bench_report
-from vibench.acquisition.drivers._sound_card import _Card
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, StreamedNoise, WhiteNoise
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.analysis import analyse
 from vibench.virtual_rig.world.world import World
+from vibench_more_drivers.sound_card import _Card
 
 from .portaudio import CARD, RATE_HZ, Silent, card_rig, simulated
-
-pytest.importorskip("_sounddevice", reason="pip install 'vibench[sound]'")
 
 
 @pytest.fixture(name="card_rig")
@@ -44,7 +42,7 @@ def card_bench(card_rig, audio):
         world = World(simulated_rig, Silent())
         real = simulated_rig.model_copy(update={"virtual": None})
         bench = open_bench(real, confirm_simulated, CalibrationRule.WAIVED)
-        card = bench.digitizer.card
+        card = bench.digitizer.bare().card
         audio.wire(world, lambda: card.waiting < 9600)
         benches.append(bench)
         return bench
@@ -129,7 +127,7 @@ def test_a_missing_sound_card_is_reported(card_rig, audio):
 
 def test_an_input_overflow_is_reported_as_lost_data(card_bench, audio):
     bench = card_bench()
-    card = bench.digitizer.card
+    card = bench.digitizer.bare().card
     card.most_waiting = 2000
     bench.digitizer.start()
     with card.changed:

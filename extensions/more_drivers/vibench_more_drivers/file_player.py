@@ -5,11 +5,13 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost
-from ..instruments import Block, Identity, Overload
-from ..recording import Recording, SealDepth, SealState, open_recording
-from ..rig import Channel, Rig, channels_of
+from vibench.acquisition.drivers import NoGenerator
+from vibench.acquisition.errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost
+from vibench.acquisition.instruments import Block, Identity, Overload
+from vibench.acquisition.recording import Recording, SealDepth, SealState, open_recording
+from vibench.acquisition.rig import Channel, Rig, channels_of
 
+FILE_GENERATOR = NoGenerator("a recording", "the recording contains what was played")
 _SAME_RATE = 1e-9
 _SAME_SCALE = 1e-6
 

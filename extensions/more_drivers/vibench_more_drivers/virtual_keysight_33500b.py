@@ -10,8 +10,8 @@ from functools import partial
 
 import numpy as np
 
-from . import scpi_message as scpi
-from .afg1022 import (
+from vibench.virtual_rig.generator import scpi_message as scpi
+from vibench.virtual_rig.generator.afg1022 import (
     AFG1022,
     SHARED_COMMANDS,
     burst_cycles,
@@ -20,9 +20,9 @@ from .afg1022 import (
     with_mode,
     without_mode,
 )
-from .channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
-from .scpi_instrument import Command, Quirks, choice, number, setting
-from .terminal_voltage import Spacing
+from vibench.virtual_rig.generator.channel_output import SINE, BurstMode, ChannelSettings, RunMode, Trigger
+from vibench.virtual_rig.generator.scpi_instrument import Command, Quirks, choice, number, setting
+from vibench.virtual_rig.generator.terminal_voltage import Spacing
 
 _MIDDLE = 32_767
 HIGHEST_RATE_HZ = 250e6

@@ -14,11 +14,16 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost, MissingLibrary
-from ..host.extras import require_extra
-from ..instruments import Block, Identity, IdleOutput, Samples
-from ..rig import Channel, OutputConfig, Rig, channels_of
-from ._overload import overload_ranges, require_playable
+from vibench.acquisition.drivers import overload_ranges, require_playable
+from vibench.acquisition.errors import (
+    ConfigurationError,
+    DataLost,
+    InstrumentError,
+    InstrumentLost,
+    MissingLibrary,
+)
+from vibench.acquisition.instruments import Block, Identity, IdleOutput, Samples
+from vibench.acquisition.rig import Channel, OutputConfig, Rig, channels_of
 
 _LATEST_S = 10.0
 """Time without samples after which the card counts as lost [s]."""
@@ -28,8 +33,7 @@ _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
 
 
 def _sounddevice() -> Any:
-    """Load the library; raises MissingLibrary if the library or the system's PortAudio is not installed."""
-    require_extra("sound")
+    """Load the library; raises MissingLibrary if the system's PortAudio is not installed."""
     try:
         return import_module("sounddevice")
     except OSError as error:

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..errors import SettingRefused
-from ..instruments import Spacing, Sweep
-from ._afg1022x import AFG1022X
-from ._generator_limits import KEYSIGHT_33500B_MODEL, ArbitraryCodes, GeneratorModel
-from ._scpi import SWITCH, Number, Word
+from vibench.acquisition.drivers import AFG1022X, SWITCH, ArbitraryCodes, GeneratorModel, Number, Word
+from vibench.acquisition.errors import SettingRefused
+from vibench.acquisition.instruments import Spacing, Sweep
+
+from . import KEYSIGHT_33500B_MODEL
 
 _NAME = "VIBENCH"
 _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2

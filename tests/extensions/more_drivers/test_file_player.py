@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.acquisition.bench.test_bench import calibrated_on
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
 from vibench.acquisition.check.admission import check_bench, require_fresh
 from vibench.acquisition.errors import InstrumentLost
@@ -78,6 +79,11 @@ def test_the_end_of_the_played_recording_is_reported(playing, original):
 def test_playback_on_a_bench_that_does_not_match_the_recording_is_refused(playing, daq, said):
     with pytest.raises(ConfigurationError, match=said):
         open_bench(playing(**daq), calibration=CalibrationRule.WAIVED)
+
+
+def test_playback_needs_no_valid_calibration(playing):
+    with pytest.raises(ConfigurationError, match="names none"):
+        open_bench(calibrated_on(playing(options={}), "2001-01-01"))
 
 
 @pytest.mark.parametrize("change", ["samples", "seal"])
