@@ -8,7 +8,8 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import PackageNotFoundError, entry_points, requires, version
+from itertools import chain
 from pathlib import Path
 
 from vibench.acquisition import MissingLibrary, require_extra, shipped_folder
@@ -78,9 +79,14 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version or, if missing, with the extra that installs the library."""
+    """Yield each library with its version or, if missing, with the extra that installs the library.
+
+    Packages with plug-ins and their libraries are included.
+    """
+    rows = (row for kind in PlugInKind for row in entry_points(group=kind.value))
+    packages = {row.dist.name: row.dist.requires or () for row in rows if row.dist is not None}
     asking: dict[str, list[str]] = {}
-    for requirement in requires("vibench") or ():
+    for requirement in chain(requires("vibench") or (), packages, *packages.values()):
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         extra = re.search(r"""extra == ['"](\w+)['"]""", requirement)
         asking.setdefault(name, []).append(extra[1] if extra else "")
