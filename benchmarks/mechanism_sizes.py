@@ -16,6 +16,7 @@ BEFORE = "7e7eec57"
 SUFFIXES = (".py", ".pyi", ".j2", ".hpp", ".cpp")
 SIM, ANALYSIS = "sim/vibench/sim/", "analysis/vibench/analysis/"
 DRIVERS, RIG = "acquisition/vibench/acquisition/drivers/", "virtual_rig/vibench/virtual_rig/"
+MORE = "extensions/more_drivers/vibench_more_drivers/"
 INSTRUMENTS = [RIG + name for name in ("daqmx/*", "generator/*", "usb/*")]
 RESULTS = [ANALYSIS + name for name in ("tables.py", "results/*", "report/*", "kinds/*")]
 AFG = [DRIVERS + name for name in ("_afg1022*", "_generator_limits.py", "_scpi.py", "_visa_link.py")]
@@ -41,8 +42,8 @@ MECHANISMS = {
     "commands and options": (["cli/*"], ["cli/*"]),
     "results and reports": (RESULTS, RESULTS),
     "AFG1022 driver": (AFG, AFG),
-    "all drivers": ([DRIVERS + "*"], [DRIVERS + "*"]),
-    "virtual instruments": (INSTRUMENTS, INSTRUMENTS),
+    "all drivers": ([DRIVERS + "*"], [DRIVERS + "*", MORE + "[!v]*"]),
+    "virtual instruments": (INSTRUMENTS, [*INSTRUMENTS, MORE + "virtual_*"]),
     "paper": (
         [SIM + "accuracy_benchmark/*", ANALYSIS + "reproduction/*", ANALYSIS + "paper_figures/*"],
         [SIM + "accuracy_benchmark/*", "studies/*"],

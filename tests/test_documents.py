@@ -27,7 +27,7 @@ FOLDERS = (
     "tests|docs|examples|benchmarks|campaigns|studies|hardware_configs|extensions"
 )
 
-NAME = re.compile(r"(?<![\w./-])vibench(?:_fast_loop)?(?:\.[A-Za-z_]\w*)+")
+NAME = re.compile(r"(?<![\w./-])vibench(?:_fast_loop|_more_drivers)?(?:\.[A-Za-z_]\w*)+")
 PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w.*/-]*\w")
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 CODE = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
