@@ -206,6 +206,12 @@ def test_an_instrument_that_is_the_only_one_found_is_the_default_answer(tmp_path
     assert "# CONFIRM: input of the 2706" in text, "comments on what was not asked stay"
 
 
+def test_an_unusual_usb_name_keeps_the_driver_of_the_template(tmp_path):
+    only = found_instruments("USB0::0699::0353::MY5::0::INSTR")
+    rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    assert (rig.generator.resource, rig.generator.driver) == ("USB0::0699::0353::MY5::0::INSTR", "afg1022x")
+
+
 @pytest.mark.parametrize(
     ("key", "answer", "said"),
     [

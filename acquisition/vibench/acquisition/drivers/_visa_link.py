@@ -1,7 +1,6 @@
 """Functions that open and list VISA resources, and explain why a resource cannot be opened."""
 
 import os
-import re
 import warnings
 from pathlib import Path
 from typing import cast
@@ -11,13 +10,13 @@ from pyvisa.resources import MessageBasedResource
 
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
 from ..host.shipped import shipped
+from ..instruments import usb_ids
 
 # Time limit of a reply [s]. The slowest known reply is the read-back of 8192 points.
 TIMEOUT_S = 3.0
 UDEV_RULES = "hardware_configs/70-vibench.rules"
 USB_DEVICES = Path("/sys/bus/usb/devices")
 USB_NODES = Path("/dev/bus/usb")
-_USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
 _MS_PER_S = 1000.0
 
 
@@ -92,10 +91,9 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
 
 def _is_locked_out(resource: str) -> bool:
     """Whether Linux lists a USB device that this account may not write to; libusb reports it as absent."""
-    named = _USB.match(resource)
-    if named is None:
+    wanted = usb_ids(resource)
+    if wanted is None:
         return False
-    wanted = tuple(int(each, 0) for each in named.groups())
     for device in USB_DEVICES.glob("*"):
         try:
             found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))

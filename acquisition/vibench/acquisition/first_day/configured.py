@@ -27,7 +27,7 @@ from ..host.printable import printable
 from ..host.schema import schema_line
 from ..host.shipped import shipped_folder
 from ..host.toml_file import complaints, from_toml
-from ..instruments import PlugInKind, missing_package, plug_in_names
+from ..instruments import PlugInKind, missing_package, plug_in_names, usb_ids
 from ..rig import Channel, GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
 from ..stopping.stop import StopSwitch
 
@@ -233,7 +233,6 @@ def refuse_at_once(error: ConfigurationError) -> None:
 
 
 _SCHEMA = re.compile(r"^#:schema .*\n")
-_USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
 
 
 def configure(
@@ -337,20 +336,13 @@ def _with_product(text: str, seen: InstrumentList, note: str) -> str:
 def _with_driver(text: str, note: str) -> str:
     resource = value_in(text, "generator.resource").strip('"')
     driver = _driver_of(resource)
-    if driver is None:
-        return text
-    if re.search(
-        r"^driver[ \t]*=", text[text.index("[generator]") :].split("\n[", maxsplit=1)[0], re.MULTILINE
-    ):
-        return with_answer(text, "generator.driver", driver, note)
-    return text.replace("[generator]\n", f'[generator]\ndriver = "{driver}"  # {note}\n', 1)
+    return text if driver is None else with_answer(text, "generator.driver", driver, note)
 
 
 def _driver_of(resource: str) -> str | None:
-    found = _USB.match(resource)
-    if found is None:
+    ids = usb_ids(resource)
+    if ids is None:
         return None
-    ids = int(found.group(1), 0), int(found.group(2), 0)
     for name in plug_in_names(PlugInKind.GENERATOR):
         config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
         with suppress(AcquisitionError):  # skip drivers of broken packages

@@ -56,8 +56,7 @@ def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[st
         except ModuleNotFoundError as error:
             if error.name is None or error.name.partition(".")[0] in {"vibench", name}:
                 raise
-            own = (each for each, libraries in EXTRAS.items() if error.name in libraries)
-            raise _missing(error.name, next(own, extra)) from error
+            raise _missing(error.name, extra) from error
 
     return attribute
 

@@ -23,4 +23,5 @@ from ._protocols import (
     Spacing as Spacing,
     Sweep as Sweep,
     read_block as read_block,
+    usb_ids as usb_ids,
 )

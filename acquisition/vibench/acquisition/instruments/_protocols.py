@@ -1,5 +1,6 @@
 """Protocols of a bench's instruments, which every driver implements."""
 
+import re
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
@@ -308,6 +309,15 @@ class RealTimeController(Protocol):
 
     def close(self) -> None:
         """Silence the drive and close the connection to the controller. May be called at any time."""
+
+
+_USB = re.compile(r"USB\d*::(0x[0-9a-f]+|[1-9]\d*)::(0x[0-9a-f]+|[1-9]\d*)::", re.IGNORECASE)
+
+
+def usb_ids(resource: str) -> tuple[int, int] | None:
+    """Return vendor and product number in a VISA name such as ``USB0::0x0699::0x0353::C1::INSTR``."""
+    found = _USB.match(resource)
+    return None if found is None else (int(found[1], 0), int(found[2], 0))
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:

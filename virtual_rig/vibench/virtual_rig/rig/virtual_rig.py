@@ -8,12 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
-from vibench.acquisition.instruments import (
-    PlugInKind,
-    missing_package,
-    plug_in as load_plug_in,
-    plug_in_names,
-)
+from vibench.acquisition.instruments import PlugInKind, missing_package, plug_in, plug_in_names, usb_ids
 from vibench.acquisition.recording import DiskTrouble, trouble_disks
 from vibench.acquisition.rig import Rig, Role, VirtualConfig
 
@@ -23,7 +18,7 @@ from ..daqmx.server import LOOPBACK, DaqServer, token_for
 from ..generator.afg1022 import AFG1022
 from ..generator.scpi_instrument import Quirks, ScpiSocket
 from ..generator.terminal_voltage import Terminal
-from ..usb.bus import plug_in, unplug, usb_service
+from ..usb.bus import plug_in as connect, unplug, usb_service
 from ..usb.usbtmc import UsbTmcInstrument
 from ..world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from ..world.world import World, virtual_section
@@ -84,7 +79,7 @@ class VirtualRig:
         """Token that calls from other computers need; None on loopback."""
         self._pace: Pace = WallPace(virtual.speed) if virtual.pace == "wall" else OnDemandPace()
         # Generator and world refer to each other, so the clock looks up ``world`` at each call.
-        simulated, usb_ids, serial = _simulated_generator(rig.generator.resource)
+        simulated, ids, serial = _simulated_generator(rig.generator.resource)
         self.generator = simulated(
             lambda: self.world.time_s,
             serial=serial,
@@ -99,7 +94,7 @@ class VirtualRig:
         self.controller = _controller(rig, lambda: self.world.time_s)
         """The simulated controller of a fast loop; None if the rig has no fast loop."""
         self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
-        self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
+        self._usb = UsbTmcInstrument(self.generator, usb_ids=ids)
         self.visa_resource = self._usb.identification.resource_name
         """VISA resource name of the generator."""
         self._running: _Running | None = None
@@ -142,7 +137,7 @@ class VirtualRig:
     def __enter__(self) -> Self:
         """Switch everything on; if a part fails, switch everything off again."""
         with ExitStack() as starting:
-            plug_in(self._usb)
+            connect(self._usb)
             starting.callback(unplug, self._usb)
             daq = starting.enter_context(
                 DaqServer(
@@ -200,7 +195,7 @@ def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
     """Return the simulated controller: a `ScpiDevice` with a `ClosedLoop` as ``cables``, or None."""
     if rig.controller is None:
         return None
-    simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")
+    simulated = plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")
     return simulated(rig.controller, virtual_section(rig).grid_rate_hz, clock)
 
 
@@ -218,15 +213,11 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
 
 def _simulated_generator(resource: str) -> tuple[type[AFG1022], tuple[int, int], str]:
     """Return class, USB numbers and serial number of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
-    fields = resource.split("::")
-    try:
-        ids = int(fields[1], 0), int(fields[2], 0)
-    except (IndexError, ValueError):
-        ids = 0, 0
+    ids, fields = usb_ids(resource) or (0, 0), resource.split("::")
     kind, vendor = PlugInKind.VIRTUAL_INSTRUMENT, f"{ids[0]:#06x}"
-    is_usb = fields[0].startswith("USB") and len(fields) >= _USB_RESOURCE_FIELDS
-    if is_usb and (vendor in plug_in_names(kind) or missing_package(vendor)):
-        return load_plug_in(kind, vendor), ids, fields[3]
+    is_known = vendor in plug_in_names(kind) or missing_package(vendor)
+    if is_known and len(fields) >= _USB_RESOURCE_FIELDS:
+        return plug_in(kind, vendor), ids, fields[3]
     raise ConfigurationError(
         f"generator.resource = {resource!r}: the virtual generator is a USB device; "
         "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
