@@ -1,5 +1,6 @@
 """Digitizer that replays a recording as if it were measured."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
@@ -45,34 +46,32 @@ class FilePlayer:
                 'daq.driver = "file" plays back a recording, but the configuration names none; give '
                 'daq.options.recording = "PATH.h5"'
             )
-        recording = open_recording(Path(path))
-        seal = recording.check_seal(SealDepth.WHOLE)
-        if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
-            recording.close()
-            raise ConfigurationError(
-                f"{path} is damaged ({seal.sentence}), but a new file made from it would have an intact "
-                "seal. Nothing was played back; restore the recording from a copy"
-            )
-        channels = channels_of(rig)
-        missing = [each.role.value for each in channels if each.role.value not in recording.roles]
-        scales = {each.role.value: each.units_per_volt for each in channels if not missing}
-        rate_hz, requested_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
-        if missing or abs(rate_hz - requested_hz) > _SAME_RATE * rate_hz:
-            recording.close()
-            raise ConfigurationError(
-                f"{path} has {', '.join(recording.roles)} at {rate_hz:.12g} samples a second; the "
-                f"configuration has {', '.join(each.role.value for each in channels)} at "
-                f"{requested_hz:.12g}. Make channels and rate agree"
-            )
-        for role, units_per_volt in scales.items():
-            made_with = recording.channel(role).physical_per_volt
-            if abs(made_with - units_per_volt) > _SAME_SCALE * abs(made_with):
-                recording.close()
+        with ExitStack() as opening:
+            recording = opening.enter_context(open_recording(Path(path)))
+            seal = recording.check_seal(SealDepth.WHOLE)
+            if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
                 raise ConfigurationError(
-                    f"{path} was recorded with {made_with:.6g} units of {role} per volt, but sensor and "
-                    f"attenuation of the configuration give {units_per_volt:.6g}; copy both from the bench "
-                    "on which it was recorded"
+                    f"{path} is damaged ({seal.sentence}), but a new file made from it would have an intact "
+                    "seal. Nothing was played back; restore the recording from a copy"
                 )
+            channels = channels_of(rig)
+            roles = [each.role.value for each in channels]
+            rate_hz, requested_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
+            if set(roles) - set(recording.roles) or abs(rate_hz - requested_hz) > _SAME_RATE * rate_hz:
+                raise ConfigurationError(
+                    f"{path} has {', '.join(recording.roles)} at {rate_hz:.12g} samples a second; the "
+                    f"configuration has {', '.join(roles)} at {requested_hz:.12g}. Make channels and rate "
+                    "agree"
+                )
+            for role, channel in zip(roles, channels, strict=True):
+                made_with = recording.channel(role).physical_per_volt
+                if abs(made_with - channel.units_per_volt) > _SAME_SCALE * abs(made_with):
+                    raise ConfigurationError(
+                        f"{path} was recorded with {made_with:.6g} units of {role} per volt, but sensor and "
+                        f"attenuation of the configuration give {channel.units_per_volt:.6g}; copy both from "
+                        "the bench on which it was recorded"
+                    )
+            opening.pop_all()
         return cls(recording, channels)
 
     @property

@@ -16,15 +16,8 @@ from ._generator_limits import (
     NoGenerator as NoGenerator,
     Shape as Shape,
 )
-from ._overload import (
-    overload_ranges as overload_ranges,
-    require_playable as require_playable,
-)
-from ._scpi import (
-    SWITCH as SWITCH,
-    Number as Number,
-    Word as Word,
-)
+from ._overload import overload_ranges as overload_ranges, require_playable as require_playable
+from ._scpi import SWITCH as SWITCH, Number as Number, Word as Word
 from ._visa_link import (
     Link as Link,
     list_visa_resources as list_visa_resources,
