@@ -25,7 +25,10 @@ CHANGES = {
     "generator.driver = 'file'": ("[generator]\n", '[generator]\ndriver = "file"\n'),
     "daq.driver = 'file'": ("[daq]\n", '[daq]\ndriver = "file"\n'),
     "daq.driver = 'soundcard'": ("[daq]\n", '[daq]\ndriver = "soundcard"\n'),
-    "'0x0957'": ("USB0::0x0699::0x0353", "USB0::0x0957::0x2C07"),
+    "generator.resource = 'USB0::0x0957::0x2C07::C019999::INSTR': '0x0957'": (
+        "USB0::0x0699::0x0353",
+        "USB0::0x0957::0x2C07",
+    ),
 }
 
 

@@ -148,10 +148,16 @@ def test_a_rig_that_is_switched_off_has_no_address():
         VirtualRig(RIG).daq_address  # noqa: B018 - asking is the test
 
 
-@pytest.mark.parametrize("resource", ["GPIB0::10::INSTR", "USB0::0x1234::0x0001::C1::INSTR"])
-def test_a_generator_that_is_not_on_usb_or_unknown_cannot_be_simulated(resource):
+@pytest.mark.parametrize(
+    ("resource", "said"),
+    [
+        ("GPIB0::10::INSTR", "the virtual generator is a USB device"),
+        ("USB0::0x1234::0x0001::C1::INSTR", "'0x1234' is not in .*; give one of 0x0699, "),
+    ],
+)
+def test_a_generator_that_is_not_on_usb_or_unknown_cannot_be_simulated(resource, said):
     generator = RIG.generator.model_copy(update={"resource": resource})
-    with pytest.raises(ConfigurationError, match=rf"{resource}.*is a USB device"):
+    with pytest.raises(ConfigurationError, match=f"generator.resource = '{resource}': {said}"):
         VirtualRig(RIG.model_copy(update={"generator": generator}))
 
 

@@ -12,7 +12,7 @@ from vibench.acquisition.check.loop import fit_sine
 from vibench.acquisition.errors import AcquisitionError, BrokenPromise, ConfigurationError
 from vibench.acquisition.host.shipped import all_shipped
 from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
-from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
+from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, plug_ins_of
 
 LEVEL = 0.02
 """Signal level of the tests, as a fraction of the bench's amplitude limit."""
@@ -20,28 +20,22 @@ SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
-def plug_ins_of(rig: Rig) -> dict[PlugInKind, set[str]]:
-    """Return the instrument plug-ins that a hardware configuration names, by kind."""
-    return {each: set[str]() for each in PlugInKind} | {
-        PlugInKind.GENERATOR: {rig.generator.driver},
-        PlugInKind.DIGITIZER: {rig.daq.driver},
-        PlugInKind.OUTPUT: set() if rig.daq.output is None else {rig.daq.driver},
-        PlugInKind.CONTROLLER: set() if rig.controller is None else {rig.controller.driver},
-        PlugInKind.SENSOR: {sensor_name(channel) for channel in rig.daq.channels},
-    }
+def names_plug_in(rig: Rig, kind: PlugInKind, name: str) -> bool:
+    """Return whether a hardware configuration names this plug-in."""
+    return (kind, name) in [each[1:] for each in plug_ins_of(rig)]
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     """Return the given bench, or the first suitable shipped one; None if no bench uses the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
-        return rig if name in plug_ins_of(rig)[kind] else None
+        return rig if names_plug_in(rig, kind, name) else None
     for path in all_shipped("hardware_configs"):
         try:
             rig = load_rig(path)
         except ConfigurationError:  # the bench needs a package that is not installed
             continue
-        if rig.virtual is not None and name in plug_ins_of(rig)[kind]:
+        if rig.virtual is not None and names_plug_in(rig, kind, name):
             return rig
     return None
 

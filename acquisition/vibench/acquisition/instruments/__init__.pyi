@@ -4,6 +4,7 @@ from ._guarded import (
     missing_package as missing_package,
     plug_in as plug_in,
     plug_in_names as plug_in_names,
+    require_plug_in as require_plug_in,
 )
 from ._protocols import (
     AnalogOutput as AnalogOutput,

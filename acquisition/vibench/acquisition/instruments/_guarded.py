@@ -88,18 +88,26 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
     return tuple(sorted({row.name for row in _rows(kind)}))
 
 
+def require_plug_in(kind: PlugInKind, name: str, given: str = "") -> None:
+    """Raise ConfigurationError if no installed package provides ``name``; ``given`` begins its sentence."""
+    if name not in (names := plug_in_names(kind)):
+        raise ConfigurationError(
+            given
+            + (
+                missing_package(name)
+                or f"{name!r} is not in {kind.value}; give one of {', '.join(names)}, or install a package "
+                "that provides it (docs/instruments.md)"
+            )
+        )
+
+
 def plug_in(kind: PlugInKind, name: str) -> Any:
     """Load the object of an entry point, by its group ``kind`` and its ``name`` in a configuration.
 
     Raises ConfigurationError when no package or more than one provides the name, or the import fails.
     """
+    require_plug_in(kind, name)
     found = {row.value: row for row in _rows(kind) if row.name == name}
-    if not found:
-        raise ConfigurationError(
-            missing_package(name)
-            or f"{name!r} is not in {kind.value}; installed are {', '.join(plug_in_names(kind))}. Correct "
-            "the driver in the hardware configuration, or install the package that provides it"
-        )
     if len(found) > 1:
         raise ConfigurationError(
             f"{name!r} of {kind.value} is provided twice ({', '.join(sorted(found))}); uninstall one of them"

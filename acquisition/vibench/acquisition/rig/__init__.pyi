@@ -40,6 +40,7 @@ from ._load_rig import (
     generator_driver as generator_driver,
     load_rig as load_rig,
     output_driver as output_driver,
+    plug_ins_of as plug_ins_of,
     with_faults as with_faults,
 )
 from ._model import (

@@ -13,10 +13,10 @@ from ..instruments import (
     GeneratorDescription,
     PlugInKind,
     driver_of,
-    missing_package,
-    plug_in_names,
+    require_plug_in,
 )
 from ._configuration import GeneratorConfig, OutputConfig, Rig
+from ._knobs import sensor_name
 
 
 def load_rig(path: Path | str) -> Rig:
@@ -26,37 +26,25 @@ def load_rig(path: Path | str) -> Rig:
     """
     path = file_path(path, "hardware_configs")
     rig = load_toml(path, Rig)
-    _require_plug_ins(rig, path)
+    for key, kind, name in plug_ins_of(rig):
+        require_plug_in(kind, name, f"{path}: {key} = ")
     if rig.virtual is None or rig.virtual.faults is None:
         return rig
     return with_faults(rig, path.absolute().parent / rig.virtual.faults)
 
 
-def _require_plug_ins(rig: Rig, path: Path) -> None:
-    """Refuse names of plug-ins that no installed package provides."""
-    plug_ins = [
+def plug_ins_of(rig: Rig) -> list[tuple[str, PlugInKind, str]]:
+    """Return key, kind and name of each plug-in that a hardware configuration names."""
+    named = [
         ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
         ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
-        *(
-            ("daq.channels.sensor", PlugInKind.SENSOR, channel.sensor)
-            for channel in rig.daq.channels
-            if channel.sensor is not None
-        ),
+        *(("daq.channels.sensor", PlugInKind.SENSOR, sensor_name(each)) for each in rig.daq.channels),
     ]
     if rig.controller is not None:
-        plug_ins.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
+        named.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
     if rig.daq.output is not None:
-        plug_ins.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
-    for key, kind, name in plug_ins:
-        if name not in (names := plug_in_names(kind)):
-            raise ConfigurationError(
-                f"{path}: {key} = "
-                + (
-                    missing_package(name)
-                    or f"{name!r} is not installed; give one of {', '.join(names)}, or install a package "
-                    f"with this entry point in {kind.value} (docs/instruments.md)"
-                )
-            )
+        named.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
+    return named
 
 
 def with_faults(rig: Rig, script: Path) -> Rig:

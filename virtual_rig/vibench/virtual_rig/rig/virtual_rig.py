@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
-from vibench.acquisition.instruments import PlugInKind, missing_package, plug_in, plug_in_names, usb_ids
+from vibench.acquisition.instruments import PlugInKind, plug_in, require_plug_in, usb_ids
 from vibench.acquisition.recording import DiskTrouble, trouble_disks
 from vibench.acquisition.rig import Rig, Role, VirtualConfig
 
@@ -213,13 +213,13 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
 
 def _simulated_generator(resource: str) -> tuple[type[AFG1022], tuple[int, int], str]:
     """Return class, USB numbers and serial number of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
-    ids, fields = usb_ids(resource) or (0, 0), resource.split("::")
+    ids, fields = usb_ids(resource), resource.split("::")
+    if ids is None or len(fields) < _USB_RESOURCE_FIELDS:
+        raise ConfigurationError(
+            f"generator.resource = {resource!r}: the virtual generator is a USB device; "
+            "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
+            "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
+        )
     kind, vendor = PlugInKind.VIRTUAL_INSTRUMENT, f"{ids[0]:#06x}"
-    is_known = vendor in plug_in_names(kind) or missing_package(vendor)
-    if is_known and len(fields) >= _USB_RESOURCE_FIELDS:
-        return plug_in(kind, vendor), ids, fields[3]
-    raise ConfigurationError(
-        f"generator.resource = {resource!r}: the virtual generator is a USB device; "
-        "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
-        "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
-    )
+    require_plug_in(kind, vendor, f"generator.resource = {resource!r}: ")
+    return plug_in(kind, vendor), ids, fields[3]
