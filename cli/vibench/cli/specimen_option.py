@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-from vibench.analysis import InvalidRequest, recorded_specimen
-from vibench.analysis.dynamics import SpecimenChoice, specimen_difference
+from vibench.analysis import InvalidRequest
+from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import SpecimenTable, UnknownSpecimenError, load_specimen, usual_specimen
 from vibench.sim.study import plausibility_warnings
 
@@ -50,6 +50,10 @@ def specimen_request(
     measured
         Recording whose drive the request simulates.
     """
+    # Not at the top: `vibench predict` imports this module, and needs no recordings.
+    from vibench.analysis import recorded_specimen
+    from vibench.analysis.dynamics import specimen_difference
+
     recorded = None if measured is None else recorded_specimen(measured)
     described = read_specimen(specimen) if specimen is not None or recorded is None else recorded
     request = options.request(described=described, **others)

@@ -89,7 +89,10 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
 
 
 def require_plug_in(kind: PlugInKind, name: str, given: str = "") -> None:
-    """Raise ConfigurationError if no installed package provides ``name``; ``given`` begins its sentence."""
+    """Check that an installed package provides ``name``, a plug-in of this ``kind``.
+
+    Raises ConfigurationError when none does; ``given`` begins its sentence.
+    """
     if name not in (names := plug_in_names(kind)):
         raise ConfigurationError(
             given

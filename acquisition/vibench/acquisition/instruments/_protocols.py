@@ -315,7 +315,7 @@ _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|[1-9]\d*)::(0x[0-9a-f]+|[1-9]\d*)::", r
 
 
 def usb_ids(resource: str) -> tuple[int, int] | None:
-    """Return vendor and product number in a VISA name such as ``USB0::0x0699::0x0353::C1::INSTR``."""
+    """Return vendor and product number in a ``resource`` such as ``USB0::0x0699::0x0353::C1::INSTR``."""
     found = _USB.match(resource)
     return None if found is None else (int(found[1], 0), int(found[2], 0))
 
