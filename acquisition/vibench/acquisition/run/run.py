@@ -148,6 +148,8 @@ def _confirmations(sheet: KnobSheet) -> dict[str, str]:
 
 
 CreateRecording = Callable[[Path, RecordingHeader], RecordingWriter]
+PlayedPhase = tuple[Phase, list[Block] | None]
+"""Phase to be played, and the list that receives its blocks; None if they are not needed."""
 
 
 class Run(ClosedOnLeaving):
@@ -263,7 +265,8 @@ class Run(ClosedOnLeaving):
     def _play_or_stop(self, runner: PhaseRunner) -> Iterator[Progress]:
         """Play the plan; after a stop or an exceeded limit, ramp down as fast as the cause requires."""
         try:
-            yield from self._play(runner)
+            for phase, blocks in self._course(runner.loop):
+                yield from runner.run_phase(phase, blocks)
             self._ending.is_finished(runner.loop.lost_samples, self._known)
         except StopRequested as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
@@ -309,8 +312,8 @@ class Run(ClosedOnLeaving):
             self._state = RunState.FAILED
             raise
 
-    def _play(self, runner: PhaseRunner) -> Iterator[Progress]:
-        loop = runner.loop
+    def _course(self, loop: AcquisitionLoop) -> Iterator[PlayedPhase]:
+        """Yield the phases of the check and of the plan; each is played before the next is requested."""
         loop.log(EventKind.PLAYER, self._drive.drive_source.value)
         playing: Iterator[Phase] = iter(())
         if self._controller is None:
@@ -322,7 +325,7 @@ class Run(ClosedOnLeaving):
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement, self._bench.rig))
-                yield from self._run_check(runner)
+                yield from self._check(loop)
                 self._drive.announce(announced)
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
@@ -330,26 +333,26 @@ class Run(ClosedOnLeaving):
                 loop.log(EventKind.CHECK, "skipped: the bench was checked shortly before")
                 pause_s = 0.0
         del announced  # phases are stored only for drives that read ahead
-        yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
+        yield Phase(RunState.ARMED, None, pause_s), None
         if self._controller is None:
             for phase in playing:
-                yield from runner.run_phase(phase)
+                yield phase, None
                 self._log_bounds(loop)
             self._log_bounds(loop)
         else:
-            yield from self._run_controller(runner, self._controller)
+            yield from self._actions(loop, self._controller)
         loop.enter(None)
 
-    def _run_controller(self, runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
-        """Carry out a controller's actions; the controller receives the samples of each action."""
+    def _actions(self, loop: AcquisitionLoop, controller: Controller[None]) -> Iterator[PlayedPhase]:
+        """Yield the phases of a controller's actions; the controller receives the samples of each action."""
         try:
             action = next(controller)
             while True:
                 for note in action.notes:
-                    runner.loop.log(note.kind, note.text)
+                    loop.log(note.kind, note.text)
                 blocks: list[Block] = []
                 if action.phase is not None:
-                    yield from runner.run_phase(action.phase, blocks)
+                    yield action.phase, blocks
                 samples = replace(phase_samples(blocks), coefficients=self._drive.coefficients)
                 action = controller.send(samples)
         except StopIteration:
@@ -368,14 +371,15 @@ class Run(ClosedOnLeaving):
         self._drive.arm(coming)
         self._bench.digitizer.start()
 
-    def _run_check(self, runner: PhaseRunner) -> Iterator[Progress]:
+    def _check(self, loop: AcquisitionLoop) -> Iterator[PlayedPhase]:
+        """Yield the phases of the check, and log what was measured."""
         before: list[Block] = []
         during: list[Block] = []
         silence, settling, measuring = check_phases(self._measurement, self._bench.rig)
-        yield from runner.run_phase(silence, before)
+        yield silence, before
         self._silence.learn_hum(phase_samples(before).volts)
-        yield from runner.run_phase(settling)
-        yield from runner.run_phase(measuring, during)
+        yield settling, None
+        yield measuring, during
         figures = check_figures(
             self._bench.rig,
             self._bench.channels,
@@ -384,7 +388,7 @@ class Run(ClosedOnLeaving):
             self._bench.digitizer.sample_rate_hz,
             run_check_vpp(self._measurement.excitation.amplitude_vpp, self._bench.rig),
         )
-        runner.loop.log(EventKind.CHECK, figures.text())
+        loop.log(EventKind.CHECK, figures.text())
 
     def _ramp_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
         return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
