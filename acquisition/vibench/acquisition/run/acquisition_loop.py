@@ -14,7 +14,10 @@ BLOCK_S = 0.1
 
 
 class AcquisitionLoop:
-    """Loop that reads and records blocks. Its clock is the number of samples read: waiting means reading."""
+    """Loop that reads and records blocks. Its clock is the number of samples read: waiting means reading.
+
+    Methods that return an iterator yield the size of each block; `read` each block before the next size.
+    """
 
     def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """Create a loop, which calls ``advance`` after every block of samples."""
@@ -34,8 +37,8 @@ class AcquisitionLoop:
         """Duration of the samples recorded so far [s]."""
         return self.samples / self._digitizer.sample_rate_hz
 
-    def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
-        """Read and record blocks for another ``duration_s``; yield each block.
+    def sizes_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[int]:
+        """Yield the sizes of the blocks of another ``duration_s``.
 
         The last sample is the one nearest to the sum of all durations so far, so rounding does not
         accumulate. The last ``lead_s`` [s] are left for the next call.
@@ -45,7 +48,7 @@ class AcquisitionLoop:
         longest = max(1, round(BLOCK_S * rate_hz))
         # Compute the goal again for every block, because a slow consumer of the blocks moves it.
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
-            yield self._next(min(longest, goal - self.samples))
+            yield min(longest, goal - self.samples)
 
     def time_s(self) -> float:
         """Return the sum of all durations so far, including delays [s]."""
@@ -56,18 +59,18 @@ class AcquisitionLoop:
         """Time since the conversion of the last sample read [s]."""
         return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
 
-    def catch_up(self) -> Iterator[Block]:
-        """Read all waiting samples, and delay the rest of the plan by the duration of these samples."""
+    def waiting_sizes(self) -> Iterator[int]:
+        """Yield the sizes of the waiting blocks, and delay the rest of the plan by their duration."""
         # Ask for waiting samples only once, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
         longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
         while waiting > 0:
-            yield self._next(min(longest, waiting))
+            yield min(longest, waiting)
             waiting -= min(longest, waiting)
 
-    def pass_time(self, duration_s: float) -> Iterator[Block]:
-        """Read until another ``duration_s`` has been converted; as many samples stay unread as before.
+    def sizes_until(self, duration_s: float) -> Iterator[int]:
+        """Yield sizes until another ``duration_s`` has been converted; as many samples stay unread as before.
 
         If more time has passed already, the rest of the plan is delayed accordingly.
         """
@@ -77,7 +80,7 @@ class AcquisitionLoop:
         piece = max(1, round(min(duration_s, BLOCK_S) * rate_hz))
         sampled = self.samples
         while sampled < goal:
-            yield self._next(min(piece, goal - self.samples))
+            yield min(piece, goal - self.samples)
             sampled = self._converted
         # Ignore up to half a sample: rounding the goal causes this difference, which must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
@@ -87,12 +90,13 @@ class AcquisitionLoop:
         """Number of samples per channel converted so far, read or not."""
         return self.samples + self._digitizer.waiting_samples
 
-    def extend(self, duration_s: float) -> Block:
-        """Read and record an additional block, and delay the rest of the plan by its duration."""
+    def extend(self, duration_s: float) -> int:
+        """Delay the rest of the plan for an additional block; return its size."""
         self._due_s += duration_s
-        return self._next(round(duration_s * self._digitizer.sample_rate_hz))
+        return round(duration_s * self._digitizer.sample_rate_hz)
 
-    def _next(self, samples: int) -> Block:
+    def read(self, samples: int) -> Block:
+        """Read, record and return the next block."""
         block = read_block(self._digitizer, samples)
         self._advance()
         self._sink.append(block)

@@ -307,14 +307,18 @@ class PhaseRunner:
         return late_s
 
     def _catch_up(self, into: Sink | None = None) -> Iterator[Progress]:
-        return self._record(self.loop.catch_up(), into)
+        return self._record(self.loop.waiting_sizes(), into)
 
-    def _record(self, blocks: Iterable[Block], into: Sink | None = None) -> Iterator[Progress]:
-        for block in blocks:
+    def _record(self, sizes: Iterable[int], into: Sink | None = None) -> Iterator[Progress]:
+        """Read and record a block of each size; check the limits after each block, and hold if requested."""
+        for size in sizes:
+            block = self.loop.read(size)
             if into is not None:
                 into.append(block)
             yield self._report_progress(block)
             self._look(block)
+            if self.switch.is_holding and self._look == self._go_on and self.state is not RunState.HELD:
+                yield from self._hold()
 
     def ramp_down_early(
         self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
@@ -334,7 +338,7 @@ class PhaseRunner:
         self.loop.cut()
         while level is not StopLevel.OFF and self.drive.is_playing:
             for wait_s in self.drive.ramp_down(ramp_s(level), self.loop.time_s):
-                yield from self._record(self.loop.pass_time(wait_s))
+                yield from self._record(self.loop.sizes_until(wait_s))
                 if (harder := self.switch.harder_than(level)) is not None:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
@@ -367,10 +371,7 @@ class PhaseRunner:
             yield from self._read(LISTEN_S)
 
     def _read(self, duration_s: float, into: Sink | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
-        for block in self.loop.read_for(duration_s, lead_s):
-            yield from self._record([block], into)
-            if self.switch.is_holding and self._look == self._go_on:
-                yield from self._hold()
+        return self._record(self.loop.sizes_for(duration_s, lead_s), into)
 
     def _hold(self) -> Iterator[Progress]:
         """Hold the run, monitored and recorded, until it is resumed or stopped.
