@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice, tee
 from pathlib import Path
@@ -227,6 +227,30 @@ class Run(ClosedOnLeaving):
         return self._blocks
 
     def _carry_out(self) -> Generator[Progress, None, None]:
+        """Play the plan; after a stop or an exceeded limit, ramp down as fast as the cause requires."""
+        with self._recording() as runner:
+            try:
+                for phase, blocks in self._course(runner.loop):
+                    yield from runner.run_phase(phase, blocks)
+                self._ending.is_finished(runner.loop.lost_samples, self._known)
+            except StopRequested as stop:
+                self._ending.is_stopped(str(stop), stop.request.cause)
+                yield from self._ramp_down_early(runner, stop.request.level)
+            except (DriveLate, LimitExceeded, RunStalled) as error:
+                self._ending.is_failed(error, str(error))
+                if isinstance(error, LimitExceeded):
+                    runner.loop.log_limit_trip(error)
+                cause = Cause.FAULT if isinstance(error, RunStalled) else Cause.LIMIT
+                yield from self._ramp_down_early(runner, LEVELS[cause])
+                raise
+            except GeneratorExit:
+                self._ending.is_stopped("the calling program abandoned the run", Cause.PROGRAM)
+                deque(self._ramp_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
+                raise
+
+    @contextmanager
+    def _recording(self) -> Iterator[PhaseRunner]:
+        """Open the recording and yield its runner; at the end, silence the drive and finish the recording."""
         sink = self._open_writer()
         loop = AcquisitionLoop(self._bench.digitizer, sink, self._guard.advance)
         self._runner = PhaseRunner(
@@ -241,7 +265,7 @@ class Run(ClosedOnLeaving):
         )
         self.switch.refusal_to_hold = self._runner.refusal_to_hold
         try:
-            yield from self._play_or_stop(self._runner)
+            yield self._runner
         except (GeneratorExit, DriveLate, LimitExceeded, RunStalled):
             raise
         except KeyboardInterrupt:
@@ -261,27 +285,6 @@ class Run(ClosedOnLeaving):
                 self.switch.refusal_to_hold = str
                 if self._until is not None:
                     self._until.close()
-
-    def _play_or_stop(self, runner: PhaseRunner) -> Iterator[Progress]:
-        """Play the plan; after a stop or an exceeded limit, ramp down as fast as the cause requires."""
-        try:
-            for phase, blocks in self._course(runner.loop):
-                yield from runner.run_phase(phase, blocks)
-            self._ending.is_finished(runner.loop.lost_samples, self._known)
-        except StopRequested as stop:
-            self._ending.is_stopped(str(stop), stop.request.cause)
-            yield from self._ramp_down_early(runner, stop.request.level)
-        except (DriveLate, LimitExceeded, RunStalled) as error:
-            self._ending.is_failed(error, str(error))
-            if isinstance(error, LimitExceeded):
-                runner.loop.log_limit_trip(error)
-            cause = Cause.FAULT if isinstance(error, RunStalled) else Cause.LIMIT
-            yield from self._ramp_down_early(runner, LEVELS[cause])
-            raise
-        except GeneratorExit:
-            self._ending.is_stopped("the calling program abandoned the run", Cause.PROGRAM)
-            deque(self._ramp_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
-            raise
 
     def _open_writer(self) -> RecordingWriter:
         """Check the plan and the bench before anything moves; create the recording and return its writer."""
