@@ -20,22 +20,17 @@ SETTLING_S = 0.3
 _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
-def names_plug_in(rig: Rig, kind: PlugInKind, name: str) -> bool:
-    """Return whether a hardware configuration names this plug-in."""
-    return (kind, name) in [each[1:] for each in plug_ins_of(rig)]
-
-
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     """Return the given bench, or the first suitable shipped one; None if no bench uses the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
-        return rig if names_plug_in(rig, kind, name) else None
+        return rig if (kind, name) in plug_ins_of(rig) else None
     for path in all_shipped("hardware_configs"):
         try:
             rig = load_rig(path)
         except ConfigurationError:  # the bench needs a package that is not installed
             continue
-        if rig.virtual is not None and names_plug_in(rig, kind, name):
+        if rig.virtual is not None and (kind, name) in plug_ins_of(rig):
             return rig
     return None
 

@@ -92,8 +92,6 @@ def _absent(resource: str, error: Exception) -> InstrumentLost:
 def _is_locked_out(resource: str) -> bool:
     """Whether Linux lists a USB device that this account may not write to; libusb reports it as absent."""
     wanted = usb_ids(resource)
-    if wanted is None:
-        return False
     for device in USB_DEVICES.glob("*"):
         try:
             found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))

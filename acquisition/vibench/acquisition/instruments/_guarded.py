@@ -94,14 +94,11 @@ def require_plug_in(kind: PlugInKind, name: str, given: str = "") -> None:
     Raises ConfigurationError when none does; ``given`` begins its sentence.
     """
     if name not in (names := plug_in_names(kind)):
-        raise ConfigurationError(
-            given
-            + (
-                missing_package(name)
-                or f"{name!r} is not in {kind.value}; give one of {', '.join(names)}, or install a package "
-                "that provides it (docs/instruments.md)"
-            )
+        absent = (
+            f"{name!r} is not in {kind.value}; give one of {', '.join(names)}, or install a package that "
+            "provides it (docs/instruments.md)"
         )
+        raise ConfigurationError(given + (missing_package(name) or absent))
 
 
 def plug_in(kind: PlugInKind, name: str) -> Any:

@@ -26,24 +26,24 @@ def load_rig(path: Path | str) -> Rig:
     """
     path = file_path(path, "hardware_configs")
     rig = load_toml(path, Rig)
-    for key, kind, name in plug_ins_of(rig):
+    for (kind, name), key in plug_ins_of(rig).items():
         require_plug_in(kind, name, f"{path}: {key} = ")
     if rig.virtual is None or rig.virtual.faults is None:
         return rig
     return with_faults(rig, path.absolute().parent / rig.virtual.faults)
 
 
-def plug_ins_of(rig: Rig) -> list[tuple[str, PlugInKind, str]]:
-    """Return key, kind and name of each plug-in that a hardware configuration names."""
-    named = [
-        ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
-        ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
-        *(("daq.channels.sensor", PlugInKind.SENSOR, sensor_name(each)) for each in rig.daq.channels),
-    ]
+def plug_ins_of(rig: Rig) -> dict[tuple[PlugInKind, str], str]:
+    """Return the plug-ins that a hardware configuration names: the key of each, by kind and name."""
+    named = {
+        (PlugInKind.GENERATOR, rig.generator.driver): "generator.driver",
+        (PlugInKind.DIGITIZER, rig.daq.driver): "daq.driver",
+        **{(PlugInKind.SENSOR, sensor_name(each)): "daq.channels.sensor" for each in rig.daq.channels},
+    }
     if rig.controller is not None:
-        named.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
+        named[PlugInKind.CONTROLLER, rig.controller.driver] = "controller.driver"
     if rig.daq.output is not None:
-        named.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
+        named[PlugInKind.OUTPUT, rig.daq.driver] = "daq.driver (of the output)"
     return named
 
 
