@@ -77,7 +77,7 @@ def test_a_diverged_chain_run_reports_only_how_it_ended(frequency, tmp_path, mon
 
 def test_a_chain_run_that_is_too_short_for_an_error_states_that_the_error_is_not_known():
     found = invoke("chain", "--cells", 1, "--amplitude", 1e-6, "--frequency", 130, "--time", "1ms")
-    assert "error not known" in found.output
+    assert "no error is known after" in found.output
     assert not re.search(r"\binf\b", found.output)
 
 

@@ -157,6 +157,29 @@ def test_start_dependence_has_the_same_label_in_the_table_and_in_json(output_of)
     assert (point["memory"], row.split()[-1]) == ("lost", "lost")
 
 
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ("map", "frequency_hz = {{ start = 260, stop = 262, points = 2 }}\namplitude_m = {0}\n"),
+        ("study", "frequencies_hz = [260.0, 262.0]\namplitudes_m = [{0}]\n"),
+    ],
+)
+def test_maps_and_studies_state_a_requested_error_that_was_not_reached(output_of, tmp_path, command, text):
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text.format(5e-6) + 'error = "0.001 %"\ntime_s = 0.2\n', "utf-8")
+    printed = " ".join(output_of(command, plan, "--out", {"map": "a", "study": "a.h5"}[command]).split())
+    assert "0 of 2 points reached an error of 0.001 %. The largest error is " in printed
+    assert "vibench predict states if more time reduces it." in printed
+
+
+def test_a_chain_states_that_a_requested_error_is_not_reachable(output_of):
+    asked = ("chain", "--cells", 2, "--amplitude", 1e-6, "--frequency", 130, "--time", "0.5s")
+    assert "; 1e-12 % is not reachable; impacts" in " ".join(output_of(*asked, "--error", 1e-14).split())
+    (run,) = output_of(*asked, "--error", 1e-14, "--json")["runs"]
+    assert run["target"]["is_reachable"] is False
+    assert run["target"]["wanted_error"] == 1e-14
+
+
 def test_every_point_of_a_curve_reaches_the_requested_error(output_of):
     asked = ("predict", "--amplitude", 20e-6, "--frequency", "128:132:2", "--error", "0.01")
     assert "3 of 3 points reached an error of 1 %" in output_of(*asked)

@@ -134,9 +134,8 @@ def _run_in_words(run: ChainRun) -> str:
     where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
     first, last = run.transmission[0, 0], run.transmission[0, -1]
     across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "
-    if not math.isnan(run.transmission_error[0]):
-        most = run.transmission_error.max()
-        across += f"error {100.0 * most:.2g} % at most; " if most < math.inf else "error not known; "
+    if run.target is not None:
+        across += f"error: {run.target.text}; "
     known = f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
     exponent = "" if math.isnan(run.exponent_per_s) else known
     if not run.time_s.size:

@@ -98,6 +98,7 @@ def predict(
     )
     began = time.monotonic()
     points: Sequence[ScenePrediction] = []
+    target_text = ""
     with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
         if (
             request.grid.size == 1
@@ -111,6 +112,7 @@ def predict(
                 scene = request.scene((0,) * len(request.axes), Rest())
                 points = [solve_scene(scene) if request.target is None else _refine(scene)]
                 failures = [(where, each.ended) for each in points if each.outcome != Outcome.REACHED_END]
+                target_text = points[0].target.text if points[0].target is not None else ""
             except (ValueError, RuntimeError) as fault:
                 prefix = "" if isinstance(fault, ValueError) else f"{type(fault).__name__}: "
                 failures = [(where, f"{prefix}{fault}")]
@@ -122,6 +124,7 @@ def predict(
             found = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
             points, failures, kept = list(found.predictions()), list(found.failures()), found.done
             taken_s = found.values("taken").ravel().tolist()
+            target_text = found.target_text(request.error)
     if as_json:
         from vibench.sim.study import software
 
@@ -137,7 +140,8 @@ def predict(
     else:
         _print_result(points, Observable.LYAPUNOV in request.observe)
         _print_duration(points, request)
-        _print_target(points, request.error)
+        if target_text:
+            console.print(target_text)
     if explain:
         (errors if as_json else console).print(paragraph(_explanation(request, points, taken_s)))
     complain_about_points(request, failures, kept)
@@ -251,14 +255,6 @@ def _print_duration(points: Sequence[ScenePrediction], study: Study) -> None:
     is_fixed = study.target is None and study.duration_s != AUTO
     if is_fixed and any(each.motion is MotionKind.CHAOTIC for each in points):
         console.print(f"Chaotic over {study.duration_s:g} s; --duration auto tests whether the chaos lasts.")
-
-
-def _print_target(points: Sequence[ScenePrediction], error: float | None) -> None:
-    if len(points) == 1 and points[0].target is not None:
-        console.print(points[0].target.text)
-    elif error is not None:
-        met = sum(each.error_estimate is not None and each.error_estimate <= error for each in points)
-        console.print(f"{met} of {count_text(len(points), 'point')} reached an error of {100.0 * error:g} %")
 
 
 def _share_text(point: ScenePrediction) -> str:

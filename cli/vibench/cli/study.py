@@ -60,6 +60,8 @@ def study(
         failed = sum(1 for _ in results.failures())
         state = "complete" if results.is_complete else "stopped: continue with --resume"
         console.print(f"{out}: {results.done} of {results.study.grid.size} points, {failed} failed ({state})")
+        if results.study.error is not None:
+            console.print(results.target_text(results.study.error))
     complain_about_points(request, list(results.failures()), results.done)
 
 

@@ -57,6 +57,8 @@ def tradeoff(
             raise InvalidRequest(str(fault)) from fault
         if not as_json:
             _print_curve(name, curves[name])
+            if study.error is not None and not any(each.error <= study.error for each in curves[name]):
+                console.print(f"No method reached an error of {100.0 * study.error:g} % in the time limit.")
     if as_json:
         found = [{"scene": name, "points": [asdict(each) for each in own]} for name, own in curves.items()]
         print_json(found[0] if scenes else {"scenes": found})

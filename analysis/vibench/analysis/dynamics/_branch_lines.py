@@ -169,6 +169,12 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
     return float(size[0] + part * (size[1] - size[0]))
 
 
+_MORE_EXACT = {
+    BranchMethod.SHOOTING: "More time does not reduce the errors of shooting.",
+    BranchMethod.BALANCE: "The others need more harmonics (--harmonics), or the method 'shooting'.",
+}
+
+
 @dataclass(frozen=True, eq=False)
 class BranchDiagram(Tabular):
     """All branches found for one request."""
@@ -208,6 +214,8 @@ class BranchDiagram(Tabular):
         if wanted is not None:
             met = sum(int(np.sum(line.error_estimate <= wanted)) for line in self.lines)
             reached = f" {met} of {motions} reached an error of {100.0 * wanted:g} %."
+            if met < self.points:
+                reached += f" {_MORE_EXACT[self.request.method]}"
         return (
             f"{branches} ({isolated} isolated), {motions} in "
             f"{self.elapsed_s:.1f} s; error relative to the fundamental of p: {self.largest_error:.1g} "

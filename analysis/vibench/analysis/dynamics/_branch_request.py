@@ -61,7 +61,8 @@ class BranchRequest(SpecimenChoice):
     """Error of each motion relative to the fundamental of p, such as 0.01 or "1 %"; 1e-4 by default. Shooting
     always reaches 1e-8; harmonic balance uses as many harmonics as needed."""
     time_s: TargetTime | None = None
-    """Time limit of the search, such as 20 or "20 s"; the result contains the branches found by then."""
+    """Time limit of the search, such as 20 or "20 s"; the result contains the branches found by then. Without
+    it, also with an error, the search takes as long as it needs."""
     harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
     """Highest harmonic of the harmonic balance."""
     places: Annotated[int, Field(ge=2, le=1000)] = 8

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
-from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled, count_text
+from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled, TargetReport, count_text
 from vibench.sim.chain import (
     BandGap,
     Chain,
@@ -53,7 +53,7 @@ class ChainRun(Tabular):
     """Results of one chain with one drive; arrays have one value per cell, counted from the base."""
 
     DOCUMENT: ClassVar = (
-        "cells frequency_hz over_hz transmission transmission_error impacts observed_s energy_j "
+        "cells frequency_hz over_hz transmission transmission_error target impacts observed_s energy_j "
         "energy_error_j outcome elapsed_s largest_p_m=largest_m lyapunov_per_s=exponent_per_s "
         "lyapunov_error_per_s=exponent_error_per_s"
     )
@@ -67,6 +67,8 @@ class ChainRun(Tabular):
     """Ratio of the amplitude of x of m0 to the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
     """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
+    target: TargetReport | None = None
+    """Requested and reached error and computing time; None if none was requested."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell during the observation, shape (cells,)."""
     impacts: NDArray[np.int64]
@@ -257,9 +259,11 @@ def _time_run(
 def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     """Compute the responses in a run from rest, then energies and motion in its continuation."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
-    relative_error = np.full(chain.size, math.nan)
+    relative_error, target = np.full(chain.size, math.nan), None
     if request.has_target:
-        found, relative_error, whole_s = chain_response_to(chain, drive, request.error, request.time_s)
+        found, relative_error, whole_s, target = chain_response_to(
+            chain, drive, request.error, request.time_s
+        )
         observed_s = found.window_s
     else:
         found = chain_response(chain, drive, request.accuracy, whole_s, observed_s)
@@ -287,6 +291,7 @@ def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRu
         _bare_run(chain, run.outcome, found.impacts, observed_s, drive.frequency_hz),
         transmission=found.response_ii[None, :, X],
         transmission_error=relative_error,
+        target=target,
         largest_m=found.largest_m[:, -1],
         energy_j=energy,
         energy_error_j=energy_error,

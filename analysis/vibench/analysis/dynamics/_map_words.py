@@ -74,7 +74,7 @@ def map_caption(results: MapResults) -> str:
             f"{audit.audited} of them were drawn at random and computed: {audit.wrong} had a different motion"
             f" ({share.low:.1%} to {share.high:.1%} of the filled points)."
         )
-    return " ".join(sentences)
+    return " ".join((*sentences, results.target_text(plan.error))).rstrip()
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:

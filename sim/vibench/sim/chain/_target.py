@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..engine.run import time_limit
+from ..scene.prediction import TargetReport
+from ..scene.refinement import LONGEST_S, OUT_OF_REACH_S, uncertainty_of_time
 from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.outcome import Outcome
@@ -22,9 +24,9 @@ FEWEST_PAIRS, STUDENT = 8, 2.365
 """Smallest number of pairs of windows for an error estimate, and Student's t (95 %) for this number."""
 TOLERANCE_PART = 0.1
 """Largest part of the requested error that may come from the integration."""
-LONGEST_S, FIRST_S, FIRST_SHARE = 60.0, 0.1, 0.75
-"""Default limit of a chain's computing time [s]. The first period may take FIRST_S or, if longer, FIRST_SHARE
-of the time limit; callers compute a second period."""
+FIRST_S, FIRST_SHARE = 0.1, 0.75
+"""Computing time that the first period may take [s], or share of the time limit if that is longer, because
+callers compute a second period."""
 HOPELESS, STEADILY = 10.0, 0.5
 """Expected time / default limit above which an error is out of reach; ratio of the errors with all and with
 half the windows above which the error falls only with the square root of the time."""
@@ -37,7 +39,9 @@ class TargetedResponse(NamedTuple):
     errors: Floats
     """Relative errors (95 %) of the transmissibility of every cell, shape (cells,)."""
     followed_s: float
-    """Total simulated time of the chain, including discarded windows [s]."""
+    """Total simulated time of all response windows [s]."""
+    target: TargetReport
+    """Requested and reached error (of the worst cell) and computing time."""
 
 
 def chain_response_to(
@@ -106,7 +110,29 @@ def chain_response_to(
         largest_m=np.max([each.largest_m for each in used], axis=0),
         impacts=np.sum([each.impacts for each in used], axis=0),
     )
-    return TargetedResponse(response, errors, sum(each.duration_s for each in seen))
+    report = _report(errors, accuracy, error, time_s, time.monotonic() - began_s, len(used))
+    return TargetedResponse(response, errors, sum(each.duration_s for each in seen), report)
+
+
+def _report(
+    errors: Floats,
+    accuracy: Accuracy,
+    wanted: float | None,
+    wanted_s: float | None,
+    taken_s: float,
+    windows: int,
+) -> TargetReport:
+    """Report the largest error and the time for the requested one, which falls with the root of the time."""
+    worst = float(errors.max())
+    error = worst if math.isfinite(worst) else None
+    is_met = error is not None and (wanted is None or worst <= wanted)
+    needed, is_reachable = None, wanted is None or wanted > accuracy.promise
+    if wanted is not None and error is not None and is_reachable and not is_met:
+        about_s = taken_s * ((worst - accuracy.promise) / (wanted - accuracy.promise)) ** 2
+        off = uncertainty_of_time(windows)
+        needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
+        is_reachable = needed[1] <= OUT_OF_REACH_S
+    return TargetReport(wanted, wanted_s, error, taken_s, 1, windows, is_met, needed, is_reachable)
 
 
 def _errors(windows: Sequence[ChainResponse]) -> Floats:

@@ -62,10 +62,6 @@ class _Kind:
         return type(self)(runs, self.mean + share * self.off(ratio), spread)
 
 
-MOST_FACTOR = 10.0
-"""Uncertainty factor above which only a range is stated for the computing time."""
-
-
 @dataclass(frozen=True)
 class ExpectedTime:
     """Expected computing time with its uncertainty."""

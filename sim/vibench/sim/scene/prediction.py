@@ -133,13 +133,13 @@ class TargetReport:
 
     @property
     def _reached(self) -> str:
-        if self.error is None:
-            return f"no error is known after {_seconds(self.time_s)}"
-        reached = _percent(self.error)
+        reached = "no error is known" if self.error is None else _percent(self.error)
         if self.is_met:
             return f"{reached} reached in {_seconds(self.time_s)}"
         sentence = f"{reached} after {_seconds(self.time_s)}"
-        wanted = _percent(self.wanted_error or 0.0)
+        if self.wanted_error is None:
+            return sentence
+        wanted = _percent(self.wanted_error)
         if not self.is_reachable:
             return f"{sentence}; {wanted} is not reachable"
         if self.needed_s is None:

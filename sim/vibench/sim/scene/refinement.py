@@ -174,6 +174,12 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     yield from _Refinement(scene, motion, clock).answers()
 
 
+def uncertainty_of_time(samples: int) -> float:
+    """Return the relative uncertainty (two standard deviations) of a time that the error of a mean needs."""
+    # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n); the time is its square.
+    return min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * samples))
+
+
 def takes_too_long(report: TargetReport) -> bool:
     """Return whether an error requested without a time certainly takes longer than the default limit."""
     return report.wanted_time_s is None and report.needed_s is not None and report.needed_s[1] > LONGEST_S
@@ -629,8 +635,7 @@ class _Refinement:
             lead = begins_s / window_s
             count, more = next_size(starts, self._target.error, lead, math.inf)
             more_s = (count * (lead + more) - len(starts) * (lead + windows)) * window_s
-            # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n).
-            off = min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * len(starts) * windows))
+            off = uncertainty_of_time(len(starts) * windows)
             about_s = max(0.0, self._clock.time_s + per_s * more_s)
             needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         return self._clock.report(found, len(starts), needed, windows)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ..scene.prediction import ScenePrediction
+from ..specimen.frozen_model import count_text
 from ..specimen.state import Floats
 from ..specimen.toml_table import fault_in_words
 from . import _grid as layout
@@ -237,6 +238,19 @@ class GridResults(Generic[Plan]):
     def done(self) -> int:
         """Number of points with a result or an error."""
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
+
+    def target_text(self, error: float | None) -> str:
+        """State how many computed points reached a requested error; empty if none was requested."""
+        if error is None:
+            return ""
+        errors = self.values("error_estimate")[self.state == PointState.DONE]
+        met, points = int(np.count_nonzero(errors <= error)), count_text(errors.size, "point")
+        text = f"{met} of {points} reached an error of {100.0 * error:g} %."
+        if met == errors.size:
+            return text
+        known = errors[np.isfinite(errors)]
+        largest = f"{100.0 * known.max():.2g} %" if known.size == errors.size else "not known"
+        return f"{text} The largest error is {largest}; vibench predict states if more time reduces it."
 
     def values(self, name: str, **fixed: Value) -> Floats:
         """Return one quantity over the axes that are not fixed; unknown numbers are NaN.
