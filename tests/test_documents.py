@@ -209,6 +209,7 @@ def test_documents_contain_only_plain_words(document):
     return worn_words(text_of(document))
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is a copy, not a checkout")
 @pytest.mark.parametrize("read", [docstrings, comments])
 def test_docstrings_and_comments_use_plain_words(read):

@@ -101,6 +101,7 @@ def api_violations(room, package, target, names):
     )
 
 
+@pytest.mark.thorough
 def test_no_import_bypasses_a_public_api():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {trespass}"

@@ -153,12 +153,14 @@ def test_a_file_is_reported_as_written_only_if_it_exists(library, tmp_path, code
     assert (tmp_path / "file").read_text() == "all of it"
 
 
+@pytest.mark.thorough
 def test_an_export_succeeds_even_if_its_temporary_file_cannot_be_removed(library, tmp_path):
     made = run_with_fault(library, EXPORT, tmp_path, "unlink", "before")
     assert (made.returncode, made.stderr) == (0, "")
     assert (tmp_path / "file").read_text() == "all of it"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("when", WHEN)
 def test_a_result_is_reported_as_added_only_if_it_is_stored(library, tmp_path, when):
     path = tmp_path / "dwell.h5"

@@ -44,6 +44,7 @@ def changed_copy(good, folder, change):
     return path
 
 
+@pytest.mark.thorough
 def test_options_for_estimator_quantity_and_resolution_are_applied_and_reported(vibench_here, good, tmp_path):
     asked = ("--estimator", "h1", "--quantity", "velocity/acceleration", "--resolution", "5", "--scale", "db")
     done = vibench_here(
@@ -156,6 +157,7 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
     assert said in sentence(changed_copy(good, tmp_path, change))
 
 
+@pytest.mark.thorough
 def test_dead_clipped_or_lost_channels_are_named_in_a_readable_message(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
@@ -182,6 +184,7 @@ def test_a_sine_at_full_scale_is_analysed(tmp_path):
     assert not analyse_files([path], "full", Simulation.LEFT_OUT).failures
 
 
+@pytest.mark.thorough
 def test_warnings_about_a_result_are_printed(vibench_here, tmp_path):
     """Warnings are printed, and not only part of the report."""
     base = synthetic.sine(4.0, 260.0, 5e-7)

@@ -35,6 +35,7 @@ def folder(tmp_path_factory):
     return place
 
 
+@pytest.mark.thorough
 def test_the_json_output_contains_fit_intervals_and_undetermined_parameters(vibench_here, folder):
     result = vibench_here("analyse", folder, "--fit", "--no-simulate", "--json", cwd=folder)
     assert result.returncode == 0, result.stderr
@@ -85,6 +86,7 @@ settle_s = 1.5
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("level_vpp", [0.3, 1.0])
 def test_a_fit_to_noise_with_collisions_is_refused(vibench_here, tmp_path, level_vpp):
     """At 1 Vpp the motion is chaotic: realisations scatter no more than periods do."""

@@ -121,6 +121,7 @@ def test_a_question_is_repeated_after_input_that_cannot_be_decoded(tmp_path, nam
     assert "is not printable" in wrong[0]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
 def test_an_answers_file_that_cannot_be_used_gives_a_one_sentence_error(tmp_path, content):
     if content is not None:
@@ -174,6 +175,7 @@ def test_a_configuration_that_cannot_be_written_completely_is_removed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_a_target_that_is_not_a_folder_is_reported_before_any_question(tmp_path):
     done = begin_configuration(tmp_path, "no/mine.toml")
     assert isinstance(done.exception, ConfigurationError)

@@ -21,6 +21,7 @@ def test_a_chain_without_drive_reports_bands_gaps_and_transmission():
     np.testing.assert_allclose(found["linear_transmission"]["3"], expected)
 
 
+@pytest.mark.thorough
 def test_a_steadily_driven_chain_gives_results_for_each_cell_and_a_file(tmp_path):
     options = ("--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.2, "--settle", 0.1)
     found = json_of("chain", *options, "--out", tmp_path / "out")

@@ -112,6 +112,7 @@ def test_a_missing_instrument_is_reported_in_one_sentence(refusal, tmp_path):
     assert "no instrument answers at USB0" in said
 
 
+@pytest.mark.thorough
 def test_the_instruments_of_the_virtual_rig_are_listed_by_name(output_of):
     found = output_of("bench", "list", "--bench", ROOT / "hardware_configs" / "virtual_rig.toml", "--json")
     assert any("1689::851" in name for name in found["visa"])

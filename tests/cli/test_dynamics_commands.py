@@ -11,6 +11,7 @@ from vibench.sim import ArcEnd
 from .in_this_process import invoke, json_of, refusal_of
 
 
+@pytest.mark.thorough
 def test_branches_are_printed_as_json_and_stored_with_a_figure_and_tables(tmp_path):
     options = ("--frequency", "60:64", "--amplitude", "5e-6", "--places", 2, "--starts", 1)
     (branch,) = json_of("branches", *options, "--out", tmp_path / "out")["branches"]
@@ -27,6 +28,7 @@ def test_the_branch_search_ends_at_the_requested_time():
     assert sum(each["end"] == ArcEnd.OUT_OF_TIME for each in found["branches"]) <= 1
 
 
+@pytest.mark.thorough
 def test_branches_over_amplitude_are_reported_in_sentences():
     result = invoke("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
     assert result.exit_code == 0, result.output
@@ -39,6 +41,7 @@ SHORT_LINE = (
 )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_branches_report_which_motions_a_bench_can_hold():
     found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig.toml"))
     # Ten control steps; each takes ten periods, or a fifth of a second if that is longer.
@@ -46,6 +49,7 @@ def test_branches_report_which_motions_a_bench_can_hold():
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
 
+@pytest.mark.thorough
 def test_a_real_time_controller_extends_the_holdable_motions():
     pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     found = json_of(*SHORT_LINE, "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"))
@@ -53,6 +57,7 @@ def test_a_real_time_controller_extends_the_holdable_motions():
     assert found["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("options", [("--model", "linear"), ()])
 def test_rounding_gives_an_undamped_branch_neither_instability_nor_bifurcation(options):
     line = ("--amplitude", 5e-6, "--frequency", "200:201", "--places", 2, "--starts", 1)

@@ -107,6 +107,7 @@ def test_invalid_exports_and_imports_are_refused_without_leftovers(run, h5_path,
     assert sorted(each.name for each in h5_path.parent.iterdir()) == ["map.toml", "run.h5"]
 
 
+@pytest.mark.thorough
 def test_the_refusal_of_an_exchange_is_one_sentence_on_standard_error(vibench, h5_path, tmp_path):
     (tmp_path / "run.csv").touch()
     result = vibench("export", "run.h5", "--to", "csv", cwd=tmp_path)

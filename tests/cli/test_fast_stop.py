@@ -121,6 +121,7 @@ def test_a_suspended_program_is_not_reported_as_silent():
         assert "switch the amplifier off" in " ".join(told.stderr.split())
 
 
+@pytest.mark.thorough
 def test_a_missing_state_folder_is_reported(tmp_path):
     told = vibench_stop(VIBENCH_STATE_DIR=str(Path(tmp_path) / "nowhere"))
     assert told.returncode == 1

@@ -167,6 +167,7 @@ def test_invalid_samples_end_a_check_or_a_run_with_a_readable_message(bench_with
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
+@pytest.mark.thorough
 def test_missing_samples_are_reported_and_prevent_playback(bench_with, outcome, tmp_path):
     pytest.importorskip("vibench_more_drivers", reason="pip install -e extensions/more_drivers brings it")
     left = [20]

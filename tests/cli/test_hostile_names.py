@@ -99,6 +99,7 @@ def test_no_command_prints_control_characters_of_a_name(vibench_here, folder, co
     assert not harmful("".join(path.read_text("utf-8") for path in folder.glob("new/*.html")))
 
 
+@pytest.mark.thorough
 def test_the_report_shows_names_and_notes_with_markup_as_plain_text(vibench_here, folder, tmp_path):
     path = next(folder.glob("*dwell.h5"))
     ended = vibench_here("analyse", path, "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)

@@ -70,6 +70,7 @@ def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
     assert len(told["kicks"]) == 3 * len(told["motions"])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("highest", "kinds"), [("6e-5", ["periodic"]), ("-4.6e-5", [])])
 def test_map_points_next_to_failed_points_have_no_motion(vibench_here, tmp_path, highest, kinds):
     # Starts with p beyond the rigid stops, at 45 um, are refused.

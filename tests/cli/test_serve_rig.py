@@ -60,6 +60,7 @@ def serve_rig_output():
     assert server.returncode == 0
 
 
+@pytest.mark.thorough
 def test_other_programs_can_use_generator_and_converter_of_the_served_rig(serve_rig_output):
     address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
     stranger = subprocess.run(

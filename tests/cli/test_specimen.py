@@ -70,6 +70,7 @@ def require_agreement(vibench_here, folder, path):
     assert specimen_of(recorded) == own
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_all_commands_agree_on_the_numbers_of_random_specimens(vibench_here, tmp_path):
     rng = np.random.default_rng(1)

@@ -75,6 +75,7 @@ def test_a_hold_without_a_named_program_is_refused_if_several_run(vibench_here, 
         assert len(announced_programs(Program)) == 2
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_a_blocked_program_is_named_and_all_other_programs_are_stopped(vibench_here, tmp_path):
     with driving_program("hangs") as hangs, driving_program("south") as south:

@@ -120,6 +120,7 @@ def test_a_wrong_study_is_refused_with_a_readable_message(refusal, tmp_path, old
     assert not (tmp_path / "a.h5").exists()
 
 
+@pytest.mark.thorough
 def test_a_study_with_a_failed_point_is_saved_and_returns_an_error(vibench_here, tmp_path):
     chatter = 'models = ["hertz", "rigid:1"]\ngaps_m = [1e-9]\nduration_s = 0.3\nwindow_s = 0.01\n'
     asked = plan(tmp_path, chatter + "amplitudes_m = [1e-3]\nfrequencies_hz = [100]\n")

@@ -68,6 +68,7 @@ def test_a_recording_swapped_for_another_is_refused_by_every_command(folder, how
         assert "the campaign's journal for dwell: it is another recording" in text
 
 
+@pytest.mark.thorough
 def test_a_missing_seal_gives_one_warning_and_is_stated_in_the_report(vibench_here, folder):
     with h5py.File(folder / "dwell.h5", "r+") as file:
         del file["seal"]

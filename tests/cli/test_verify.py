@@ -67,6 +67,7 @@ def point_outside(path):
         made.attrs["sha256"] = np.bytes_(hashlib.sha256(SECRET[:2000]).hexdigest())
 
 
+@pytest.mark.thorough
 def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
     good = vibench_here("verify", ".", "--json", cwd=folder)
     assert good.returncode == 0, good.stderr
@@ -82,6 +83,7 @@ def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
     assert vibench_here("verify", "one.h5", cwd=folder).returncode == 0
 
 
+@pytest.mark.thorough
 def test_a_wrong_or_missing_key_is_reported(vibench_here, folder):
     (folder / "key").write_text("a key that was not used here")
     found = vibench_here("verify", ".", "--key", "key", "--json", cwd=folder)
@@ -92,6 +94,7 @@ def test_a_wrong_or_missing_key_is_reported(vibench_here, folder):
     assert "error: The key nowhere for seals cannot be read" in none.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("arguments", [("analyse", "two.h5", "--json"), ("export", "two.h5", "--to", "csv")])
 def test_damaged_recordings_are_not_analysed(vibench_here, folder, arguments):
     damage(folder / "two.h5")
@@ -101,6 +104,7 @@ def test_damaged_recordings_are_not_analysed(vibench_here, folder, arguments):
     assert not list(folder.glob("two*.csv"))
 
 
+@pytest.mark.thorough
 def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder):
     with h5py.File(folder / "two.h5", "r+") as file:
         file["m0_velocity"].attrs["delay_s"] = 1.0
@@ -120,6 +124,7 @@ def pack_folder(vibench_here, folder):
     return found, names, {each["@id"]: each for each in graph}
 
 
+@pytest.mark.thorough
 def test_an_intact_folder_is_packed_without_warnings(vibench_here, folder):
     found, names, graph = pack_folder(vibench_here, folder)
     assert (found.returncode, "error" in found.stderr) == (0, False), found.stderr
@@ -128,6 +133,7 @@ def test_an_intact_folder_is_packed_without_warnings(vibench_here, folder):
     assert "cannot be trusted" not in graph["./"]["description"]
 
 
+@pytest.mark.thorough
 def test_unfinished_recordings_are_excluded_from_a_crate_and_named(vibench_here, folder):
     with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
@@ -136,6 +142,7 @@ def test_unfinished_recordings_are_excluded_from_a_crate_and_named(vibench_here,
     assert "note: five.h5.part is not finished and was omitted" in found.stderr
 
 
+@pytest.mark.thorough
 def test_a_crate_marks_damaged_recordings(vibench_here, folder):
     damage(folder / "two.h5")
     (folder / "three.h5").write_bytes((folder / "three.h5").read_bytes()[:5000])
@@ -168,6 +175,7 @@ def test_an_ro_crate_states_which_recordings_of_its_campaign_are_missing(vibench
     assert "tone.h5 cannot be trusted (missing" in graph["./"]["description"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -195,6 +203,7 @@ def test_external_links_are_followed_on_request(vibench_here, folder):
     assert (folder / "two.csv").exists()
 
 
+@pytest.mark.thorough
 def test_the_command_recover_follows_external_links_on_request(vibench_here, refusal, folder):
     with growing_recording(folder / "four.h5"):
         shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
@@ -214,6 +223,7 @@ def test_a_finished_recording_named_as_a_part_file_is_not_recovered(refusal, fol
     assert (folder / "four.h5.part").read_bytes() == before
 
 
+@pytest.mark.thorough
 def test_bad_recordings_do_not_affect_other_recordings_of_a_folder(vibench_here, folder):
     shutil.copy(folder / "one.h5", folder / "four.h5")
     with h5py.File(folder / "four.h5", "r+") as file:

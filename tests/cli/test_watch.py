@@ -98,6 +98,7 @@ def test_watch_shows_the_run_and_its_end(running):
     assert "dwell" in said
 
 
+@pytest.mark.thorough
 def test_watch_reports_that_no_engine_runs(vibench, tmp_path):
     told = vibench("stop", cwd=tmp_path)
     assert told.returncode == 1
@@ -164,6 +165,7 @@ class TestWithoutAnEngine:
             assert recording.reason == "from elsewhere"
         assert list((Path(os.environ["VIBENCH_STATE_DIR"]) / "engines").glob("*.json")) == []
 
+    @pytest.mark.thorough
     def test_engine_commands_are_refused_for_other_programs(self, script, vibench_here, tmp_path):
         held = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert held.returncode == 1

@@ -49,6 +49,7 @@ def focusable(window):
             yield widget
 
 
+@pytest.mark.thorough
 def test_every_focusable_widget_has_an_accessible_name(lasting_window):
     nameless = []
     for widget in focusable(lasting_window):
@@ -117,6 +118,7 @@ def scrolled_sideways(page):
             yield area.accessibleName(), area.widget().minimumSizeHint().width(), area.viewport().width()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 def test_every_field_has_a_visible_edge(lasting_window, qapp, qtbot, contrast, theme):
     """WCAG 2.1, section 1.4.11: contrast of at least 3 with the inside and the outside."""

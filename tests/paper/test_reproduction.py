@@ -45,6 +45,7 @@ def test_short_runs_show_the_effects_of_collisions(evidence):
     assert len(asked) == len(set(asked)) == 3
 
 
+@pytest.mark.thorough
 def test_the_claims_are_scored_for_each_damping(evidence):
     weak = replace(SHORT, highest_hz=25.0)
     found_scores = scores(claims("linear-resonances", "p-saturates"), evidence, weak)

@@ -38,6 +38,7 @@ def test_the_classical_runge_kutta_method_has_order_four():
     assert coarse / fine == pytest.approx(16.0, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_ode45_has_errors_of_the_size_of_its_tolerances():
     specimen = gong2025(contact="power:5")
     truth = independent_state(specimen, DRIVE, 0.01, MOVING)

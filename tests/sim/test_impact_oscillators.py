@@ -167,6 +167,7 @@ def test_the_soft_oscillator_grazes_where_its_linear_resonance_reaches_the_stop(
     assert (found.motion is FinalMotion.QUIET) == (beyond < 0.0)
 
 
+@pytest.mark.thorough
 def test_the_ueda_oscillator_has_the_published_exponent():
     # Ueda: x'' + 0.05 x' + x^3 = 7.5 cos t; the linear spring is negligible.
     specimen = replace(on_heavy_base(PowerLaw(1.0, ((3, 1.0),)), 1.0, 0.05), stiffnesses=UEDAS_SPRINGS)

@@ -15,6 +15,7 @@ def virtual():
         yield running
 
 
+@pytest.mark.thorough
 def test_generator_and_converter_are_listed_under_the_names_used_in_configurations(virtual):
     found = list_instruments(server=virtual.daq_address)
     assert any("1689::851::L0001" in resource for resource in found.visa_resources)
@@ -24,6 +25,7 @@ def test_generator_and_converter_are_listed_under_the_names_used_in_configuratio
     assert found.remarks == ()
 
 
+@pytest.mark.thorough
 def test_a_missing_daq_driver_is_reported_and_other_instruments_are_listed(virtual):
     found = list_instruments()
     assert found.visa_resources
@@ -31,5 +33,6 @@ def test_a_missing_daq_driver_is_reported_and_other_instruments_are_listed(virtu
     assert any("no NI-DAQmx driver" in remark for remark in found.remarks)
 
 
+@pytest.mark.thorough
 def test_a_server_that_does_not_answer_is_named_in_the_remarks(virtual):
     assert any("127.0.0.1:9" in remark for remark in list_instruments(server="127.0.0.1:9").remarks)

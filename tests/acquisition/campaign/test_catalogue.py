@@ -54,6 +54,7 @@ def reads(monkeypatch):
     return opened
 
 
+@pytest.mark.thorough
 def test_the_catalogue_lists_recordings_in_subfolders_with_their_plan_and_time_and_size(folder):
     dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
@@ -72,6 +73,7 @@ def test_a_tracked_resonance_is_listed_with_its_search_range():
     assert _band(plan.model_dump()) == (240, 290)
 
 
+@pytest.mark.thorough
 def test_only_new_and_changed_files_are_read(folder, reads):
     before = list_recordings(folder)
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
@@ -84,6 +86,7 @@ def test_only_new_and_changed_files_are_read(folder, reads):
     assert sorted(reads) == ["moved.h5", "sweep.h5"]
 
 
+@pytest.mark.thorough
 def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     before = list_recordings(folder)
     (folder / CATALOGUE_NAME).unlink()
@@ -93,6 +96,7 @@ def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
+@pytest.mark.thorough
 def test_the_verdict_on_a_recording_states_how_it_ended_and_any_overload(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
@@ -112,6 +116,7 @@ def test_the_verdict_on_a_recording_states_how_it_ended_and_any_overload(bench, 
     assert entry.reason == "seen enough"
 
 
+@pytest.mark.thorough
 def test_running_recordings_are_listed_and_abandoned_ones_are_marked_as_interrupted(bench, folder):
     with Run(bench, DWELL, folder / "now.h5") as run:
         next(iter(run))
@@ -120,6 +125,7 @@ def test_running_recordings_are_listed_and_abandoned_ones_are_marked_as_interrup
     assert "now.h5.part" not in [entry.path for entry in list_recordings(folder)]
 
 
+@pytest.mark.thorough
 def test_a_file_that_is_not_a_recording_is_listed_as_unreadable(folder):
     (folder / "junk.h5").write_bytes(b"no HDF5")
     entry = next(entry for entry in list_recordings(folder) if entry.path == "junk.h5")
@@ -127,6 +133,7 @@ def test_a_file_that_is_not_a_recording_is_listed_as_unreadable(folder):
     assert "junk.h5" in entry.reason
 
 
+@pytest.mark.thorough
 def test_a_foreign_file_named_like_the_catalogue_is_kept_until_a_rebuild(folder):
     (folder / CATALOGUE_NAME).write_text("my notes " * 200)
     with pytest.raises(RecordingError, match="is not a catalogue"):
@@ -135,6 +142,7 @@ def test_a_foreign_file_named_like_the_catalogue_is_kept_until_a_rebuild(folder)
     assert len(list_recordings(folder, Refresh.ALL)) == 2
 
 
+@pytest.mark.thorough
 def test_a_write_protected_folder_can_be_listed(folder, monkeypatch):
     # For a directory in place of the database SQLite reports the same error as for a read-only folder.
     (folder / CATALOGUE_NAME).mkdir()
@@ -146,6 +154,7 @@ def test_a_missing_folder_is_refused_with_advice(tmp_path):
         list_recordings(tmp_path / "nowhere")
 
 
+@pytest.mark.thorough
 def test_a_copy_of_a_recording_is_listed_as_a_copy(folder):
     shutil.copy(folder / "monday" / "dwell.h5", folder / "again.h5")
     by_path = {each.path: each.verdict for each in list_recordings(folder)}

@@ -23,6 +23,7 @@ from .small_campaigns import campaign, fail_one_read, outcomes, points, states
 REST_S = 12.0
 
 
+@pytest.mark.thorough
 def test_the_rig_is_silent_between_recordings(rig, tmp_path):
     coarse = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"grid_rate_hz": 25_600.0})})
     with ReconnectingBench(coarse) as kept:
@@ -91,6 +92,7 @@ def test_a_hold_extends_a_cooling_pause_until_the_hold_is_released(bench, tmp_pa
     assert outcomes(point_results) == [("one", "recorded"), ("two", "recorded")]
 
 
+@pytest.mark.thorough
 def test_a_campaign_killed_in_a_cooling_pause_continues_at_the_next_point(bench, new_bench, rig, tmp_path):
     def as_left_by_a_kill(event):
         if event.kind is CampaignEventKind.RESTING:

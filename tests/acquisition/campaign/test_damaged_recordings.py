@@ -113,6 +113,7 @@ def test_a_damaged_recording_is_reported_and_kept_and_its_point_is_measured_agai
     assert {outcome for outcome, _ in outcomes(again).values()} == {PointOutcome.KEPT}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("existing", ExistingRecordings)
 def test_a_link_to_a_disk_that_is_not_connected_is_kept(bench, folder, existing):
     link = folder / "one.h5"
@@ -139,6 +140,7 @@ def test_a_campaign_that_lost_its_journal_does_not_accept_damaged_recordings(ben
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
 def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, folder, has_journal):
     """The check of hundreds of recordings must notice a stop before it has read them all."""
@@ -211,6 +213,7 @@ def test_a_campaign_whose_older_journal_has_no_seals_can_be_resumed(bench, folde
     assert (one.seal, len(three.seal)) == ("", 64)
 
 
+@pytest.mark.thorough
 def test_unsealed_recordings_of_an_older_version_are_kept_and_reported(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
@@ -223,6 +226,7 @@ def test_unsealed_recordings_of_an_older_version_are_kept_and_reported(bench, fo
     assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}
 
 
+@pytest.mark.thorough
 def test_points_are_measured_again_if_the_seals_of_their_recordings_were_removed(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
@@ -233,6 +237,7 @@ def test_points_are_measured_again_if_the_seals_of_their_recordings_were_removed
     assert {each.outcome for each in made} == {PointOutcome.RECORDED}
 
 
+@pytest.mark.thorough
 def test_every_seal_check_detects_a_swapped_recording(folder):
     shutil.copy(folder / "one.h5", folder / "two.h5")
     with open_recording(folder / "two.h5") as recording:
@@ -277,6 +282,7 @@ def test_a_journal_with_two_different_seals_for_one_recording_is_reported_as_dam
     assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
+@pytest.mark.thorough
 def test_a_recording_moved_back_after_its_point_was_repeated_is_reported_as_bad(bench, folder):
     former = (folder / "two.h5").read_bytes()
     (folder / "two.h5").unlink()
@@ -334,6 +340,7 @@ def test_verifying_an_emptied_folder_reports_missing_recordings(folder):
     assert bad == dict.fromkeys(("older/one.h5", "older/two.h5", "older/three.h5"), "missing")
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
 def test_undecodable_file_names_and_circular_links_do_not_prevent_a_listing(folder):
     shutil.copy(folder / "two.h5", os.fsdecode(os.fsencode(folder) + b"/\xff.h5"))
@@ -410,6 +417,7 @@ def test_a_complete_recording_unfinished_on_disk_is_not_repeated(bench, tmp_path
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
+@pytest.mark.thorough
 def test_a_complete_recording_counts_even_if_the_journal_lists_it_as_failed(bench, tmp_path):
     """The journal may lag behind a recovery, or the user has recovered the recording by hand."""
     run_until_disk_refuses(bench, tmp_path, None)
@@ -424,6 +432,7 @@ def test_a_complete_recording_counts_even_if_the_journal_lists_it_as_failed(benc
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
 
 
+@pytest.mark.thorough
 def test_the_point_of_a_recording_moved_back_into_the_folder_is_not_measured_again(bench, folder):
     (folder / "two.h5").rename(folder / "two.away")
     with pytest.raises(RecordingError, match="gone"):

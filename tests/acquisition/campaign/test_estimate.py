@@ -37,6 +37,7 @@ def test_the_estimated_size_of_recordings_matches_their_samples(rig, tmp_path):
     assert expected.fits
 
 
+@pytest.mark.thorough
 def test_an_estimate_excludes_existing_recordings(bench, rig, tmp_path):
     point_results = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):

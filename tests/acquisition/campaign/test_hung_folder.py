@@ -16,6 +16,7 @@ PLAN = Campaign(
 )
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(60)
 @pytest.mark.skipif(sys.platform == "win32", reason="a pipe that nobody reads hangs as POSIX has it")
 def test_an_unresponsive_status_file_does_not_block_a_stop(rig, tmp_path, monkeypatch):

@@ -82,6 +82,7 @@ def _start_and_die(path):
         os._exit(9)
 
 
+@pytest.mark.thorough
 def test_a_kill_during_a_journal_transaction_keeps_the_previous_state(journal):
     path = journal.path
     journal.close()

@@ -31,6 +31,7 @@ def test_a_file_with_the_name_of_the_campaign_folder_is_refused_before_output(be
     assert not any(name == "start" for name, _, _ in bench.world.calls)
 
 
+@pytest.mark.thorough
 def test_limits_are_checked_once_for_points_with_equal_excitation(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
@@ -42,6 +43,7 @@ def test_limits_are_checked_once_for_points_with_equal_excitation(bench, tmp_pat
     assert [each.name for each in checked] == ["one", "louder"]
 
 
+@pytest.mark.thorough
 def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, monkeypatch):
     def measure_and_move(*arguments, **named):
         outcome = run_measurement(*arguments, **named)
@@ -67,6 +69,7 @@ def recordings(new_bench, rig, tmp_path_factory):
     return folder, seen
 
 
+@pytest.mark.thorough
 def test_progress_counts_the_recordings(recordings):
     assert recordings[1] == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
 
@@ -99,6 +102,7 @@ def test_a_resume_with_another_plan_is_refused(bench, recordings):
         run_campaign(bench, changed, recordings[0], ExistingRecordings.RESUME)
 
 
+@pytest.mark.thorough
 def test_a_campaign_can_skip_a_failed_measurement(bench, tmp_path):
     fault = fail_one_read(bench, DataLost("a hole"), "one")
     point_results = run_campaign(
@@ -124,6 +128,7 @@ def test_a_campaign_does_not_start_if_one_plan_exceeds_a_limit(bench, tmp_path):
     assert bench.world.calls == []
 
 
+@pytest.mark.thorough
 def test_ctrl_c_ramps_down_the_measurement_and_ends_the_campaign(bench, tmp_path):
     def press_once(progress):
         if progress.name == "two" and progress.run.state is RunState.SETTLING:

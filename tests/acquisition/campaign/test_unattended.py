@@ -33,6 +33,7 @@ def log(folder):
 
 
 class TestRetries:
+    @pytest.mark.thorough
     def test_a_measurement_with_lost_data_is_repeated_in_a_new_file(self, bench, tmp_path):
         fault = fail_one_read(bench, DataLost("a hole"))
         point_results = run_campaign(bench, campaign("one", "two", attempts=2), tmp_path, on_progress=fault)
@@ -52,6 +53,7 @@ class TestRetries:
         assert (point.state.value, point.reason_code, point.attempts) == ("failed", ReasonCode.DATA_LOST, 1)
         assert point.reason == "a hole"
 
+    @pytest.mark.thorough
     def test_a_campaign_reopens_its_bench_after_a_lost_instrument(self, bench, new_bench, rig, tmp_path):
         opened = []
 
@@ -115,6 +117,7 @@ class TestAnotherBench:
             run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
+    @pytest.mark.thorough
     def test_a_changed_bench_must_be_accepted_only_once(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": with_other_serial(bench.identities["generator"])}
@@ -126,6 +129,7 @@ class TestAnotherBench:
 
 
 class TestFurtherMeasurements:
+    @pytest.mark.thorough
     def test_follow_up_measurements_run_next_and_are_requested_once(self, bench, tmp_path):
         asked = []
 
@@ -152,6 +156,7 @@ class TestFurtherMeasurements:
             ("two", ["one", "more", "two"], True),
         ]
 
+    @pytest.mark.thorough
     def test_a_resume_repeats_a_follow_up_analysis_that_was_not_stored(self, bench, tmp_path):
         def failing_analysis(finished, recording):
             raise ZeroDivisionError
@@ -171,6 +176,7 @@ class TestFurtherMeasurements:
 
 
 class TestResuming:
+    @pytest.mark.thorough
     def test_a_lost_journal_is_rebuilt_from_the_recordings(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         journal_path(tmp_path, "c").unlink()
@@ -201,6 +207,7 @@ class TestResuming:
 
 
 class TestWatching:
+    @pytest.mark.thorough
     def test_log_and_status_line_show_the_events_of_a_campaign(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         of_points = ["point_begun", "point_done"]
@@ -222,6 +229,7 @@ class TestWatching:
         lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
         assert json.loads(lines[1])["event"] == "begun"
 
+    @pytest.mark.thorough
     def test_a_notification_command_is_run_at_faults_and_at_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"

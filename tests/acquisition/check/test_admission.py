@@ -93,6 +93,7 @@ def test_the_rig_sets_how_long_a_check_is_valid(rig, state_folder):
     assert why_not(result, patient, NOW) is None
 
 
+@pytest.mark.thorough
 def test_a_new_check_arms_the_bench_and_is_recorded(real, tmp_path):
     bench, _ = real
     result = require_fresh(bench, tmp_path, CheckRule.NOW)
@@ -115,6 +116,7 @@ def test_a_failed_new_check_is_stored_and_does_not_arm_the_bench(real, tmp_path)
         require_fresh(bench, tmp_path)
 
 
+@pytest.mark.thorough
 def test_a_check_after_which_the_drive_stays_on_warns_about_the_output(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
@@ -132,6 +134,7 @@ def test_a_waived_check_is_noted_in_the_recording(real, tmp_path):
         assert recording.bench_check == {}
 
 
+@pytest.mark.thorough
 def test_a_virtual_bench_is_checked_once_automatically(rig, state_folder, tmp_path):
     with open_bench(rig) as bench:
         first = require_fresh(bench, tmp_path)
@@ -140,6 +143,7 @@ def test_a_virtual_bench_is_checked_once_automatically(rig, state_folder, tmp_pa
         assert bench.last_check == first
 
 
+@pytest.mark.thorough
 def test_a_gain_change_since_the_last_check_is_reported_in_decibels_with_its_age_in_days(real, tmp_path):
     bench, virtual = real
     check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
@@ -154,6 +158,7 @@ def test_a_gain_change_since_the_last_check_is_reported_in_decibels_with_its_age
     assert result.report["amplifier gain"].verdict is Verdict.OK
 
 
+@pytest.mark.thorough
 def test_checks_of_different_configurations_are_not_compared(real, tmp_path):
     bench, _ = real
     store_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))

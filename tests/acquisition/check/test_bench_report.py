@@ -174,6 +174,7 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
+@pytest.mark.thorough
 def test_a_wrong_load_setting_that_cannot_be_read_is_found_with_advice(check_rig, rig, tmp_path):
     assert failed_findings(check_rig(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
     # The panel is set to 50 ohm: every amplitude is twice the setting.
@@ -201,6 +202,7 @@ def test_the_bench_report_is_a_table_and_round_trips_through_json(check_rig, rig
         report["nonsense"]
 
 
+@pytest.mark.thorough
 def test_a_bench_with_an_analogue_output_for_sines_is_checked_through_that_output(tmp_path):
     rig = load_rig("virtual_rig_streaming")
     with open_bench(rig) as bench:

@@ -59,6 +59,7 @@ def sweep_bench(new_control_bench, both_ways):
     return both_ways["bench"]
 
 
+@pytest.mark.thorough
 def test_jumps_up_and_down_are_bracketed_around_the_folds(sweep_bench):
     jumps = {each["direction"]: each for each in notes_of(sweep_bench, "jump") if each["how"] == "localised"}
     lower, upper = folds_hz(sweep_bench.oscillator, LEVEL)
@@ -186,6 +187,7 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
     assert found[-1]["frequency_hz"] > found[0]["frequency_hz"] + 0.05
 
 
+@pytest.mark.thorough
 def test_a_strongly_bent_resonance_is_followed(new_control_bench):
     """The resonance moves from 120 to 127 Hz, by up to four half-widths (0.48 Hz) per level."""
     bench = new_control_bench(hardening=HARDENING)

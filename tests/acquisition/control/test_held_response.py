@@ -29,6 +29,7 @@ def hold_response(tmp_path):
     return carry_out
 
 
+@pytest.mark.thorough
 def test_the_base_level_of_a_held_response_matches_the_closed_form(rig, hold_response):
     plan = HeldResponse(amplitude_vpp=1, frequencies_hz=(88, 90, 92), response_m=1e-6, record_s=0.5)
     specimen = specimen_of(rig)

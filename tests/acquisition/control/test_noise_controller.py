@@ -101,6 +101,7 @@ def test_the_base_spectrum_is_lowered_only_where_m0_would_exceed_its_limit(recor
         assert notes(recording)[-1]["notched"] > 0
 
 
+@pytest.mark.thorough
 def test_a_run_with_an_unreachable_spectrum_is_ramped_down(record_noise):
     with pytest.raises(LimitExceeded, match=r"needs .* Vpp at .* allows at most amplitude_vpp = 0\.1"):
         record_noise(noise(amplitude_vpp=0.1))

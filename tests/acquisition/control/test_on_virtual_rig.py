@@ -88,6 +88,7 @@ def test_the_measured_period_matches_the_simulation(record_run, frequency_hz, am
     assert found["level"] == "within tolerance"
 
 
+@pytest.mark.thorough
 def test_the_base_level_is_held_despite_impact_ringing_on_a_light_table(record_run):
     plan = HeldDwell(
         amplitude_vpp=2.0,

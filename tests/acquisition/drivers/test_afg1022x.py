@@ -133,6 +133,7 @@ class TestPlaying:
         volts = (held / 8191.5 - 1) * generator.panel_vpp / 2
         assert np.max(np.abs(volts - 0.25 * (values - values.mean()))) < 0.5 / 16383 + 0.5e-4
 
+    @pytest.mark.thorough
     def test_a_waveform_with_newline_bytes_is_transferred_intact_through_a_socket(self, plugged):
         with ScpiSocket(plugged.instrument) as socket:
             config = plugged.config.model_copy(update={"resource": socket.resource_name})

@@ -140,6 +140,7 @@ class TestRuns:
         client.resume()
         until_state(client, EngineState.RUNNING)
 
+    @pytest.mark.thorough
     def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, client, shipped_rig, tmp_path):
         start_run(client, shipped_rig, tmp_path, "first", "second")
         client.stop(StopLevel.RAMP, "enough for today")
@@ -272,6 +273,7 @@ def test_arming_a_long_campaign_may_exceed_the_answer_timeout(shared_engine, cli
 
 
 class TestMissingViewers:
+    @pytest.mark.thorough
     def test_an_attended_run_is_aborted_when_its_viewer_stops_sending_requests(
         self, client, shipped_rig, tmp_path
     ):
@@ -352,6 +354,7 @@ class TestMissingViewers:
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
+    @pytest.mark.thorough
     def test_an_armed_engine_disarms_when_its_viewer_stops_sending_requests(
         self, client, shared_engine, shipped_rig, tmp_path
     ):

@@ -210,6 +210,7 @@ def test_requests_and_answers_round_trip(handler):
     assert json.loads(looked.text).keys() == {"run_id", "first_sample", "sample_rate_hz", "shape"}
 
 
+@pytest.mark.thorough
 def test_a_hold_of_a_drive_that_cannot_be_held_is_refused(shipped_rig, tmp_path):
     """A run with a dead man's switch cannot be held; a confirmed hold would end it as complete."""
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})

@@ -137,6 +137,7 @@ class TestStalls:
 
 
 class TestConnectionsWithoutToken:
+    @pytest.mark.thorough
     def test_two_thousand_idle_connections_do_not_block_a_stop(self, running, tmp_path):
         before = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
         with connections(running.address, 2000):
@@ -184,11 +185,13 @@ class TestConnectionsWithoutToken:
 
 
 class TestMissingDescriptors:
+    @pytest.mark.thorough
     def test_a_stop_works_without_free_file_descriptors(self, running, tmp_path):
         with without_descriptors(running):
             stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors")
             require_ending(tmp_path, "no descriptors")
 
+    @pytest.mark.thorough
     def test_a_stop_file_ends_the_run_without_free_file_descriptors(self, running, tmp_path):
         with without_descriptors(running):
             write_stop_file(
@@ -220,6 +223,7 @@ class TestAnnouncements:
             path.unlink()
             other.stdin.close()
 
+    @pytest.mark.thorough
     def test_announcements_of_another_computer_are_kept(self, process):
         told = the_engine(process.pid)
         path = engines_folder() / "4.json"

@@ -45,6 +45,7 @@ def test_limit_checks_are_sorted_by_utilisation_and_violations_are_marked(rig):
     assert "generator" in seen.checks[0].complaint()
 
 
+@pytest.mark.thorough
 def test_a_preview_of_a_long_sweep_has_a_bounded_number_of_samples(rig):
     excitation = QUICK["sweep"].excitation.model_copy(update={"duration_s": 900.0})
     seen = preview_measurement(QUICK["sweep"].model_copy(update={"excitation": excitation}), rig)

@@ -45,6 +45,7 @@ def test_predicted_motion_with_contact_is_within_50_percent(rig, frequency_hz):
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(peak_m(rig, 8.0, frequency_hz), rel=0.5)
 
 
+@pytest.mark.thorough
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(frequency_hz=st.floats(150, 300), level=st.floats(0.05, 0.99))
 @example(frequency_hz=195.0, level=0.5)

@@ -209,6 +209,7 @@ def test_recordings_killed_in_every_phase_lose_at_most_one_second(tmp_path):
     assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [2, 3, 3]
 
 
+@pytest.mark.thorough
 def test_a_killed_program_leaves_a_recording_that_opens(tmp_path):
     words = tmp_path / "words"
     with words.open("wb") as out:

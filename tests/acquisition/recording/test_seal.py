@@ -76,6 +76,7 @@ def test_the_quick_check_finds_a_change_in_a_table_of_any_length(tmp_path, make_
     assert state_of(path, "quick") is state_of(path) is SealState.DAMAGED
 
 
+@pytest.mark.thorough
 def test_h5py_and_hashlib_alone_verify_a_seal(make_file):
     path = make_file()
     assert state_of(path) is state_of(path, "quick") is SealState.INTACT

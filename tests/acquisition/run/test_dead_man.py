@@ -67,6 +67,7 @@ def test_the_low_level_check_is_silent_after_its_burst(guarded, tmp_path):
         assert loud[-1] * 1e-4 <= CHECK_SETTLE_S + CHECK_LISTEN_S + CHECK_MARGIN_S
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("dead_man_s", [0.2, 0.5, 5.0])
 def test_the_low_level_check_gives_the_same_value_with_a_dead_man_switch(laboratory, tmp_path, dead_man_s):
     _, connected = laboratory()
@@ -96,6 +97,7 @@ def test_the_bench_check_plays_one_burst_that_ends_by_itself(guarded, monkeypatc
     assert report.verdict is Verdict.OK
 
 
+@pytest.mark.thorough
 def test_bursts_contain_whole_periods_and_are_separated_by_short_gaps(guarded, tmp_path):
     _, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:

@@ -63,6 +63,7 @@ def recording(laboratory, tmp_path, monkeypatch):
         yield virtual, run
 
 
+@pytest.mark.thorough
 def test_a_stalled_run_is_silenced(recording, monkeypatch):
     virtual, run = recording
     assert terminal_v(virtual) > 0.5
@@ -78,12 +79,14 @@ def test_a_stalled_run_is_silenced(recording, monkeypatch):
         assert recorded.reason.startswith("the run read no samples for 5 s; its output was switched off")
 
 
+@pytest.mark.thorough
 def test_a_stalled_run_is_silenced_sooner_after_a_stop(recording):
     virtual, run = recording
     run.switch.ask(StopRequest(Cause.TERMINATED, StopLevel.ABORT, "SIGTERM"))
     until(lambda: terminal_v(virtual) < SILENT_V, drive_guard.STOPPED_BLOCKS * 0.1 + 3.0)
 
 
+@pytest.mark.thorough
 def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
     virtual, run = recording
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 5)
@@ -95,6 +98,7 @@ def test_a_continuing_run_is_not_silenced(recording, monkeypatch):
     assert terminal_v(virtual) > 0.5
 
 
+@pytest.mark.thorough
 def test_a_stop_is_not_confirmed_by_the_silence_of_another_generator(recording, rig, tmp_path):
     """One script may drive two benches, each in its own thread."""
     north, _ = recording
@@ -252,6 +256,7 @@ def test_background_jobs_of_a_run_start_no_new_thread(monkeypatch):
     assert done == [1, 2]
 
 
+@pytest.mark.thorough
 def test_a_drive_guard_that_fails_to_silence_a_drive_warns_once_and_tries_again(monkeypatch, caplog):
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 1)
     output = Output(*[InstrumentLost("THE OUTPUT MAY STILL BE ON")] * 3)

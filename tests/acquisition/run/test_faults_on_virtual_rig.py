@@ -105,6 +105,7 @@ def test_a_silently_replaced_setting_ends_the_run(laboratory, tmp_path):
     assert "18" in str(failure.value)
 
 
+@pytest.mark.thorough
 def test_a_laser_drop_out_and_an_overload_are_flagged_without_ending_the_run(laboratory, tmp_path):
     virtual, connected = laboratory()
     blind = when_recording(lambda: virtual.faults.over_range(0.2))

@@ -95,6 +95,7 @@ def test_probe_and_accelerometer_measure_the_same_motion_as_the_vibrometer(tmp_p
     assert abs(at) == pytest.approx(1.0, rel=3e-4)
 
 
+@pytest.mark.thorough
 def test_a_force_cell_measures_the_force_on_fixture_and_specimen(tmp_path):
     path = record(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     with open_recording(path) as recording:
@@ -266,6 +267,7 @@ def test_a_campaign_with_accelerometers_matches_the_vibrometer(tmp_path):
     assert kinds[0] == kinds[1]
 
 
+@pytest.mark.thorough
 def test_an_analysis_of_a_force_response_to_a_sine_is_refused(tmp_path):
     path = record(rig_with("base_force"), tmp_path, amplitude_vpp=0.05, frequency_hz=80.0, **DWELL)
     assert other_responses([path]) == {}

@@ -38,6 +38,7 @@ def segment(recording, label):
     return recording.read("drive_voltage", found.first_sample, found.last_sample + 1)
 
 
+@pytest.mark.thorough
 def test_a_recorded_dwell_has_the_planned_frequency_and_amplitude(virtual_bench, tmp_path):
     dwell = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1)
     with record(virtual_bench, tmp_path, dwell) as recording:
@@ -65,6 +66,7 @@ def test_the_recorded_ramps_rise_and_fall_along_a_half_cosine(virtual_bench, tmp
         np.testing.assert_allclose(levels, heights, atol=2e-3)
 
 
+@pytest.mark.thorough
 def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
@@ -84,6 +86,7 @@ def test_recorded_noise_has_a_flat_line_spectrum_in_its_band(virtual_bench, tmp_
     assert np.max(lines[900:]) < 0.02 * np.mean(inside)
 
 
+@pytest.mark.thorough
 def test_a_recorded_sweep_has_as_many_cycles_as_the_ideal_sweep(virtual_bench, tmp_path):
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
     with record(virtual_bench, tmp_path, sweep) as recording:

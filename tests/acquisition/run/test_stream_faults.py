@@ -75,6 +75,7 @@ def one_sentence(failure):
     return text
 
 
+@pytest.mark.thorough
 def test_an_output_over_a_limit_fades_out_and_the_limit_is_named(laboratory, tmp_path):
     virtual, connected = laboratory()
     # The noise reaches some 100 m/s2; 736 m/s2 are allowed.
@@ -89,6 +90,7 @@ def test_an_output_over_a_limit_fades_out_and_the_limit_is_named(laboratory, tmp
     assert np.max(np.abs(drive[-200:])) < 0.01
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("code", [-200290, -200018])
 def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
     virtual, connected = laboratory()
@@ -102,6 +104,7 @@ def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
+@pytest.mark.thorough
 def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_in_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     pause = when_recording(lambda: advance(virtual, 1.0))
@@ -189,6 +192,7 @@ class FillingDisk:
         return self._writer.finish(state, reason)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(resource is None, reason="limits on file size exist on POSIX only")
 def test_a_full_disk_fades_the_output_out_and_keeps_the_recording(laboratory, tmp_path):
     virtual, connected = laboratory()

@@ -96,6 +96,7 @@ def test_the_recording_matches_the_preview_within_converter_noise(streamed):
     assert np.max(np.abs(left)) < 10 * NOISE_V
 
 
+@pytest.mark.thorough
 def test_the_output_is_silent_between_the_check_and_the_ramp(streamed):
     quiet = streamed.drive_v[streamed.segments["check"].stop + 4000 : streamed.segments["ramp_up"].start]
     assert quiet.size > 0.2 * RATE_HZ

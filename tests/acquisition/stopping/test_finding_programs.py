@@ -112,6 +112,7 @@ def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_stat
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
+@pytest.mark.thorough
 def test_a_killed_program_is_reported_until_its_rig_is_opened_again_and_silent(capsys):
     script = (
         "from vibench.acquisition import *; from vibench.acquisition.stopping.program import note_open_bench;"
@@ -146,6 +147,7 @@ with open_bench(Path(sys.argv[1])), stop_on_signal(StopSwitch(), "x"):
 """
 
 
+@pytest.mark.thorough
 def test_a_killed_program_is_reported_until_the_same_generator_is_silent(tmp_path, capsys):
     """Two rigs may have the same name, for example after a file was copied."""
     usual = shipped("hardware_configs/virtual_rig.toml")
@@ -198,6 +200,7 @@ def test_a_user_can_stop_a_program_that_root_runs_with_the_state_folder_of_this_
     assert switch.request.reason == "smoke"
 
 
+@pytest.mark.thorough
 def test_a_stop_by_root_waits_while_the_program_of_a_user_ramps_down(state_of_other_user, monkeypatch):
     """The program updates the stop's file as a sign of life, and may not do that to a file of root."""
     monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)

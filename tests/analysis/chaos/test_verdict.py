@@ -239,6 +239,7 @@ def test_a_decaying_transient_is_undecided_and_not_periodic_or_quasi_periodic(se
     assert motion_verdict(points, DRIVE_HZ).kind is MotionKind.UNDECIDED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", range(5))
 def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
     """Narrow-band noise through a cubic was called chaotic in 6 of 6 cases, through x + x²/2 in 9 of 20."""
@@ -287,6 +288,7 @@ def test_invalid_poincare_points_or_noise_or_frequency_are_refused(value, noise,
         motion_verdict(Points(value, noise), drive_hz)
 
 
+@pytest.mark.thorough
 def test_a_period_that_explains_little_of_the_scatter_is_not_reported():
     """A slow transient of 0.3 % of the orbit was once reported as period 10."""
     place, rng = np.arange(700), np.random.default_rng(1)

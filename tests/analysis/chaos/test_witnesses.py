@@ -53,6 +53,7 @@ def test_the_zero_one_test_distinguishes_chaos_from_a_motion_of_period_eight(gro
     assert zero_one(logistic(growth, 2000)).k == pytest.approx(k, abs=0.01)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("stride", "is_oversampled"), [(1, True), (5, True), (20, False)])
 def test_the_zero_one_test_detects_an_oversampled_flow(lorenz, stride, is_oversampled):
     found = zero_one(lorenz[::stride][:2000])
@@ -77,6 +78,7 @@ def test_neighbouring_points_of_a_map_diverge_at_the_rate_of_the_exponent(series
     assert abs(found.exponent - exponent) < 3 * found.sd_exponent
 
 
+@pytest.mark.thorough
 def test_neighbouring_points_of_a_flow_diverge_at_the_rate_of_the_exponent(lorenz):
     points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
     found = divergence(points, steps=400, apart=100)
@@ -92,6 +94,7 @@ def test_noise_as_large_as_the_attractor_gives_no_exponent():
     assert not divergence(delay_vectors(noisy, 2), steps=20, noise=0.2).is_resolved
 
 
+@pytest.mark.thorough
 def test_the_surrogate_test_separates_a_noisy_henon_map_from_linear_noise():
     rng = np.random.default_rng(2)
     series = henon(2000)

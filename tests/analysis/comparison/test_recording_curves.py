@@ -20,6 +20,7 @@ def comparison(streamed_file):
     return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
+@pytest.mark.thorough
 def test_a_transmission_curve_sent_to_another_process_keeps_its_bounds(comparison):
     (curve,) = pickle.loads(pickle.dumps(comparison)).curves
     assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)

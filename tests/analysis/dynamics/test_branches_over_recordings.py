@@ -57,6 +57,7 @@ def test_a_dwell_has_no_level_over_frequency(dwell_file):
         level_of_drive(comparison(path))
 
 
+@pytest.mark.thorough
 def test_a_report_overlays_branches_and_states_level_differences(diagram, stepped_file, tmp_path):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
     (drawn,) = draw_branches(results, [diagram])

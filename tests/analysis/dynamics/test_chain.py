@@ -46,6 +46,7 @@ def test_the_chain_figure_shades_band_gaps_and_tabulates_its_curves(swept_chain)
     assert drawn.png.startswith(b"\x89PNG")
 
 
+@pytest.mark.thorough
 def test_a_chain_driven_by_recorded_noise_has_the_linear_transmission(noise_file):
     found = chain_answer(
         ChainRequest(lengths=(2,), drive="recorded", recording=str(noise_file()), duration_s=60.0)

@@ -167,6 +167,7 @@ def test_a_changed_branch_file_is_refused(tmp_path, change):
         read_diagram(path)
 
 
+@pytest.mark.thorough
 def test_the_json_document_contains_every_branch_point(paper_diagram):
     found = json.loads(json.dumps(paper_diagram.to_dict(), allow_nan=False))
     assert sum(len(each["points"]) for each in found["branches"]) == paper_diagram.points

@@ -36,6 +36,7 @@ def test_a_map_shows_the_recorded_level_and_responses(small_map, stepped_file):
     assert points == sum(len(curve.frequency_hz) for curve in level.measured) > 0
 
 
+@pytest.mark.thorough
 def test_a_report_overlays_recordings_only_on_frequency_amplitude_maps(small_map, stepped_file, tmp_path):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
     other = solve_map(Map(model="linear", damping_time_s=Range(start=1e-5, stop=2e-5, points=2)))

@@ -148,6 +148,7 @@ def test_values_held_within_a_record_are_counted_as_lost(tmp_path, fault, row):
         imported("csv", tmp_path, values, SINE)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 @pytest.mark.parametrize("plan", [SINE, HITS], ids=["dwell", "hits"])
 @pytest.mark.parametrize("kind", ["csv", "h5", "wav 16 bit"])

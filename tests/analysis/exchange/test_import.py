@@ -356,6 +356,7 @@ def test_a_dwell_that_was_exported_and_imported_gives_the_same_results(dwell_fil
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
 
 
+@pytest.mark.thorough
 def test_noise_that_was_exported_and_imported_gives_the_same_transmission(noise_file, tmp_path):
     with open_recording(noise_file()) as recording:
         original = analyse(recording)
@@ -378,6 +379,7 @@ def test_noise_that_was_exported_and_imported_gives_the_same_transmission(noise_
     np.testing.assert_allclose(found.response.frequency_response.value, wanted.value, rtol=1e-4)
 
 
+@pytest.mark.thorough
 def test_export_and_import_use_bounded_memory(tmp_path):
     samples = 2_000_000
     with h5py.File(tmp_path / "long.h5", "w") as file:

@@ -96,6 +96,7 @@ def test_every_missing_row_is_counted_as_lost(tmp_path, kind, share, seed):
     np.testing.assert_allclose(velocity[places], expected, atol=1e-7)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("share", [0.01, 0.1, 0.4])
 def test_missing_rows_of_an_hdf5_file_with_float32_times_are_counted(tmp_path, share):
     rng = np.random.default_rng(3)
@@ -179,6 +180,7 @@ def test_a_dwell_with_missing_rows_is_refused_but_a_part_without_gaps_is_analyse
     assert found.response.drive.frequency_hz == pytest.approx(150.0, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_a_file_with_more_gaps_than_a_recording_can_store_is_refused_without_leftovers(tmp_path):
     places = np.flatnonzero(np.arange(200_000) % 23 != np.arange(200_000) // 23 % 20)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)

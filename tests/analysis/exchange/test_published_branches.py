@@ -23,6 +23,7 @@ def cycles():
     return {each.name.removeprefix("CBC_"): each for each in found}
 
 
+@pytest.mark.thorough
 def test_published_stable_motions_have_the_stated_frequency_and_amplitude(cycles):
     for speed in STABLE:
         found = cycles[f"stable_v{speed}"]

@@ -140,6 +140,7 @@ def expected_outcome(kind, fault):
     return "lost" if fault == "late" and kind in SAYS_STARTS else "whole"
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
 @pytest.mark.parametrize("kind", [*SAYS_TIMES, *SAYS_STARTS, "wav"])
 @pytest.mark.parametrize("seed", [43])

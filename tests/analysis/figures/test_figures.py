@@ -48,6 +48,7 @@ def numbers(path):
     return {heading: np.array([float(row[heading] or "nan") for row in rows]) for heading in rows[0]}
 
 
+@pytest.mark.thorough
 def test_a_transmission_figure_shows_measurement_and_simulation(noise_file):
     found = result(noise_file())
     drawn = transmission_figure(found.analysis, found.overlay)
@@ -69,6 +70,7 @@ def test_a_transmission_figure_shows_measurement_and_simulation(noise_file):
     assert len(drawn.figure.legends) == 1
 
 
+@pytest.mark.thorough
 def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise_file):
     found = result(noise_file())
     caption = transmission_figure(found.analysis, found.overlay).caption
@@ -90,6 +92,7 @@ def test_files_saved_with_a_figure_contain_its_numbers(noise_file, tmp_path):
     assert numbers(sines)["response_i"].size == found.overlay.prediction.frequency_hz.size
 
 
+@pytest.mark.thorough
 def test_drawing_the_same_figure_twice_gives_identical_files(noise_file):
     found = result(noise_file(), Simulation.LEFT_OUT)
     drawn = [transmission_figure(found.analysis).svg for _ in range(2)]
@@ -104,6 +107,7 @@ def test_noise_levels_are_drawn_from_weak_to_strong(noise_file, tmp_path):
     assert "at 2 noise levels" in drawn.caption
 
 
+@pytest.mark.thorough
 def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     found = result(sweep_file)
     drawn = sweep_figure(found.analysis, found.overlay)
@@ -154,6 +158,7 @@ def test_collisions_throughout_a_sweep_are_reported_in_one_phrase(sweep_file):
     assert regions_text(replace(found, regions=(whole,))) == "the masses collide during the whole sweep"
 
 
+@pytest.mark.thorough
 def test_dwells_are_drawn_in_rows_by_level_and_the_caption_states_their_responses(dwell_file):
     strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
     drawn = dwells_figure([(each.analysis, each.overlay) for each in (strong, weak)])
@@ -181,6 +186,7 @@ def test_a_stepped_sine_figure_has_one_marker_per_step(stepped_file):
     assert "2 steps" in drawn.caption
 
 
+@pytest.mark.thorough
 def test_a_number_of_parts_above_the_plan_is_attributed_to_feedback(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     many = replace(facts, whole_stretches=78, planned_stretches=2)
@@ -189,6 +195,7 @@ def test_a_number_of_parts_above_the_plan_is_attributed_to_feedback(dwell_file):
     assert said[1] == "78 parts were recorded completely; feedback determined their number"
 
 
+@pytest.mark.thorough
 def test_levels_of_all_channels_are_shown_with_units(dwell_file):
     facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
     drawn = bench_levels_figure(facts)

@@ -34,6 +34,7 @@ def cases():
     return found
 
 
+@pytest.mark.thorough
 def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful_width(cases):
     bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
     held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905

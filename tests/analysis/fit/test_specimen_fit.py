@@ -133,6 +133,7 @@ def test_fit_intervals_hold_if_the_scatter_is_estimated_from_three_realisations(
     assert sum(held) > 0.95 * len(held) - 3 * math.sqrt(0.95 * 0.05 * len(held))
 
 
+@pytest.mark.thorough
 def test_noise_of_any_level_neither_rejects_a_true_model_nor_makes_the_fit_diverge(true):
     rng, said = np.random.default_rng(3), []
     for sd in np.geomspace(0.03, 0.5, 30):
@@ -217,6 +218,7 @@ def test_causes_that_cannot_be_distinguished_are_named_together(true):
     }
 
 
+@pytest.mark.thorough
 def test_the_uncertainty_of_a_sensor_widens_the_intervals_that_depend_on_it(true):
     """A sensitivity error of 1 % is no contradiction if the calibration uncertainty is 1 %."""
     off = transmission(true, np.random.default_rng(8), sd=2e-3, gain=1.01)

@@ -57,6 +57,7 @@ def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(noisy_dwell):
     assert "exponent" in told[Hidden.EXPONENT].not_determined
 
 
+@pytest.mark.thorough
 def test_simulated_runs_of_the_true_specimen_have_the_statistics_of_the_recording(noisy_dwell):
     """Converter noise in the recorded voltage once drove the simulated table: 30 standard deviations off."""
     rng, runs = np.random.default_rng(3), 14
@@ -71,6 +72,7 @@ def test_simulated_runs_of_the_true_specimen_have_the_statistics_of_the_recordin
     assert np.abs(z).max() < student.isf(0.005 / z.size, runs - 1)
 
 
+@pytest.mark.thorough
 def test_a_rig_with_a_wrong_base_response_is_refused_before_the_fit(noisy_dwell, tmp_path):
     other = shutil.copy(noisy_dwell.path, tmp_path / "other.h5")
     with h5py.File(other, "r+") as file:

@@ -59,6 +59,7 @@ def fitted_model(campaign):
     return update_model(campaign)
 
 
+@pytest.mark.thorough
 def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(fitted_model):
     assert [each.parameter for each in fitted_model.values] == [*LINEAR, Parameter.GAP]
     for each in fitted_model.values:
@@ -147,6 +148,7 @@ def lowered_dwells(folder, levels_m):
         yield synthetic.write_recording(folder, plan, motion, velocity, [part], name=f"dwell{number}")
 
 
+@pytest.mark.thorough
 def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_of_the_gap(tmp_path):
     """The gap was given as (5.1 to 15.4) um instead of 45."""
     paths = list(lowered_dwells(tmp_path, [8e-6, 4e-6, 2e-6, 1.5e-6, 0.5e-6]))
@@ -154,6 +156,7 @@ def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_o
     assert found.low <= 45e-6 <= found.high
 
 
+@pytest.mark.thorough
 def test_dwells_below_and_above_the_onset_of_collisions_bound_the_gap(dwell_file):
     results = analyse_files([dwell_file("weak"), dwell_file("strong")], "dwells", Simulation.LEFT_OUT)
     dwells = [each.analysis for each in results.dwells]

@@ -64,6 +64,7 @@ def analyse_with(tmp_path_factory):
     return record_and_analyse
 
 
+@pytest.mark.thorough
 def test_the_driven_spectral_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
     quiet, noisy = (analyse_with(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
     driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
@@ -73,6 +74,7 @@ def test_the_driven_spectral_lines_are_taken_from_the_plan_despite_drive_noise(a
     assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
+@pytest.mark.thorough
 def test_a_square_nonlinearity_distorts_even_lines_and_a_cubic_one_odd_lines(analyse_with):
     square = distortion(analyse_with(lambda velocity: 0.05 * velocity**2).response.periodic)
     cube = distortion(analyse_with(lambda velocity: 0.02 * velocity**3).response.periodic)

@@ -78,6 +78,7 @@ def test_a_single_hammer_hit_gives_resonances_without_bounds(tmp_path):
     assert "no result has bounds" in said
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [2, 3])
 def test_the_damping_of_an_exponential_window_is_subtracted(tmp_path, seed):
     """Segments are shorter than the response; the exponential window adds twice the damping of mode 1."""
@@ -95,6 +96,7 @@ def test_the_damping_of_an_exponential_window_is_subtracted(tmp_path, seed):
         assert abs(each.peak_magnitude - peak) < 3 * each.sd_peak_magnitude
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [5, 6])
 def test_the_bounds_for_the_modes_of_a_free_body_hold_and_are_narrow(tmp_path, seed):
     """The step of the velocity once gave chi² = 0.02, and bounds up to six times wider."""

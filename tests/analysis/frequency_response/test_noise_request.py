@@ -26,6 +26,7 @@ def response(path, **asked):
     return analyse(path, FrequencyResponseRequest(**asked)).response
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("noisy", ["base", "m0"])
 @pytest.mark.parametrize(
     ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]
@@ -88,6 +89,7 @@ def test_segments_that_touch_lost_or_overloaded_samples_are_left_out_and_counted
     np.testing.assert_allclose(found.frequency_response.value, 2, rtol=1.5e-2)
 
 
+@pytest.mark.thorough
 def test_an_overloaded_realisation_is_left_out(noise_file):
     overload = Overload("base_acceleration", round(3.2 * RATE), round(3.2 * RATE) + 4)
     found = response(noise_file(overloads=(overload,)))
@@ -98,6 +100,7 @@ def test_an_overloaded_realisation_is_left_out(noise_file):
         response(noise_file(overloads=both))
 
 
+@pytest.mark.thorough
 def test_periodic_noise_accepts_an_estimator_and_refuses_segments(noise_file):
     found = response(noise_file(), estimator=Estimator.HV, noise_ratio=1e-6, confidence=0.8)
     assert found.frequency_response.settings.estimator is Estimator.HV
@@ -142,6 +145,7 @@ def test_a_frequency_resolution_too_fine_for_the_record_is_refused(streamed_file
         response(streamed_file(), **asked)
 
 
+@pytest.mark.thorough
 def test_a_displacement_ratio_is_converted_to_the_requested_quantities(streamed_file):
     found = response(streamed_file()).frequency_response
     view = parse_view("velocity/acceleration", MagnitudeScale.DECIBEL)

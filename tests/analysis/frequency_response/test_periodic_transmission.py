@@ -127,6 +127,7 @@ def test_transmission_bounds_have_their_stated_coverage(count):
     assert inside_magnitude / trials == pytest.approx(0.95, abs=own_error + 0.01)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
 def test_the_linear_gain_of_a_cubic_nonlinearity_matches_the_closed_form(sigma):
     """The linear gain of u + 0.1 u^3 for noise of variance s^2 is 1 + 0.3 s^2."""

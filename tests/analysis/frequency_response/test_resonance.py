@@ -66,6 +66,7 @@ def modes():
     return np.sort(omega) / (2 * np.pi), 2e-5 * np.sort(omega) / 2
 
 
+@pytest.mark.thorough
 @settings(deadline=None, max_examples=8)
 @given(natural_hz=st.floats(150, 350), damping=st.floats(0.003, 0.08))
 def test_a_single_mode_is_recovered_exactly(natural_hz, damping):
@@ -175,6 +176,7 @@ def test_modes_with_close_frequencies_are_separated(apart_hz, shares):
         assert min(np.max(np.abs(_z(each, *mode[:2]))) for mode in modes) < 3.5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("shares", "seed", "draw"), [((1.0, -0.7), 77, 0), ((1.0, -0.7), 77, 3), ((1.0, 0.6, 1.0), 777, 2)]
 )

@@ -54,6 +54,7 @@ def peak_bytes(duration_s):
     return peak, channels
 
 
+@pytest.mark.thorough
 def test_a_four_times_longer_record_needs_no_more_memory():
     short, _ = peak_bytes(25.0)
     long, channels = peak_bytes(100.0)
@@ -61,6 +62,7 @@ def test_a_four_times_longer_record_needs_no_more_memory():
     assert channels.longest_read < channels.samples / 5
 
 
+@pytest.mark.thorough
 def test_analysis_progress_reports_every_stage_and_its_completed_share(streamed_file):
     heard = []
     analyse(streamed_file(), observer=heard.append)

@@ -292,6 +292,7 @@ def test_a_motion_without_contact_determines_no_gap(world_recording):
     assert motion.free_gaps == (None, None)
 
 
+@pytest.mark.thorough
 def test_requests_that_can_give_no_result_are_refused_with_a_readable_message(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     rigid = replace(recorded.specimen, contact=RigidStops(0.8))
@@ -336,6 +337,7 @@ def test_a_second_sensor_does_not_contradict_a_correct_track(world_recording, fu
         )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("scale", "late"), [(0.8, 0), (1.0, 40)])
 def test_a_second_sensor_with_wrong_amplitude_or_phase_refutes_the_track(world_recording, scale, late):
     """No bounds are given, since either the track or the sensor is wrong."""

@@ -25,6 +25,7 @@ def dwell(live_world):
     return running, seen, said, running.p()
 
 
+@pytest.mark.thorough
 def test_the_relative_displacement_of_the_live_twin_matches_the_simulation(dwell):
     _, seen, said, truth = dwell
     assert said == []

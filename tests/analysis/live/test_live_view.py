@@ -126,6 +126,7 @@ def view_of_sweep(lead_in_s):
     return view
 
 
+@pytest.mark.thorough
 def test_the_ramp_and_the_ringing_before_a_sweep_give_no_live_points():
     history = view_of_sweep(LEAD_IN_S).history()
     assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)

@@ -31,6 +31,7 @@ def noise_power(acceleration, rate_hz):
     return float(np.mean(lines[slice(*(round(each) for each in BETWEEN_HZ))]))
 
 
+@pytest.mark.thorough
 def test_draws_of_the_twin_include_amplifier_noise_that_was_not_recorded(recording):
     """Without it the simulated base has 0.7 times the noise, and limits of weak motions are too narrow."""
     source = voltage_source(recording, specimen_of(RIG), draws=8)
@@ -42,6 +43,7 @@ def test_draws_of_the_twin_include_amplifier_noise_that_was_not_recorded(recordi
     assert source.run.why == ""
 
 
+@pytest.mark.thorough
 def test_a_twin_reports_that_the_amplifier_noise_is_unknown(recording):
     unheard = replace(recording, segments=())
     assert "noise of the amplifier is unknown" in voltage_source(unheard, specimen_of(RIG)).run.why

@@ -47,6 +47,7 @@ def test_random_magnitudes_exceed_the_limit_in_1_percent_of_cases():
     assert 5 <= outside <= 36
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("scatter", [0.01, 0.5, 1.5, 9.0])
 @pytest.mark.parametrize("middle", [0.3, np.pi])
 def test_correct_phases_exceed_the_limit_in_1_percent_of_cases_on_the_whole_circle(scatter, middle):

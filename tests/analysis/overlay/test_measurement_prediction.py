@@ -49,6 +49,7 @@ def lowest_hz(start_hz, stop_hz, amplitude_vpp):
     return predict_measurement(Measurement(name="sweep", excitation=sweep), RIG).collision_bands_hz[0][0]
 
 
+@pytest.mark.thorough
 def test_a_downward_sweep_keeps_colliding_to_lower_frequencies_than_an_upward_sweep():
     """Upwards collisions begin where the linear motion closes the gap; downwards they last longer,
     down to a frequency that varies with the chaotic motion."""

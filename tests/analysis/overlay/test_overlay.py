@@ -31,6 +31,7 @@ def test_a_weak_dwell_and_its_simulation_differ_by_less_than_0_01_db(dwell_file)
     assert overlay.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_the_simulation_of_a_colliding_dwell_agrees_in_impacts_and_statistics(dwell_file, dwell_motions):
     analysis, overlay = overlay_of(dwell_file("strong"))
     true = dwell_motions["strong"][2]

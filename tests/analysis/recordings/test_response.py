@@ -125,6 +125,7 @@ def test_the_level_of_a_channel_is_computed_only_from_samples_that_were_not_lost
     assert [each.rms for each in levels] == pytest.approx([np.sqrt(np.nanmean(row**2)) for row in rows])
 
 
+@pytest.mark.thorough
 def test_the_power_of_simulated_accelerometer_noise_doubles_at_the_ends_of_a_record():
     """Beyond an end, the integral continues with mirrored samples, which repeat the last samples' noise."""
     rng = np.random.default_rng(5)

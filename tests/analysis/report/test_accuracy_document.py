@@ -31,6 +31,7 @@ def benchmark():
     )
 
 
+@pytest.mark.thorough
 def test_the_accuracy_page_begins_with_its_conclusion(benchmark, page_of):
     for page in (PAGE.read_text(encoding="utf-8"), page_of(benchmark)):
         assert page.index("`standard` is the default") < 100 < page.index("| level | promised |")

@@ -51,6 +51,7 @@ def test_two_recordings_of_the_same_samples_are_counted_once(dwell_file, tmp_pat
     assert any("has the same samples as" in each for each in check_warnings(found))
 
 
+@pytest.mark.thorough
 def test_a_different_recording_with_the_same_identity_gives_a_warning(dwells, dwell_file, tmp_path):
     shutil.copy(dwells / "weak.h5", tmp_path / "a.h5")
     shutil.copy(dwell_file("strong"), tmp_path / "b.h5")

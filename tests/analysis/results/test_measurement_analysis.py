@@ -45,6 +45,7 @@ def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file)
     assert found.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal_bands(dwell_file):
     weak, strong = analyse(dwell_file("weak")), analyse(dwell_file("strong"))
     assert strong.response.response_ii < 0.3 * weak.response.response_ii

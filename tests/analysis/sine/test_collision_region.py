@@ -72,6 +72,7 @@ def test_a_sweep_without_impacts_has_no_collision_region():
     assert not result.is_colliding.any()
 
 
+@pytest.mark.thorough
 def test_continuous_collisions_give_one_region_over_the_whole_sweep():
     result, _ = find_collisions(20e-6, 240.0, 300.0)
     (region,) = result.regions
@@ -90,6 +91,7 @@ def laser_drop_outs(velocity, rng):
     return spoilt
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("spoil", [ten_times_the_noise, laser_drop_outs])
 def test_noise_and_laser_drop_outs_do_not_move_the_ends_of_a_collision_region(spoil):
     result, impacts_hz = find_collisions(5e-6, 225.0, 385.0, spoil)
@@ -175,6 +177,7 @@ def test_a_sweep_with_impacts_in_a_single_interval_is_not_called_free_of_collisi
     assert any(low <= impacts_hz[0] + 0.5 and impacts_hz[0] - 0.5 <= high for high, low in said.too_fast_hz)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("number", "least_hz"), [(10, 560.0), (4, 0.0)])
 def test_bounds_of_the_end_of_collisions_include_ringing_after_the_last_impact(number, least_hz, monkeypatch):
     """Sweep 10 once collided up to 761 Hz instead of 593 Hz; sweep 4 had a second region, 207 to 186 Hz."""
@@ -183,6 +186,7 @@ def test_bounds_of_the_end_of_collisions_include_ringing_after_the_last_impact(n
     assert least_hz < region.stop.lower_hz <= impacts_hz[-1] <= region.stop.upper_hz
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("number", [29, 44])
 def test_bounds_of_the_beginning_of_collisions_include_periodic_impacts(number, monkeypatch):
     """Starts of 76.0 and 235.0 Hz were once reported within 1.7 Hz; the true ones were 71.2 and 225.4 Hz."""
@@ -213,6 +217,7 @@ def test_a_short_range_with_collisions_is_reported():
     assert without_stops.not_determined_hz == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("is_known", [True, False])
 @pytest.mark.parametrize(("seed", "level_m"), [(10, 3.2e-7), (15, 2.18e-6), (28, 1.72e-5)])
 def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed, level_m, is_known):

@@ -14,6 +14,7 @@ def analyses(dwell_file):
     return {level: analyse(open_recording(dwell_file(level))) for level in ("weak", "strong")}
 
 
+@pytest.mark.thorough
 def test_a_weak_dwell_is_periodic_with_the_drive_and_a_colliding_dwell_is_not(analyses):
     weak, strong = analyses["weak"].motion.verdict, analyses["strong"].motion.verdict
     assert (weak.kind, weak.period) == (MotionKind.PERIODIC, 1), weak.why

@@ -115,6 +115,7 @@ def test_a_tracked_resonance_is_analysed_and_reported(record_and_analyse):
     assert [np.isnan(each.get_xydata()[:, 1]).tolist() for each in lines] == [[False, True, False]] * 3
 
 
+@pytest.mark.thorough
 def test_settled_steps_are_analysed_like_any_stepped_sine(record_and_analyse):
     analysis = record_and_analyse(SettledSine(amplitude_vpp=0.05, frequencies_hz=(230, 240), record_s=0.5))
     assert analysis.response.left_out == 0

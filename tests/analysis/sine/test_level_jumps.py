@@ -23,6 +23,7 @@ def analysis(tmp_path_factory):
     return analyse(record(tmp_path_factory.mktemp("level") / "level.h5", plan, rig))
 
 
+@pytest.mark.thorough
 def test_the_specimen_jumps_up_at_a_higher_level_than_down(analysis):
     rise, fall = level_jumps(analysis.response)
     assert (rise.direction, rise.before_vpp, rise.after_vpp) == ("up", 0.6, 0.7)

@@ -73,6 +73,7 @@ def test_bounds_include_noise_that_is_larger_than_the_drive(tmp_path):
     assert covers(first, linear(180.0)), first.sentence
 
 
+@pytest.mark.thorough
 def test_the_part_of_a_periodic_motion_that_does_not_repeat_counts_as_noise(tmp_path):
     """The part of a linear motion that does not repeat (5 %) counts as noise.
 

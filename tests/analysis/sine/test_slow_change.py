@@ -65,6 +65,7 @@ def test_a_slow_beat_is_not_called_periodic_and_its_bounds_cover_later_records(d
         assert abs(found[0] - 0.989 * GAIN * np.median(again)) <= found[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rate_hz", [0.1, 0.35, 1.1])
 def test_a_slow_modulation_of_amplitude_or_phase_is_not_called_periodic(dwell, rate_hz):
     for number, envelope in enumerate(

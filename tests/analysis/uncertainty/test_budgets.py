@@ -150,6 +150,7 @@ def test_an_uncertainty_document_states_source_and_date_of_each_calibration(weak
     assert parts["vibrometer calibration"] == pytest.approx(0.006 * document["value"])
 
 
+@pytest.mark.thorough
 def test_the_response_i_budget_of_an_aperiodic_motion_includes_the_random_error(dwell_file):
     results = analyse_files([dwell_file("strong")], "strong", Simulation.LEFT_OUT)
     (strong,) = results.results
@@ -190,6 +191,7 @@ def test_the_scatter_of_a_maximum_is_estimated_from_one_window(bounded):
     assert 0.9 * true < np.median(told) < 1.6 * true
 
 
+@pytest.mark.thorough
 def test_the_bound_of_the_largest_value_in_chaos_covers_other_windows():
     """Windows of four chaotic motions at drives [Hz, m], damping times [s] and gaps [m]."""
     held = []

@@ -102,6 +102,7 @@ def test_the_feedback_law_stabilises_all_motions_of_a_branch_even_with_a_wrong_m
             assert loop_multiplier(each, law, *slopes) < 0.99
 
 
+@pytest.mark.thorough
 def test_pd_gains_on_m0_hold_the_branch_but_pd_gains_on_the_base_do_not():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     of_m0, of_base = pd_law(plant(), 1), pd_law(plant(), 0)

@@ -87,6 +87,7 @@ def pd(kp, kd, tau_s, step_s):
     )
 
 
+@pytest.mark.thorough
 def test_controller_frames_match_the_protocol_documents(installed):
     from helic_link import frame
 

@@ -40,6 +40,7 @@ def playing(rig, original):
     return rig_of
 
 
+@pytest.mark.thorough
 def test_playing_back_a_recording_reproduces_every_sample(playing, original, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         again = run_measurement(bench, PLAN, tmp_path / "again.h5").path
@@ -106,12 +107,14 @@ def test_playback_under_another_plan_is_refused(playing, tmp_path):
         run_measurement(bench, other, tmp_path / "again.h5")
 
 
+@pytest.mark.thorough
 def test_playback_with_another_sensor_scale_is_refused(playing, rig):
     other = rig.vibrometer.model_copy(update={"range_mm_per_s_per_v": 500.0})
     with pytest.raises(ConfigurationError, match="units of m0_velocity per volt"):
         open_bench(playing().model_copy(update={"vibrometer": other}))
 
 
+@pytest.mark.thorough
 def test_playback_needs_no_bench_check_and_no_waiver(playing, tmp_path):
     with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
         with pytest.raises(ConfigurationError, match="plays back a recording"):

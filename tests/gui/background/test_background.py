@@ -74,6 +74,7 @@ def is_being_read(thread):
     return frame is not None and frame.f_locals.get("remaining", 0) > 1 << 20
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(60)
 def test_closing_ends_a_process_that_is_sending_its_result(background, qtbot, tmp_path):
     """The window waited for ever for the rest of an answer."""

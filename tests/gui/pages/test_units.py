@@ -132,6 +132,7 @@ def numbers_of(page):
     return [edit.content() for edit in page.findChildren(QuantityEdit)]
 
 
+@pytest.mark.thorough
 def test_a_change_of_units_converts_every_number_and_can_be_undone(full_window):
     before = {name: list(texts_of(page)) for name, page in full_window.pages.items()}
     values = {name: numbers_of(page) for name, page in full_window.pages.items()}
@@ -180,6 +181,7 @@ def test_lists_of_numbers_are_read_in_the_displayed_unit(closing):
     assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
 
 
+@pytest.mark.thorough
 def test_the_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
     choose_units(full_window, OTHERS)
     UNITS.choose({})
@@ -188,6 +190,7 @@ def test_the_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
     again.background.close()
 
 
+@pytest.mark.thorough
 def test_axis_numbers_are_in_the_unit_of_the_label(full_window):
     plot = next(each for each in full_window.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)

@@ -34,6 +34,7 @@ def test_copying_a_table_copies_the_selected_rows_or_else_all_rows(table, qtbot)
     assert clipboard() == whole
 
 
+@pytest.mark.thorough
 def test_every_table_of_the_window_can_be_copied(window):
     tables = [each for each in window.findChildren(QTableView) if isinstance(each, QAbstractItemView)]
     assert len(tables) >= 8

@@ -52,6 +52,7 @@ def test_the_stop_button_states_its_action_and_does_not_move(qtbot, closing):
     assert button.geometry() == before
 
 
+@pytest.mark.thorough
 def test_the_stop_button_does_not_have_the_focus_when_the_window_opens(window, qtbot):
     qtbot.waitUntil(lambda: window.focusWidget() is not None)
     assert window.focusWidget().objectName() != "stop"

@@ -28,6 +28,7 @@ def test_blocking_work_is_logged_with_the_visible_page(qapp, qtbot):
     monitor.stop()
 
 
+@pytest.mark.thorough
 def test_the_status_line_shows_a_responsive_event_loop(window, qtbot):
     frames = window.status_line.labels[StatusField.FRAMES]
     qtbot.waitUntil(lambda: "latency" in frames.text())

@@ -26,6 +26,7 @@ def own(tmp_path):
     return folder
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("page", [TEST, QUEUE])
 def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(lasting_window, own, monkeypatch, page):
     measurement = lasting_window.context.selection.measurement

@@ -28,6 +28,7 @@ def drop(window, *paths):
     )
 
 
+@pytest.mark.thorough
 def test_a_dropped_file_opens_on_its_page_and_is_listed_as_recent(window, tmp_path):
     test = tmp_path / "mine.toml"
     measurement = window.context.selection.measurement.model_copy(update={"name": "mine"})
@@ -76,6 +77,7 @@ def test_a_file_that_is_not_a_recording_is_reported_on_the_files_page(window, qt
     assert "broken.h5" in window.strip.notices[-1].what
 
 
+@pytest.mark.thorough
 def test_edits_of_test_and_campaign_can_be_undone(window, qtbot):
     selection, key = window.context.selection, Qt.KeyboardModifier.ControlModifier
     window.show_page(TEST)
@@ -101,6 +103,7 @@ def test_edits_of_test_and_campaign_can_be_undone(window, qtbot):
     assert selection.campaign == before
 
 
+@pytest.mark.thorough
 def test_all_settings_are_edited_in_one_form_and_stored(window, qapp, tmp_path):
     dialog = SettingsDialog(window.context, window)
     points = qapp.font().pointSize()

@@ -11,6 +11,7 @@ from vibench.gui.widgets.theme import DARK, LIGHT
 from vibench.gui.window.window import PAGES, Window
 
 
+@pytest.mark.thorough
 def test_every_page_opens_with_its_shortcut(lasting_window, qtbot):
     for number, name in enumerate(lasting_window.pages, start=1):
         qtbot.keyClick(lasting_window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)

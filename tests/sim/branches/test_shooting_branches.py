@@ -172,6 +172,7 @@ def test_the_asymmetric_branch_begins_and_ends_at_symmetry_breaking(near_the_fir
     assert sorted(joins) == pytest.approx(sorted(own), abs=0.02)
 
 
+@pytest.mark.thorough
 def test_the_linear_motion_at_a_grazing_point_just_reaches_the_stop():
     specimen = gong2025()
     free = gong2025(contact="linear")
@@ -196,6 +197,7 @@ def test_a_rigid_stop_branch_is_exact_until_a_grazing_contact():
             assert branch.events[-1].kind is BifurcationKind.GRAZING
 
 
+@pytest.mark.thorough
 def test_each_branch_point_uses_the_recorded_level_at_its_frequency():
     specimen = gong2025()
     path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))

@@ -67,6 +67,7 @@ def test_energy_is_conserved_for_every_law_drive_and_accuracy_level(contact, cel
             assert chain_energies(chain, run.final_state).sum() == pytest.approx(before, rel=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
 def test_a_motion_deep_inside_a_steep_contact_is_integrated_at_every_accuracy_level(accuracy):
     """At reference accuracy the step control once asked for less than rounding, and the run stalled."""

@@ -68,6 +68,7 @@ def reference_state(chain, drive, duration_s, state):
     return np.concatenate([now[:size].reshape(-1, 3), now[size:].reshape(-1, 3)], axis=1)
 
 
+@pytest.mark.thorough
 def test_coupled_cells_with_every_contact_law_match_an_independent_integrator():
     paper = gong2025()
     chain = Chain(

@@ -138,6 +138,7 @@ def test_a_computing_time_too_short_for_a_drive_period_is_refused():
     assert time.thread_time() - began_s < 1.5 * 0.5
 
 
+@pytest.mark.thorough
 def test_an_error_that_a_chain_cannot_reach_in_minutes_ends_the_run_early():
     began_s = time.thread_time()
     found = chain_response_to(chain_of(gong2025(), 2), Harmonic(220.0, 20e-6), 1e-12, None)

@@ -85,6 +85,7 @@ def test_no_end_of_chaos_is_found_in_an_exponent_that_scatters_around_zero():
     assert found.count(FinalMotion.SETTLED) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("drive", "source"), [(Harmonic(234.0, 5e-6), Source.MODES), (Harmonic(510.0, 50e-6), Source.MULTIPLIERS)]
 )

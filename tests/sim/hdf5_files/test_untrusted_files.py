@@ -73,6 +73,7 @@ def too_many_attributes(file):
         file["own"].attrs[f"a{number}"] = number
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fill", "said"),
     [

@@ -24,6 +24,7 @@ def adaptive():
     return solve_map(PLAN)
 
 
+@pytest.mark.thorough
 def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     full = solve_map(PLAN.model_copy(update={"refinement": "full"}))
     is_computed = adaptive.state == PointState.DONE

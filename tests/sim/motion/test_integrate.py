@@ -88,6 +88,7 @@ def test_a_sampled_sine_converges_to_the_sine_with_order_four():
     assert np.log2(errors[0] / errors[2]) / 2.0 > 3.5
 
 
+@pytest.mark.thorough
 def test_a_sweep_agrees_with_an_independent_integrator_within_its_stated_error():
     specimen, sweep = paper(), LinearSweep(80.0, 300.0, 0.05, 20e-6)
     ours = integrate(specimen, sweep, 0.03, Accuracy.REFERENCE)

@@ -26,6 +26,7 @@ def test_both_responses_without_contact_are_the_exact_transmissibility(frequency
     assert response.impacts == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("contact", "drive"),
     [

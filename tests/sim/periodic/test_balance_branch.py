@@ -81,6 +81,7 @@ def test_the_phase_resonance_of_a_duffing_oscillator_runs_along_the_exact_backbo
         assert 2 * math.pi * branch.frequencies_hz[k] == pytest.approx(backbone, rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_a_duffing_branch_is_unstable_between_its_folds():
     structure, spring = oscillator(0.04), PowerSpring(1.0, ((3, 0.5),))
     options = BalanceOptions(fewest=7, tolerance=1e-6)
@@ -124,6 +125,7 @@ def test_a_branch_over_amplitude_grazes_where_the_linear_motion_equals_the_gap()
     assert branch.events[1].kind is BifurcationKind.FOLD
 
 
+@pytest.mark.thorough
 def test_a_branch_over_amplitude_reaches_a_strongly_nonlinear_motion():
     structure, spring = oscillator(0.1), PowerSpring(1.0, ((3, 1.0),))
     branch = level_branch(structure, spring, 2.0 / (2 * math.pi), 0.1, 5.0)

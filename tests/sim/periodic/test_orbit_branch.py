@@ -33,6 +33,7 @@ def test_a_branch_of_orbits_ends_at_the_requested_value(upward_branch):
     assert upward_branch.response_ii.shape == (len(upward_branch.frequencies_hz), 4)
 
 
+@pytest.mark.thorough
 def test_a_symmetric_branch_does_not_end_at_its_mirror_image():
     """An orbit and its mirror image differ by rounding only, whose sign has no meaning."""
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
@@ -68,6 +69,7 @@ def test_perturbations_decay_at_stable_and_grow_at_unstable_points_of_a_branch(u
         assert 0.01 * expected < growth < 100.0 * expected
 
 
+@pytest.mark.thorough
 def test_a_branch_reaches_the_stops_where_the_linear_motion_grazes_them():
     # A weak drive at 60 Hz is raised until p reaches the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])

@@ -59,6 +59,7 @@ def test_a_frequency_band_without_phase_resonance_is_refused(band_hz, levels_m, 
         phase_resonance_branch(gong2025(), band_hz, levels_m)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
 def test_a_phase_resonance_is_refused_if_its_newton_iteration_fails(low_m):
     """Its last iterate at 17 Hz was once returned as a motion in a band of 92 to 97 Hz."""

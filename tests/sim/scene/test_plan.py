@@ -63,6 +63,7 @@ def test_the_planned_cost_without_contact_grows_with_the_drive_periods():
     assert cost(1e6) > 30.0 * cost(1e4)
 
 
+@pytest.mark.thorough
 def test_the_cost_of_enormous_levels_grows_as_planned():
     """Relative to the plan, levels of 1 to 20 m took 14 times as long as 10 um."""
 

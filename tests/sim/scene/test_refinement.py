@@ -74,6 +74,7 @@ def test_a_mean_over_initial_states_reaches_an_error_of_one_percent():
     assert again.response_ii == found.response_ii
 
 
+@pytest.mark.thorough
 def test_the_error_of_a_mean_over_initial_states_includes_the_error_of_the_runs():
     """The responses from different initial states scatter by less than the tolerance of a run."""
     specimen = gong2025(8.1e-6, 5.965e-6, "power:3")
@@ -139,6 +140,7 @@ def test_an_error_below_rounding_is_reported_as_unreachable():
     assert report.text.endswith("; 1e-13 % is not reachable")
 
 
+@pytest.mark.thorough
 def test_an_unreachable_error_of_a_mean_over_initial_states_is_recognised_at_once():
     began_s = time.thread_time()
     report = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=1e-12)).target

@@ -60,6 +60,7 @@ def test_start_dependence_without_a_budget_is_known_only_for_chaos():
     assert chaos.motion is MotionKind.CHAOTIC_SO_FAR
 
 
+@pytest.mark.thorough
 def test_several_attractors_of_one_scene_are_reported_with_their_shares(several_attractors):
     assert several_attractors.memory is StartMemory.LOST
     assert several_attractors.is_one_of_several
@@ -73,6 +74,7 @@ def test_several_attractors_of_one_scene_are_reported_with_their_shares(several_
     assert asked.response_i == pytest.approx(several_attractors.response_i, rel=0.3)
 
 
+@pytest.mark.thorough
 def test_other_initial_states_reach_reported_attractors(several_attractors):
     """Three other random initial states reach at most one attractor that was not reported."""
     ensemble = several_attractors.ensemble
@@ -101,6 +103,7 @@ def test_transient_chaos_is_followed_to_its_final_motion(short_chaos):
     assert escape.lifetime_above_s < 1.0 / escape.rate_per_s < escape.lifetime_below_s
 
 
+@pytest.mark.thorough
 def test_runs_still_chaotic_at_their_end_raise_the_bound_on_the_share_of_unknown_motions():
     found = solve_scene(
         scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
@@ -110,6 +113,7 @@ def test_runs_still_chaotic_at_their_end_raise_the_bound_on_the_share_of_unknown
     assert found.unseen_share > pending / found.starts
 
 
+@pytest.mark.thorough
 def test_chaos_that_lasts_is_reported_with_a_lower_bound_of_its_lifetime():
     found = solve_scene(scene("hertz", 260.0, 5e-6))
     assert found.motion is MotionKind.CHAOTIC

@@ -180,6 +180,7 @@ def test_the_lyapunov_exponent_matches_the_final_motion():
     assert quiet.lyapunov_per_s == pytest.approx(modal_form(gong2025()).rates.real.max())
 
 
+@pytest.mark.thorough
 def test_chaos_that_ends_during_the_averaging_of_its_exponent_gets_no_negative_exponent():
     """Each initial state is another realisation; on every computer some end in or after the window."""
     observe = (Observable.RESPONSE, Observable.LYAPUNOV)
@@ -265,6 +266,7 @@ def test_a_slowly_decaying_motion_is_undecided(contact, damping_time_s, frequenc
     assert answer.motion is MotionKind.UNDECIDED
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency_hz", "amplitude_m", "damping_time_s"),
     [

@@ -200,6 +200,7 @@ def test_two_consecutive_simulations_equal_one_simulation_of_the_whole():
     assert parts.impacts == whole.impacts > 0
 
 
+@pytest.mark.thorough
 def test_replaying_the_recorded_coil_voltage_reproduces_the_table_motion():
     drive = tones(0.7, [266.0])
     measured = loaded_shaker()

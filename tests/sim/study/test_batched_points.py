@@ -51,6 +51,7 @@ def test_long_independent_study_points_are_solved_in_batches(changed, in_lanes):
     assert (study_solver(plan) == InBatches()) is in_lanes
 
 
+@pytest.mark.thorough
 def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, require_equal):
     require_equal(solve_study(curve, workers=3), answers)
 
@@ -66,6 +67,7 @@ def test_a_batched_point_of_a_study_equals_a_single_prediction(curve, answers):
         )
 
 
+@pytest.mark.thorough
 def test_batched_and_single_motions_agree_within_their_errors():
     scenes = [
         Scene(

@@ -159,6 +159,7 @@ def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, long_study):
     assert time.monotonic() - began_s < START_PATIENCE_S
 
 
+@pytest.mark.thorough
 def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
     package = tmp_path / "other" / "vibench" / "sim"
     shutil.copytree(Path(vibench.sim.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))

@@ -80,6 +80,7 @@ def test_a_study_file_round_trips(small, tmp_path, require_equal):
     assert json.loads(json.dumps(again, allow_nan=False)) == again
 
 
+@pytest.mark.thorough
 def test_motions_of_an_ensemble_round_trip_through_the_study_file(tmp_path):
     """Chaos ends within a few tens of seconds here: some runs have settled after 12 s."""
     study = Study(
@@ -256,6 +257,7 @@ def set_values(name, value):
     return change
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("change", "said"),
     [

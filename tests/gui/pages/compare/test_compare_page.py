@@ -151,6 +151,7 @@ def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
     assert "twice, transmission, measured" in (tmp_path / "out.csv").read_text().splitlines()[0]
 
 
+@pytest.mark.thorough
 def test_a_copy_under_another_name_is_shown_once(page, record_noise, tmp_path):
     notices = []
     page.context.noticed.connect(notices.append)

@@ -110,6 +110,7 @@ def curve_data(page, number):
     return curve.getData()
 
 
+@pytest.mark.thorough
 def test_the_list_describes_state_plan_and_problems_of_every_file(page):
     assert cell(page, "whole", "State") == "✔ complete"
     assert cell(page, "stopped", "State") == "■ stopped"
@@ -136,6 +137,7 @@ def test_a_recording_without_its_seal_gets_a_warning(show_file, wait_for):
     wait_for(lambda: page._facts.sentence.startswith("✖ seal gone: its seal is gone"))
 
 
+@pytest.mark.thorough
 def test_samples_that_differ_from_their_seal_get_a_warning(page, folder, tmp_path, wait_for):
     """The quick check of a seal reads no samples of a large file."""
     path = tmp_path / "changed.h5"
@@ -261,6 +263,7 @@ def test_a_recording_from_another_folder_can_be_opened(page, record, tmp_path, q
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
+@pytest.mark.thorough
 def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(show_file, wait_for):
     page = show_file("whole.h5")
     view = page.pictures.spectrogram
@@ -298,6 +301,7 @@ def test_opening_a_recording_by_its_path_reads_it_once(show_file, folder, wait_f
     assert read == [folder / "whole.h5"]
 
 
+@pytest.mark.thorough
 def test_a_recording_may_finish_while_it_is_displayed(page, begin_recording, tmp_path, wait_for):
     writer, part = begin_recording(tmp_path, "growing")
     page.context.choose_folder(tmp_path)
@@ -357,6 +361,7 @@ def test_an_impossible_folder_name_is_refused(page, typed):
     assert page._folder_line.text() == str(page._folder)
 
 
+@pytest.mark.thorough
 def test_deleted_files_disappear_from_the_list_of_files(shared_context, record, tmp_path, wait_for, closing):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
@@ -420,6 +425,7 @@ def test_no_hint_asks_for_a_recording_when_a_recording_is_selected(
     page.pictures.setCurrentWidget(page.time_histories)
 
 
+@pytest.mark.thorough
 def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(show_file, wait_for, qtbot):
     page = show_file("whole.h5")
     view = page.pictures.spectrogram

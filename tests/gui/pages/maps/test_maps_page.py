@@ -101,6 +101,7 @@ def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
     assert "810000 points are too many for the window" in page.form.complaint
 
 
+@pytest.mark.thorough
 def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
     compute_map(page, wait_for)
     page.pick(120.0, 1e-5)

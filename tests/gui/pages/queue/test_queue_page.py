@@ -11,6 +11,7 @@ def page(shared_context, closing):
     return closing(QueuePage(shared_context))
 
 
+@pytest.mark.thorough
 def test_rows_of_an_earlier_campaign_cannot_be_removed(page, wait_for):
     """The second of two quick removals removed a wrong entry or raised an error."""
     page.open_file(shipped("campaigns/quick.toml"))

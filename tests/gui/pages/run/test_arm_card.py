@@ -48,6 +48,7 @@ def show(page, status, qapp):
     page.arm_card.show_status(status, "", "")
 
 
+@pytest.mark.thorough
 def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qapp, qtbot):
     page, status = small
     show(page, status, qapp)
@@ -71,6 +72,7 @@ def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qap
     assert card.is_read, "it has been read once"
 
 
+@pytest.mark.thorough
 def test_a_new_armed_plan_is_shown_from_its_beginning(small, qapp):
     page, status = small
     show(page, status, qapp)
@@ -85,6 +87,7 @@ def test_a_new_armed_plan_is_shown_from_its_beginning(small, qapp):
     assert not page.arm_card.is_read
 
 
+@pytest.mark.thorough
 def test_a_plan_that_fits_into_the_window_can_be_started_at_once(window, qapp):
     window._timer.stop()
     window.resize(1280, 800)

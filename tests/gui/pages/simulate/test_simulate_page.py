@@ -38,6 +38,7 @@ def point(model, frequency_hz, response=2.0, impacts=0, exponent=None):
     return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, exponent)
 
 
+@pytest.mark.thorough
 def test_a_simulation_completes_and_is_drawn(page, wait_for):
     simulate(page)
     assert page.simulator.is_busy
