@@ -12,7 +12,7 @@ LONGEST_PERIOD = 32
 _TABLE = 2
 """Number of dimensions of an array of Poincaré points, whose shape is (drive periods, coordinates)."""
 STEADY = 2e-3
-"""Scatter of the points allowed in a steady motion, relative to the orbit, because real drives fluctuate."""
+"""Largest scatter of the points of a steady motion, relative to the orbit; real drives fluctuate."""
 _NOISE_MARGIN = 1.5
 """Largest ratio of the points' measured to expected scatter at which noise explains the scatter."""
 _REPEATED = 0.25
@@ -115,7 +115,7 @@ def is_settled(points: Points) -> bool:
 
 
 def scatter_drifts(points: Points) -> bool:
-    """Return whether the points' scatter changes by a tenth or more over the record, even if it is small."""
+    """Return whether the points' scatter changes by a tenth or more over the record, however small it is."""
     sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
     relative = Points(points.value / points.spread, points.noise)
     return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)

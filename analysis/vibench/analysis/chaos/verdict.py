@@ -213,9 +213,9 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     closed curve. It is *chaotic* only if all tests agree: the points are settled, far above the noise and on
     no closed curve, the 0-1 test is near one without oversampling, and surrogates reject linear noise. Each
     test alone would accept some noise as chaos. If any test fails, the verdict is undecided. If the motion
-    changes once, as when a chaotic transient ends, the last part is classified: always if its period is at
-    most 4, otherwise only if it is the longer part. With noise above a tenth of the orbit, the verdict is
-    undecided. Raises InvalidRequest when the drive frequency is not positive and finite.
+    changes once, as when a chaotic transient ends, the last part is classified if its period is at most 4 or
+    if it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
+    InvalidRequest when the drive frequency is not positive and finite.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 
 
 def _bent_test(points: Points, seed: int) -> SurrogateTest:
-    """Test for noise after a static nonlinearity, by ranks (if it is monotone) or time symmetry (if not)."""
+    """Test for noise after a static nonlinearity: by ranks if it is monotone, otherwise by time symmetry."""
     ranked = [surrogate_test(normal_scores(each), seed=seed) for each in points.value.T]
     weakest, strongest = max(ranked, key=lambda each: each.p), max(ranked, key=lambda each: each.margin)
     if not weakest.rejects_linear_noise:

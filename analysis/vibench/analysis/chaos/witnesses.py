@@ -11,7 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""A neighbour distant in time is searched for among at most four times this number of nearest points."""
+"""A neighbour distant in time is searched for among up to four times as many nearest points as this."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -40,7 +40,7 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
 def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> tuple[Integers, Integers]:
     """Find, for each point, the nearest point that is distant in time.
 
-    Returns the indices of the points that have such a neighbour, and of their neighbours.
+    Returns the indices of the points that have such a neighbour, and the indices of these neighbours.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ class SurrogateTest:
 
     @property
     def p(self) -> float:
-        """Probability that linear noise gives a statistic as small as the series (one-sided rank test)."""
+        """Probability that linear noise gives as small a statistic as the series (one-sided rank test)."""
         smaller = sum(each <= self.statistic for each in self.surrogates)
         return (smaller + 1) / (len(self.surrogates) + 1)
 
@@ -346,7 +346,7 @@ def time_symmetry(series: Reals) -> float:
 def surrogate_test(
     series: Reals, statistic: Callable[[Reals], float] = prediction_error, *, seed: int = 0
 ) -> SurrogateTest:
-    """Compare a statistic of a series, small if the series is deterministic, with its values for surrogates.
+    """Compare a statistic of a series with its values for surrogates; determinism makes the statistic small.
 
     Parameters
     ----------

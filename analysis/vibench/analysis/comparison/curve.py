@@ -171,7 +171,7 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 standard deviations."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance [half widths]): within this distance of a mode lie at most n peaks, its own included."""
+"""Pairs (n, distance [half widths]): a mode has at most n peaks within this distance, its own included."""
 _CROWD_RISE = 0.3
 """Minimum height of a peak that is counted for `_CROWDS`, relative to the minimum height of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01

@@ -61,7 +61,7 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator
 
 
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
-    """Yield separate curves of the steps up and the steps down, because the two differ between the jumps."""
+    """Yield separate curves for steps up and steps down; the two responses differ between the jumps."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
         return  # several levels at one frequency are not a curve over frequency
     directions = np.array(found.direction)

@@ -192,7 +192,7 @@ class BranchDiagram(Tabular):
 
     @property
     def largest_error(self) -> float:
-        """Largest median error of a branch; medians, because errors grow near folds; NaN without branches."""
+        """Largest of the branches' median errors (errors grow near folds); NaN without branches."""
         errors = [np.median(line.error_estimate) for line in self.lines]
         return float(max(errors, default=float("nan")))
 

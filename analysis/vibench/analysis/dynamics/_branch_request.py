@@ -37,7 +37,7 @@ class BranchMethod(StrEnum):
     SHOOTING = "shooting"
     """Shooting: exact motions of any period with every contact, for any contact law."""
     BALANCE = "balance"
-    """Harmonic balance with as many harmonics as needed: motions of the drive's period, no rigid stops."""
+    """Harmonic balance, as many harmonics as needed; for motions of the drive's period, no rigid stops."""
     FIRST_ORDER = "first-order"
     """Harmonic balance with one harmonic, the paper's eq. 5; power laws only."""
 

@@ -139,7 +139,7 @@ class ChainAnswer(Tabular):
 
     @property
     def linear_transmissions(self) -> dict[int, list[list[float]]]:
-        """`linear_transmission` by number of cells, one list per cell."""
+        """`linear_transmission` keyed by number of cells, with one list per cell."""
         return {cells: self.linear_transmission(cells).T.tolist() for cells in self.request.lengths}
 
     @cached_property
@@ -204,7 +204,7 @@ STRETCHES = 400
 """Maximum number of equal parts of a sweep or recording; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, the averaging time is at most `ENERGY_SHARE` of the time simulated before."""
+time was requested, the averaging time is at most `ENERGY_SHARE` of the time simulated until then."""
 SWEEP_PARTS = 120
 """Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
 FEWEST_PERIODS = 12
@@ -365,7 +365,7 @@ def _bare_run(
 
 
 def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, ratio: Reals) -> ChainRun:
-    """Build the result of a run with its motion shown over the whole run."""
+    """Build the result of a run, including the motion over the whole run."""
     energy, error = mean_energies(chain, run.states, base)
     stretches = np.array_split(np.arange(len(run.time_s)), min(STRETCHES, max(1, len(run.time_s))))
     sizes = [np.sqrt(np.mean(run.states[each, :, X] ** 2, axis=0)) for each in stretches]
@@ -385,7 +385,7 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Return drive frequencies and relative amplitudes at them, from Hann-weighted parts of the sweep."""
+    """Return drive frequencies with the relative amplitude at each, from Hann-weighted parts of the sweep."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
     turning = np.exp(-2j * np.pi * drive.turns(run.time_s))

@@ -91,7 +91,7 @@ class ChainRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     def _refuse_beside_target(self) -> None:
-        """If an error or time is requested, refuse unsteady drives, and options that follow from it."""
+        """Refuse unsteady drives, and options that follow from a requested error or time, if one is given."""
         if not self.has_target:
             return
         if self.drive is not ChainDrive.STEADY:

@@ -27,7 +27,7 @@ class RecordedLevel:
 
 
 def specimen_difference(simulated: Specimen, recorded: Specimen | None, name: str) -> str:
-    """Return a sentence on the differences of a simulated from a recorded specimen; empty if there are none.
+    """Return a sentence on how a simulated specimen differs from the recorded one; empty if they are equal.
 
     Parameters
     ----------

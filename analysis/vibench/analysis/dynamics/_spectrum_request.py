@@ -113,7 +113,7 @@ class SpectrumPoint:
     dimension_high: float
     verdict: str
     observed_s: float
-    """Time over which the exponents are averaged; chaos may end later."""
+    """Time over which the exponents are averaged; chaos may end after this time."""
     motion: str
     source: str
     blocks: int
@@ -124,7 +124,7 @@ class SpectrumPoint:
 
     @property
     def observation(self) -> str:
-        """Verdict with the time for which it holds, in words."""
+        """Verdict in words, with the time for which it was observed."""
         later = ", possibly a transient" if self.verdict == "chaotic" else ""
         return f"{self.verdict} over {self.observed_s:.3g} s{later}"
 

@@ -16,7 +16,7 @@ from ._source_channel import SECONDS, SourceChannel
 from ._times import TIME_UNITS, agrees
 
 _MOST_REPEATED = 100
-"""Maximum number of samples by which times may go back; a larger step means that another record begins."""
+"""Maximum number of samples by which times may go back; after a larger jump back, another record begins."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Piece:
     """Stretch of evenly spaced samples in a file."""
 
     first: int
-    """Index in the file of the first sample of the stretch."""
+    """Index of the stretch's first sample, counted from the start of the file."""
     place: int
     """Time of the stretch's first sample, in sample intervals since the channel's start."""
     samples: int
@@ -35,7 +35,7 @@ class Piece:
         return self.place + self.samples
 
     def span(self, first: int, stop: int) -> range:
-        """Return the times of samples ``first`` to ``stop`` of the file within this piece; may be empty."""
+        """Return the times of the stretch's samples from ``first`` to ``stop`` of the file; may be empty."""
         shift = self.place - self.first
         return range(max(self.place, first + shift), min(self.end, stop + shift))
 

@@ -44,7 +44,7 @@ class CrateFacts:
     """Title; the name of the folder if empty."""
     description: str = ""
     organisation: str = ""
-    """Publisher, and affiliation of the authors."""
+    """Organisation that publishes the crate and to which the authors belong."""
     organisation_url: str = ""
 
 

@@ -334,7 +334,7 @@ def _are_numbers(cells: Sequence[str]) -> bool:
 def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
     """Return labels and units from one heading row or two separate rows; empty texts if not stated.
 
-    Raises ValueError for a row with fewer units than columns, because it is unknown which columns have them.
+    Raises ValueError for a row with fewer units than columns, because the units cannot be assigned.
     """
     for line in head:
         cells = [each.strip() for each in layout.cells(line.strip())]

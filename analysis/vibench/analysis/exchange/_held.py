@@ -16,11 +16,11 @@ _VIBRATING = {"velocity", "acceleration", "displacement", "force"}
 """Quantities that vary during every test; others, such as a temperature or a trigger, may stay constant."""
 _DRIVEN = {DRIVE, "amplifier_voltage", BASE}
 _FEWEST, _LONGER = 16, 4
-"""Minimum number of equal last samples that count as held, and its ratio to the longest other run."""
+"""Minimum number of equal samples at the end that count as held; minimum ratio to the longest other run."""
 _WEAK_STEPS = 3.0
-"""Largest distance of a held value's neighbours [converter steps] at which the signal is only weak."""
+"""Largest distance of neighbours from a constant value [converter steps] in a weak signal (not held)."""
 _PATTERN, _FEWEST_VALUES = 64, 16
-"""Number of last samples that are searched for earlier in the record; minimum number of distinct values."""
+"""Number of last samples to search for earlier in the record; minimum number of distinct values in them."""
 _SEARCHED = 1 << 17
 """Number of samples at the end of a record in which repeated samples are searched for."""
 _JUMP = 0.02

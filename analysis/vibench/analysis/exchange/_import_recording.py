@@ -158,7 +158,7 @@ def import_recording(
 
     Channels are aligned by the times in the file. Missing samples, and values that are not finite, count as
     lost samples of all channels. The stored "volts" are the numbers in the file. Integers of up to 31 bits
-    are stored exactly, other numbers in steps of 2^-30 of the power of two above the largest number.
+    stay exact; other numbers are stored in steps of 2^-30 of the power of two above the largest number.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ _SCALE = re.compile(
 
 
 MOST_CHANNELS = 64
-"""Maximum number of values of a fact, one per channel of a table; larger arrays are samples."""
+"""Maximum number of values of a fact with one value per channel of a table; larger arrays are samples."""
 _COUNT_SCALE = re.compile(
     rf"{_SCALE.pattern}|sens\w*|conv\w*|mult\w*|resol\w*|calib\w*|coeff\w*|sf|c1|to_\w+|units?_per_\w+", re.I
 )

@@ -87,7 +87,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
 
 
 def _unlike_segments(counts: Mapping[str, Mapping[int, int]]) -> Iterator[tuple[str, str]]:
-    """Yield path and segments of channels that are as long as another channel but divided differently.
+    """Yield path and segments of channels that are as long as another channel but have other segments.
 
     Channels that share all segments, follow one another, or take turns are left out.
     """

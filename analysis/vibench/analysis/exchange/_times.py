@@ -59,11 +59,11 @@ EVEN = 1e-3
 _PLACED = 0.1
 """Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Smallest deviation of irregular intervals from multiples of the usual one; largest fraction of these."""
+"""Smallest deviation of irregular intervals from multiples of the usual interval; their largest fraction."""
 _SINGLE = 0.2
 """Quantile of the intervals that equals one sample interval, even if two in five samples were lost."""
 _LEAST_ROUNDED = 3
-"""Minimum number of differing intervals to recognize rounding; fewer could be due to regular losses."""
+"""Minimum number of unusual intervals to recognize rounding; fewer could be due to regular losses."""
 _JITTER, _OUTLIERS = 0.04, 0.03
 """Largest range of jitter beyond rounding [sample intervals]; fraction of outliers ignored on each side."""
 _COARSE_SPREAD = 1.25
@@ -217,7 +217,7 @@ def is_time_of(name: str, label: str) -> bool:
 
 
 def _is_time(channel: SourceChannel, found: "re.Match[str] | None", first: Reals) -> bool:
-    """Return whether a column contains times, as its name suggests; "t" may also mean a temperature."""
+    """Return whether a column contains times; the name "t" without a unit may also mean a temperature."""
     if found is not None and (channel.unit or found["unit"]):
         return True
     steps = np.diff(np.sort(first))

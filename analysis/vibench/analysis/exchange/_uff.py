@@ -423,7 +423,7 @@ def _node(axis: FunctionAxis, recording: RecordingDescription) -> int:
 
 
 def _with_spacing(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
-    """Return a function, its first frequency, and its spacing with six digits; zeros for uneven spacing."""
+    """Return a function, its first frequency and its spacing (six digits each; zeros for uneven spacing)."""
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
@@ -450,9 +450,9 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 
 
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
-    """Return a first frequency and a spacing that divides it, with six digits; zeros if there are none.
+    """Return a frequency that is a multiple of a spacing, and this spacing; zeros if there is no such pair.
 
-    pyEMA and sdypy-EMA compute the number of lines below the first; a rounding error would add a line.
+    Both have six digits. pyEMA and sdypy-EMA count the lines below this frequency; rounding may add one.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))

@@ -43,7 +43,7 @@ def _require_sound(excerpt: Excerpt) -> None:
 
 
 def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write all channels in blocks; lost samples become zero, larger values are clipped to full scale.
+    """Write all channels in blocks; lost samples become zero, values beyond full scale are clipped.
 
     Counts of converters of up to 32 bits stay exact. Raises InvalidRequest for a fractional sample rate, or
     too many samples for a WAV file.
@@ -107,7 +107,7 @@ def _read_column(column: NDArray[Any], start: int, stop: int) -> Reals:
 
 
 def _valid_bits(path: Path) -> int:
-    """Return the stated bits of a sample; raises ValueError for a truncated file or several data chunks."""
+    """Return the stated bits per sample; raises ValueError for a truncated file or several data chunks."""
     bits = 8 * BYTES
     with path.open("rb") as file:
         order = ORDERS.get(file.read(4))
