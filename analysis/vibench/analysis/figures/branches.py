@@ -18,7 +18,7 @@ from . import style
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
-"""Height of the third panel, which shows which unstable motions a bench can hold [in]."""
+"""Height [in] of the third panel, which shows the unstable motions that a bench can hold."""
 EVENT_MARKS = {
     "fold": ("o", "#d55e00"),
     "period doubling": ("s", "#009e73"),
@@ -116,7 +116,7 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
 def _growth(
     axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
 ) -> None:
-    """Draw the e-folding times of unstable motions; the bench cannot hold motions below ``least_s``."""
+    """Draw the e-folding times of unstable motions; times below ``least_s`` are too short for the bench."""
     for line, held in zip(diagram.lines, holdable, strict=True):
         place, grows = _place(diagram, line), ~line.is_stable
         for label, chosen, colour in (

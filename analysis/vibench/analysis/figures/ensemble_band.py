@@ -109,7 +109,7 @@ def band_columns(overlay: AbstractOverlay[Any], name: str, column: str) -> dict[
 
 
 def simulated_responses(overlay: SweepOverlay | SteppedSineOverlay) -> dict[str, Reals]:
-    """Return table columns with the simulated responses to sines, and median and band of their draws."""
+    """Return table columns of simulated responses to sines, with median and band of the simulated runs."""
     return {
         **columns(overlay.response, "response_i_simulated=response_i response_ii_simulated=response_ii"),
         **band_columns(overlay, RESPONSE_I, "response_i"),

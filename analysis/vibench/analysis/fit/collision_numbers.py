@@ -24,7 +24,7 @@ from .specimen_fit import SpecimenFit
 from .statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
-"""Ratios of Response I to II (1 for a sine), below which there are no collisions, above which there are."""
+"""Ratios of Response I to II (1 for a sine): no collisions below the first, collisions above the second."""
 _LENGTH_S = 3.0
 """Length of the tracked part of a recording [s], long enough for four restarts of the search."""
 _MOST_RECORDINGS = 3
@@ -188,7 +188,7 @@ class _Colliding:
     path: Path
     label: SegmentLabel
     middle: float
-    """Relative position, 0 to 1, of the part's centre within the longest segment with this label."""
+    """Relative position, 0 to 1, of the part's centre within the longest segment with the part's label."""
     drive_hz: float | None = None
 
     def clip(self, recording: Recording) -> tuple[float, float]:

@@ -162,7 +162,7 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onset]:
     """Yield the onset at every frequency that has dwells with and without collisions.
 
-    The lower bound is the largest relative motion without collisions at which m0 moves as predicted, as
+    The lower bound is the largest relative motion without collisions at which m0 moves as predicted, because
     masses may also collide smoothly. The upper bound is the smallest linear motion of a colliding dwell,
     unless its collisions may persist from a higher level or another frequency. As collisions disturb the
     base, this motion is scaled from the largest dwell without collisions by the generator amplitude.

@@ -177,7 +177,7 @@ def lines_of(
 ) -> Lines:
     """Select the spectral lines well above their scatter; raises NotEnoughData if too few are left.
 
-    Magnitudes of a fitted specimen, if given, decide the selection, so that measurement noise does not.
+    The magnitudes of a fitted specimen, if given, replace the noisy measured ones in this selection.
     """
     measured = np.abs(frequency_response.value)
     frequency_hz = frequency_response.frequency_hz

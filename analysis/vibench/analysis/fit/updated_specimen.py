@@ -132,7 +132,7 @@ class UpdatedSpecimen(Tabular):
         return (*linear, *table, *_contradictory_suspects(self.collisions))
 
     def confirm(self, results: CampaignResults) -> "UpdatedSpecimen":
-        """Return the fit, without its values if a simulation with them disagrees with measured noise."""
+        """Return the fit; omit its values if a simulation with them disagrees with measured noise."""
         overlays = [
             each.overlay for each in results.noise if Path(each.analysis.facts.name).name == self.linear_from
         ]
@@ -284,7 +284,7 @@ def update_model(
     Parameters
     ----------
     results
-        Results of recordings of one specimen; noise results are displacement over displacement.
+        Results of recordings of one specimen; noise results must be ratios of displacements.
     also_free
         Additional parameters to fit to noise: one mass, and single dampers.
     observer

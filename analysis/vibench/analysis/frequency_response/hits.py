@@ -17,7 +17,7 @@ _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
 """Usual length [s] and minimum number of the pieces into which the drive is divided to compare energies."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""A drive of hits has over 0.9 of its energy in the strongest 0.05 of the time; noise has 0.06 there."""
+"""A drive of hits has over 0.9 of its energy in the strongest 0.05 of the time; noise has 0.06 of it."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
@@ -93,7 +93,7 @@ def _drive(channels: Channels, start: int, stop: int) -> Reals:
 
 
 def _longest(clear: Reals) -> int:
-    """Return the segment length that maximises (segments - 1) * length; the longest if this is always 0."""
+    """Return the segment length that maximises (segments - 1) * length; the longest if all products are 0."""
     kept_s = [(np.count_nonzero(clear >= each) - 1) * each for each in clear]
     return int(clear[int(np.argmax(kept_s))] if max(kept_s) > 0 else np.max(clear))
 
@@ -102,7 +102,7 @@ def _longest(clear: Reals) -> int:
 class HitSpectra:
     """Spectra of the hits under an exponential window, from which responses are estimated.
 
-    The window multiplies all channels by exp(-decay t), which turns H(i w) into H(i w + decay). Its decay is
+    The window multiplies all channels by exp(-decay t), which turns H(i w) into H(i w + decay). The decay is
     the smallest that reduces the response to a thousandth at the end of a segment; 0 with ``Window.BOXCAR``.
     """
 

@@ -219,7 +219,7 @@ def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Comple
 
 
 Background = Callable[[Reals], Complexes]
-"""Function of frequency [Hz] that returns background shapes with real factors, shape (lines, factors)."""
+"""Function of frequency [Hz] that returns background shapes, one per real factor: (lines, factors)."""
 _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14

@@ -36,7 +36,7 @@ from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 Estimated = tuple[FrequencyResponse, Callable[[], "NoiseResponse"]]
-"""Pair of the transmission and a slower function that returns all results, such as resonances."""
+"""Pair: the transmission, and a slow function that returns all results, such as resonances."""
 _BLOCK = 1 << 19
 """Number of samples read at once."""
 _LEVEL_SEGMENT_S = 1.0
@@ -246,7 +246,7 @@ def streamed_response(
 ) -> NoiseResponse:
     """Estimate the transmission from all usable non-periodic noise, or from all hits of a hammer.
 
-    Raises NotEnoughData when less than two segments of noise, or no hit, are left.
+    Raises NotEnoughData when fewer than two segments of noise, or no hits, are left.
     """
     rate = channels.sample_rate_hz
     stretch = only_stretch(channels, SegmentLabel.NOISE)
@@ -381,7 +381,7 @@ def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Seque
 
 
 def as_displacements(frequency_response: FrequencyResponse, channels: Channels) -> FrequencyResponse:
-    """Convert velocity over base acceleration to a displacement ratio; keep force over acceleration [kg]."""
+    """Convert velocity over base acceleration to a displacement ratio; leave force over acceleration [kg]."""
     if channels.is_force:
         return frequency_response
     return converted_frequency_response(
@@ -406,8 +406,8 @@ _QUIET_BLOCKS = 200
 def scatter_over_silence(channels: Channels, noise: Noise, found: NoiseResponse) -> float:
     """Return the variance about the linear response, relative to silence, as the median over the lines.
 
-    NaN for hits. Chaos scatters equally between periods and between realisations, so only silence reveals it.
-    Recordings start or end in silence (no drive); without silence, the ratio is too small.
+    NaN for hits. Chaos scatters periods as much as realisations, so only a comparison with silence reveals
+    it. Recordings start or end in silence (no drive); without silence, the ratio is too small.
     """
     length, rate = round(_QUIET_S * channels.sample_rate_hz), round(channels.sample_rate_hz)
     label = SegmentLabel.NOISE if found.periodic is None else SegmentLabel.REALISATION

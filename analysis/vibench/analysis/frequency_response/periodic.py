@@ -24,7 +24,7 @@ from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Fraction of a period that may be missing at the end of a record; it is then continued periodically."""
+"""Fraction of a period that may be missing at the end of a record, which is then continued periodically."""
 _WEAKEST_LINE = 1e-3
 """Minimum amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Lines up to this relative deviation are used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""A deviation above `_SMALL` is used to find a drift up to this multiple of the median deviation."""
+"""To find a drift, deviations above `_SMALL` are used up to this multiple of the median deviation."""
 
 
 class Scatter(StrEnum):
@@ -282,8 +282,8 @@ def _without_drift(
 ) -> tuple[Drift | None, Complexes]:
     """Return the drift between realisations, None if insignificant, and the deviations without drift.
 
-    Distortion with random phases is independent between lines, so a common part is a drift. The drift must
-    explain most of the scatter beyond noise, and far more than chance.
+    Distortion with random phases is independent between lines, so a part common to all lines is a drift. The
+    drift must explain most of the scatter beyond noise, and far more than chance.
 
     Parameters
     ----------

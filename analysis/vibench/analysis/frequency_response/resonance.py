@@ -237,7 +237,7 @@ def _refit(band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...
 
 
 def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
-    """Fit all modes of a band together, starting from the single fits; return these if the joint fit fails.
+    """Fit all modes of a band together from the single fits; return the single fits if the joint fit fails.
 
     H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
     exact for a linear specimen with any damping. If these modes do not explain the band, the mode with the
