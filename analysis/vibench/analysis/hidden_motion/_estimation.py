@@ -72,7 +72,7 @@ def estimate(
     first: int,
     stop: int,
 ) -> Estimate | str:
-    """Estimate parameters between two samples of a motion; on failure, return the reason as a sentence.
+    """Estimate parameters from the motion between two samples; on failure, return the reason as a sentence.
 
     ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
     """

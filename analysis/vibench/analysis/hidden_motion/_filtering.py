@@ -82,7 +82,7 @@ class FilterState:
     """State of a run of the filter, updated in place."""
 
     sample: int
-    """Index in the motion of the last sample that the filter used."""
+    """Index of the last sample that the filter used, counted from the start of the motion."""
     state: Reals
     covariance: Reals
     innovation_level: float = 1.0
@@ -98,7 +98,7 @@ class FilterPredictions:
     """Predictions of the filter for each sample, before that sample was used."""
 
     first: int
-    """Index in the motion of the first predicted sample."""
+    """Index of the first predicted sample, counted from the start of the motion."""
     states: Reals
     covariances: Reals
     innovations: Reals

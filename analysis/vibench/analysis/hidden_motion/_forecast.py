@@ -1,4 +1,4 @@
-"""Forecast of m1 for 40 ms under a steady sine, with the error of earlier forecasts."""
+"""Forecast of m1's motion for 40 ms under a steady sine, with the error of earlier forecasts."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class Forecast(Tabular):
     OWN_UNITS: ClassVar = {"p": "m", "error": "m"}
 
     first: int
-    """Index in the recording of the first forecast sample."""
+    """Index of the first forecast sample, counted from the start of the recording."""
     p: Reals
     """Relative displacement p = y - z [m]."""
     error: Reals

@@ -1,7 +1,7 @@
 """Parameters of a specimen from a colliding motion, with bounds.
 
 If the motion can be tracked with the described parameters, these are only refined. Otherwise start values are
-found without a contact model: m1, springs and dampers from flights, gaps from impacts. Tracking refines them.
+found without a contact model: flights give m1, springs and dampers; impacts give gaps. Tracking refines all.
 """
 
 from collections.abc import Mapping
@@ -47,8 +47,8 @@ _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
 _COARSE_HZ = 12_800.0
 _GAPS = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.MEAN_GAP)
 _COARSE_SD = {Hidden.C0: 5e-4, Hidden.C1: 1.5e-2, Hidden.C2: 1e-3, **dict.fromkeys(_GAPS, 2e-4)}
-"""Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; it is proportional to the
-squared sample interval."""
+"""Relative systematic error at 12.8 kHz, at which a contact lasts about a sample; the error is proportional
+to the squared sample interval."""
 _ONE_SIDED_SD = {
     Hidden.LOWER_GAP: 4e-9,
     Hidden.UPPER_GAP: 4e-9,
@@ -233,7 +233,7 @@ def _restarts(
 
 @dataclass(frozen=True, eq=False)
 class _CombinedEstimate:
-    """Parameters from the motion without the prior; all of shape (parameters,), SI."""
+    """Parameters that the motion determines without the prior; all arrays of shape (parameters,), SI."""
 
     values: Reals
     half: Reals
@@ -247,7 +247,7 @@ class _CombinedEstimate:
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _CombinedEstimate:
-    """Return the mean of restarts and its half width, from the larger of scatter and claimed uncertainty.
+    """Return the mean of restarts and its half width; the larger of scatter and claimed uncertainty counts.
 
     Restarts over the same samples are not independent: their scatter shows the influence of start values.
     A scatter above the claimed uncertainty shows a wrong model, and is itself uncertain for few restarts.

@@ -181,7 +181,7 @@ class HiddenMotion(Tabular):
     name: str
     sample_rate_hz: float
     first_sample: int
-    """Index in the recording of the first sample of the motion."""
+    """Index of the motion's first sample, counted from the start of the recording."""
     noise: ChannelNoise
     specimen: TrackedSpecimen
     """Parameters used for tracking."""
@@ -206,7 +206,7 @@ class HiddenMotion(Tabular):
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether parameters were given or found and no sensor refutes them; otherwise bounds are omitted."""
+        """Whether parameters were given or found, and no sensor refutes them; if not, bounds are omitted."""
         if any(each.confirms is False for each in self.mass_checks):
             return False
         return self.found is None or any(each.is_determined for each in self.found.parameters)

@@ -158,7 +158,7 @@ class LiveMotion(Tabular):
     why: str
     """Reason why the motion is not tracked."""
     first: int
-    """Index in the recording of the first sample of ``p``."""
+    """Index of the first sample of ``p``, counted from the start of the recording."""
     p: Reals
     """Relative displacement, NaN without a track [m]."""
     forecast: Forecast | None
@@ -306,7 +306,7 @@ class LiveTwin:
         Parameters
         ----------
         first_sample
-            Index in the recording of the first sample.
+            Index of the first of these samples, counted from the start of the recording.
         acceleration, velocity
             Acceleration of the base [m/s2] and velocity of m0 [m/s], shape (samples,).
         frequency_hz

@@ -58,7 +58,7 @@ class PreparedMotion:
     sample_rate_hz: float
     coupling_rad_per_s: float
     first_sample: int
-    """Index in the recording of the first sample."""
+    """Index of the motion's first sample, counted from the start of the recording."""
     noise: ChannelNoise
 
     @property

@@ -32,7 +32,7 @@ class SensorCorrection:
     """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""
 
     def correct(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
-        """Return the motion of base and m0; values within HALF_LENGTH of an end are wrong."""
+        """Return the motion of base and m0; values within HALF_LENGTH samples of an end are wrong."""
         return (
             np.convolve(acceleration, self.acceleration, "same"),
             np.convolve(velocity, self.velocity, "same"),

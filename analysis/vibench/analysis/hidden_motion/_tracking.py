@@ -50,12 +50,12 @@ class TrackedPiece:
 
     @property
     def first(self) -> int:
-        """Index in the motion of the first tracked sample."""
+        """Index of the first tracked sample, counted from the start of the motion."""
         return self.smoothed.first
 
     @property
     def stop(self) -> int:
-        """Index in the motion one past the last tracked sample."""
+        """Index after the last tracked sample, counted from the start of the motion."""
         return self.first + int(self.smoothed.states.shape[0])
 
 

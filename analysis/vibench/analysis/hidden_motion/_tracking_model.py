@@ -62,7 +62,7 @@ class StepTables:
     """Tables of a specimen for the filter."""
 
     flow: Reals
-    """Matrix that maps state, acceleration and its rise to the next state, without stops; shape (8, 10)."""
+    """Matrix from state, base acceleration and its increment to the next state, no stops; shape (8, 10)."""
     small_flow: Reals
     """The same matrix for a small step, shape (8, 10)."""
     small_steps: int
@@ -98,7 +98,7 @@ def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Rea
 
 
 def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
-    """Return the matrix of one step for state, input and the input's linear rise, shape (n, n + 2)."""
+    """Return the matrix of one step for state, input and the input's linear increase, shape (n, n + 2)."""
     n = len(a)
     joint = np.zeros((n + 2, n + 2))
     joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s
