@@ -175,7 +175,7 @@ _SEGMENTS_IN_SIGHT = 250
 _LOG_ROWS = 300
 _LEAST_HZ = 1.0
 _FLOOR_DB = -400.0
-"""Smallest density drawn, because zero has no logarithm [dB]."""
+"""Smallest density drawn [dB], because zero has no logarithm."""
 
 
 class RowSpacing(StrEnum):
@@ -218,7 +218,7 @@ class DensityPicture:
 
 
 def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
-    """Return the spectrogram of part of a recording, to which every sample contributes.
+    """Return the spectrogram of part of a recording; every sample of this part contributes.
 
     Raises RecordingError, InvalidRequest or NotEnoughData for an unusable file, channel or stretch.
     """
@@ -253,7 +253,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Return the edges of the frequency axis and the rows; a row shows the strongest line within it."""
+    """Return the edges of the frequency axis, and the rows; each row shows its strongest spectral line."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

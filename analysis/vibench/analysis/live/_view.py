@@ -30,7 +30,7 @@ from ._spectra import LiveSpectra, LiveSpectrum
 _SPAN_S = 78e-6
 """Step of the sixth difference [s]; a longer step passes more of the motion, a shorter step more noise."""
 _DAMPING_TIME_S = 2e-5
-"""Damping time of m0's springs [s]: at an impact, ratio of acceleration step to change of its slope."""
+"""Damping time of m0's springs [s]: at an impact, the acceleration's step over the change of its slope."""
 _CONTACT_S = 30e-6
 """Assumed duration of a contact; contacts last 20 to 40 us."""
 _APART_S = 100e-6
@@ -49,7 +49,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise, since impacts affect higher ones; its value for unit noise."""
+"""Quantile of |noise| that measures the noise (impacts affect higher quantiles); value for unit noise."""
 
 
 class ImpactCounter:

@@ -270,7 +270,7 @@ _NOISE = 0.15
 """Uncertainty of the natural logarithm of a channel's noise, which is estimated in its quietest part."""
 _MORE = 3
 _HOPELESS = 0.2
-"""Probability of enough draws for a comparison below which no more draws are made."""
+"""No more draws are made if enough draws for a comparison are less probable than this."""
 _SEED = 17
 _BLOCK = 1 << 17
 """Number of samples per block of added noise."""
@@ -434,7 +434,7 @@ def all_draws(
 
 
 def _chance_of_enough(alike: float, made: int, most: int) -> float:
-    """Return the chance that `FEWEST_DRAWS` of ``most`` draws are alike, if ``alike`` of ``made`` are."""
+    """Return the chance that `FEWEST_DRAWS` of ``most`` draws are alike, after ``alike`` of ``made`` were."""
     further = scipy.stats.betabinom(most - made, 1 + alike, 1 + made - alike)
     return float(further.sf(FEWEST_DRAWS - alike - 1))
 
@@ -505,7 +505,7 @@ class StretchDraws:
     volts: Reals
     """Recorded voltage without the noise of its channel."""
     first: int
-    """Index in the recording of the first sample of ``volts``."""
+    """Index of the first sample of ``volts``, counted from the start of the recording."""
     kept: slice
     """Slice of ``volts`` with the simulated part of the recording."""
 

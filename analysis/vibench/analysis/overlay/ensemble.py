@@ -23,7 +23,7 @@ MIXED = -1
 FEWEST_DRAWS = 5
 """Minimum number of draws with the measured kind of motion for a comparison."""
 _CLEAR = 0.75
-"""Fraction of the limit of |z|; no more draws are made if half of them keep all values within it."""
+"""No more draws are made if every measured value has |z| within this fraction of the limit."""
 _FEWEST_POINTS = 30
 """Minimum number of values per draw for the largest |z| to follow Gumbel's distribution."""
 
@@ -228,7 +228,7 @@ class EnsembleCurve(Tabular):
 
 
 class PhaseCurve(EnsembleCurve):
-    """Phases, measured and in every draw [rad]; compared are their angles from the draws' mean direction.
+    """Phases, measured and in every draw [rad]; their angles from the draws' mean direction are compared.
 
     These angles lie within half a turn, so the band may extend beyond pi. Phases that scatter over the whole
     circle do not disagree.
@@ -274,8 +274,8 @@ def largest_of_chance(largest: Reals) -> float:
     """Return the limit that, in 99 % of cases, the largest |z| of another draw does not exceed.
 
     ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
-    distribution with their mean and deviation. A fitted factor widens it, because few draws determine both
-    poorly: otherwise, 2 % of cases with 16 draws would exceed it, and 5 % with five.
+    distribution with mean and deviation of these values. Few draws determine both poorly, so a fitted factor
+    widens the limit. Otherwise 2 % of cases with 16 draws, and 5 % with five, would exceed it.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -370,7 +370,7 @@ def logarithmic_difference(
 # rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If the motion ends within this interval [s] in all runs, the cause is common to them, not chance."""
+"""If the motion ends within this interval [s] in all runs, it ends by a common cause, not by chance."""
 
 
 @dataclass(frozen=True)

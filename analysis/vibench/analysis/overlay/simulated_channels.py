@@ -75,7 +75,7 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 _PIECE_S = 5.0
 """Duration that is simulated at once, to limit memory [s]."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; each extra sample reduces a spline's end effect to 0.27 of it."""
+"""Extra samples on each side of a piece; each extra sample multiplies a spline's end effect by 0.27."""
 _VX = 3
 _STATE = 6
 

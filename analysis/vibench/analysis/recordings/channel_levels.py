@@ -113,14 +113,14 @@ _COUNTED = 2**16 + 1
 _TOPS = (0.1, 0.03, 0.01)
 """Heights of the top parts of a peak that are examined for clipping, relative to the peak's height."""
 _FLAT = 0.88
-"""Minimum fraction of a clipped top's samples in its upper half; smooth peaks have 0.71, straight 0.84."""
+"""Minimum fraction of a clipped top's samples in its upper half; smooth peaks: 0.71, straight peaks: 0.84."""
 _FLAT_VALUE = 0.4
-"""Minimum fraction of the samples in a clipped peak's upper half that have the clipped value."""
+"""In the upper half of a clipped peak, at least this fraction of the samples has the clipped value."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
 _FEWEST_STEPS = 40
 """Minimum height of a peak [converter steps]: a sine of 16 steps has 0.42 of its samples at two values."""
 _GAP, _GAP_IN_TOP = 0.01, 0.15
-"""Largest range without values in a smooth, well sampled peak, relative to heights of peak and of top."""
+"""Largest range without values in a smooth, well sampled peak, relative to heights of peak and top."""
 _AS_FREQUENT = 0.4
 """Largest number of samples at one value below a clipped peak, relative to the number of clipped samples."""
 
@@ -134,7 +134,7 @@ def _lasting(bins: Reals) -> tuple[int, int]:
 
 
 def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
-    """Return the value at which the upper peaks are clipped; None if not, or if this is unclear.
+    """Return the value at which the upper peaks are clipped; None if they are not, or if this is unclear.
 
     If the sample clock is locked to the drive, every period has the same few values. The histogram of a
     smooth peak may then look clipped, but has an empty range above ``lasting``, the highest bin that three
@@ -172,7 +172,7 @@ def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale:
 
 
 def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
-    """Return whether an envelope stays near a value for long, such as for a free body before a hit.
+    """Return whether an envelope stays near a value for long, as that of a free body before a hit does.
 
     If a signal has only one value, it counts as rest only at zero: a saturated amplifier is also constant.
     """

@@ -120,7 +120,7 @@ class Channels(Protocol):
         """Ratio of the response sensor's gain to the base sensor's, without their delays; shape (lines,)."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the parts of the record named ``label``, in the order of time."""
+        """Return the record's parts named ``label``, in the order of time."""
 
     def read(self, start: int, stop: int) -> Reals:
         """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
@@ -182,7 +182,7 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Return the parts of the record named ``label`` that have samples, without rejected averages."""
+        """Return the record's parts named ``label`` that have samples, without rejected averages."""
         found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments
@@ -223,7 +223,7 @@ class RecordedChannels:
 
 
 def far_from(marks: Flags, reach: int) -> Flags:
-    """Return flags of the samples that are over ``reach`` samples from every marked one, shape (samples,)."""
+    """Return flags of samples more than ``reach`` samples away from every marked one, shape (samples,)."""
     if not marks.any():
         return np.ones(marks.size, dtype=np.bool_)
     total = np.concatenate(([0], np.cumsum(marks)))
