@@ -197,7 +197,7 @@ class Tabular:
     def to_xarray(self) -> "xarray.Dataset":
         """Return all numbers of the result as an `xarray.Dataset`.
 
-        Arrays over the result's frequencies or times share this dimension. Bounds (``magnitude_lower``) and
+        Arrays over the result's frequencies or times share one dimension. Bounds (``magnitude_lower``) and
         standard deviations (``sd_...``) are separate variables. Names of values in a part begin with the name
         of the part (``response_frequency_hz``). A list of parts that contain single numbers, such as
         resonances, becomes one array per field (``resonances_frequency_hz``); other parts are numbered. A

@@ -56,7 +56,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Card:
-    """Content of the card, and of the row in the overview table, of one recording or group of claims."""
+    """Content for one recording or group of claims: the card, and the row in the overview table."""
 
     name: str
     result: str

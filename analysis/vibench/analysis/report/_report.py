@@ -67,7 +67,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
-    """Yield sentences on the resonances at the weakest noise and on their changes at the strongest."""
+    """Yield sentences on the resonances at the weakest noise, and on their changes at the strongest noise."""
     if not noise:
         return
     weak, strong = noise[0], noise[-1]
@@ -196,7 +196,7 @@ def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each branch diagram; if over frequency, with the results of stepped sines and sweeps."""
+    """Draw each branch diagram; diagrams over frequency also show results of stepped sines and sweeps."""
     levels = _recorded_levels(results)
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
@@ -304,7 +304,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return as one text: result and age of the last bench check, and its findings that are not ok."""
+    """Return one text with result and age of the last bench check, and its findings that are not ok."""
     check = facts.bench_check
     if not check:
         return "none"

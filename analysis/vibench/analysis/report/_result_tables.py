@@ -204,7 +204,7 @@ def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, s
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's median level in all draws [dB]; for one run or a low level, that of the first draw."""
+    """Return a band's median level in all draws [dB]; for one run or a low level, the first draw's level."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]

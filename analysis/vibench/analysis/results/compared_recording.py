@@ -86,7 +86,7 @@ _NO_LEVEL = "{} does not contain levels for a range of frequencies; choose a ste
 
 
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
-    """Return pairs (frequency [Hz], base amplitude [m]) of a stepped sine or a sweep, rising in frequency.
+    """Return pairs (frequency [Hz], base amplitude [m]) of a stepped sine or a sweep, sorted by frequency.
 
     Raises NotEnoughData when the recording is of another kind, or has a single frequency.
     """

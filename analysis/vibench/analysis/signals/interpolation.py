@@ -23,7 +23,7 @@ _PHASES = 512
 
 
 def _weights_of_phases() -> Reals:
-    """Return the windowed sinc at every tap, from one phase before a sample to one after the next sample."""
+    """Return the windowed sinc at every tap, for fractions from one phase below 0 to one phase above 1."""
     fraction = np.arange(-1, _PHASES + 2, dtype=np.float64) / _PHASES
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
@@ -154,7 +154,7 @@ class Decimator:
 
 
 def _taps(factor: int) -> Reals:
-    """Return a Kaiser low-pass from 0.4 to 0.6 of the new rate; half its length is a multiple of factor."""
+    """Return a Kaiser low-pass (edge at 0.4 to 0.6 of the new rate); factor divides half its length."""
     if factor == 1:
         return np.ones(1)
     width = 2 * (1 - 2 * TRUSTED_FRACTION) / factor

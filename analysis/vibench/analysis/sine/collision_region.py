@@ -31,7 +31,7 @@ _QUIET_QUANTILE = 0.1
 _CLEARLY = 2.0
 """Ratio of residual to threshold above which collisions are certain."""
 _RISE = 1.2
-"""Ratio of the residual to that of the previous interval; above it, impacts must excite the residual."""
+"""Ratio of the residual to the previous interval's residual above which impacts must be the cause."""
 _ALONE = 10.0
 """Ratio of the residual to noise, distortion and ringing above which one interval may have impacts."""
 _UNLIKE = 2.0
@@ -102,7 +102,7 @@ class Collisions(Tabular):
 
 
 def collisions(sweep: SweptMotion) -> Collisions:
-    """Find the intervals of a sweep in which the masses collide, where the motion is no slowly varying sine.
+    """Find the intervals with collisions, in which the motion is not a slowly varying sine.
 
     Impacts cause velocity that no order of the drive explains; so does ringing after resonances in a fast
     sweep. The residual has three limits: 4 times the noise, 2 % of order 1, and twice the residual simulated

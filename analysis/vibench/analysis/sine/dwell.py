@@ -33,7 +33,7 @@ NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Largest residual that counts as noise, relative to noise in silence, which is shorter than a ring-down."""
+"""Largest residual that counts as noise, relative to noise in a silence (shorter than a ring-down)."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
@@ -183,7 +183,7 @@ def _remaining_decay(off: Complexes | Reals, slope: complex, place: Reals) -> fl
     """Return the largest likely distance of the mean of ``off`` from the end of its exponential decay.
 
     For exp(-h x), -1 < x < 1, the ratio of quadratic to linear Legendre coefficient is r = (5/3) i2(h) /
-    i1(h), at most h / 3; that of the mean to the linear coefficient is 0.2 r + 1 / h.
+    i1(h), at most h / 3. The ratio of the mean to the linear coefficient is 0.2 r + 1 / h.
     """
     curve = place**2 - np.mean(place**2)
     bend = complex(curve @ off / (curve @ curve))

@@ -62,7 +62,7 @@ def jumps(
 ) -> tuple[Jump, ...]:
     """Return the jumps of a response over time.
 
-    At each interval straight lines are fitted to the logarithm of the response before and after. A jump is a
+    At each interval, straight lines are fitted to the logarithm of the response before and after. A jump is a
     local maximum of the difference of both lines, of at least 1.5 dB and 8 standard errors. Resonances of a
     linear specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump maximises
     the likelihood; its bounds come from the likelihood ratio.
@@ -107,7 +107,7 @@ def _logarithm(response: Reals) -> Reals:
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Return each interval's step, from the line fitted before it to the line after it, and its error."""
+    """Return each interval's step, from the line fitted before it to the line after it, with its error."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
@@ -185,7 +185,7 @@ JUMP_FACTOR = 2.0
 """Minimum ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as such."""
 
 
 @dataclass(frozen=True)

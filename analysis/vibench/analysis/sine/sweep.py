@@ -107,7 +107,7 @@ def _continue_phase(phase: Reals, edge: int) -> Reals:
 _SAMPLES_PER_CYCLE = 24
 """Minimum samples per cycle at the highest drive frequency, so that sampled maxima are at most 0.9 % low."""
 _BAND_BELOW = 0.25
-"""High-pass frequency for displacement [lowest drive frequency]; half orders pass, drift does not."""
+"""High-pass frequency for displacement / lowest drive frequency; half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
 """Low-pass frequency relative to the decimated rate, within the flat band of the decimation."""
 _LINEAR_ABOVE = 5.5
@@ -176,8 +176,8 @@ class SweptMotion(Tabular):
     linear_impacts: Reals
     """Orders 2 and 3 relative to order 1, without contact; modes may ring at twice the drive frequency."""
     steady_over_swept: float
-    """Largest Response II without contact for steady sines, divided by that in this sweep. NaN if the
-    measured Response II differs from it, for example while the specimen still rings."""
+    """Largest Response II without contact: value for steady sines divided by value in this sweep. NaN if the
+    measured Response II differs from the latter, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -452,7 +452,7 @@ class SweepSums:
         return np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: base.size])
 
     def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
-        """Return displacement at `ALL_ORDERS`, in intervals long enough to separate them."""
+        """Return displacement at `ALL_ORDERS`, in intervals long enough to separate the orders."""
         cycles = self._low_hz * self._interval / self._rate_hz
         longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
         longer = min(longer, response.size)

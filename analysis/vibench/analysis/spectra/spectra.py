@@ -285,7 +285,7 @@ def amplitude_spectrum(
     samples
         Shape (samples,); the mean is removed, so that an offset does not hide the lowest lines.
     window
-        Hann by default, which shows up to 15 % less for a sine between lines; flat top is within 0.1 %.
+        Hann by default, which shows up to 15 % too little for a sine between lines; flat top is within 0.1 %.
     """
     count = samples.size
     if count < 2:

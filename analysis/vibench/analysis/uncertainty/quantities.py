@@ -27,7 +27,7 @@ _SHAPE_VARIANCE = 0.5633
 """n times the variance of the shape k estimated from n maxima (Hosking, Wallis and Wood 1985, for k = 0)."""
 _FEWEST_DRAWS = 5
 _NO_DRAWS = Contribution(Cause.CHANCE, None, "there are no draws of the twin")
-"""Stands for a random error of a maximum, or of a 0.1 s interval of a sweep, that only draws can give."""
+"""Stands for an unknown random error of a maximum, or of a 0.1 s sweep interval; only draws determine it."""
 _ENDS = 2
 """Number of intervals at each end of a sweep where a largest value depends on where the intervals begin."""
 _PEAKED = 1.05
@@ -255,7 +255,7 @@ def _largest(
 
 
 def _scatter(overlay: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
-    """Return a value's scatter over draws with the measured kind of motion; None with under 5 draws."""
+    """Return a value's scatter over draws with the measured kind of motion; None if fewer than 5."""
     curve = None if overlay is None else overlay.quantity(name)
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
