@@ -61,7 +61,7 @@ class BranchContinuation(AbstractFeedback):
     """Size of the drive changes that measure the stability of each point: relative rms change of the
     fundamental of base or m0, whichever is larger. Use 0.02 if noise is low, 0 to skip the measurement."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
-    """Number of evaluated periods with small drive changes per point; further periods find their size."""
+    """Number of evaluated periods with small drive changes per point; other periods find the needed size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:

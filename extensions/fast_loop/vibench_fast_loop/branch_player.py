@@ -126,7 +126,7 @@ class BranchPlayer:
 
 
 def _settled_part(seen: Coefficients) -> Coefficients:
-    """Return the second half of the blocks, halved again as long as its two halves differ."""
+    """Return the second half of the blocks, halved again while its two halves differ."""
     while len(seen) > 3:
         first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
         # Differences of neighbours are used, because a drift hardly changes them.

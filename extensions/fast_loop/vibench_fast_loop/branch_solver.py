@@ -188,7 +188,7 @@ def noise_of(base_u: Vector, ratio_u: float) -> Vector:
 
 
 def _reference(points: Sequence[MeasuredPoint]) -> MeasuredPoint:
-    """Return the newest point that is far enough from the last to define a direction, else the first one."""
+    """Return the newest point far enough from the last one to define a direction; else the first point."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

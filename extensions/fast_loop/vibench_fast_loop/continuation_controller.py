@@ -228,7 +228,7 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 _EACH = 5
 """Number of drive periods per change: deviations hardly grow in this time, but the upper modes can follow."""
 _LEAD, _TRIAL = 3, 8
-"""Number of changes before the evaluated ones, and number in the trial that finds their size."""
+"""Number of changes before the evaluated changes; number of changes in the trial that finds the size."""
 _CHANGED = (0, 2)
 """Indices of the perturbed coefficients (first and third harmonic); the specimen drives the table at both."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05

@@ -250,7 +250,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Return the last motion before one is not held; None if the first motion is not held."""
+    """Return the last motion up to which all motions are held; None if the first motion is not held."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])

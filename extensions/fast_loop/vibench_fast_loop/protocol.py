@@ -92,7 +92,7 @@ class LoopBlock(FrozenModel):
 
 
 class LoopReport(FrozenModel):
-    """Report of a controller. Each measured block is contained in one report only."""
+    """Report of a controller. Each measured block appears in exactly one report."""
 
     vibench_loop: Literal[1] = LOOP_PROTOCOL
     state: LoopState
@@ -115,7 +115,7 @@ class LoopFacts(FrozenModel):
     watchdog_s: PositiveFloat
     """Time without a request after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """The only input, if the controller accepts only proportional-derivative laws; None if any linear law."""
+    """Only input of a controller limited to proportional-derivative laws; None if it accepts other laws."""
 
 
 class LoopRequest(FrozenModel):
