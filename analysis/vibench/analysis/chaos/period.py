@@ -14,7 +14,7 @@ _TABLE = 2
 STEADY = 2e-3
 """Largest scatter of the points of a steady motion, relative to the orbit; real drives fluctuate."""
 _NOISE_MARGIN = 1.5
-"""Largest ratio of the points' measured to expected scatter at which noise explains the scatter."""
+"""Largest ratio of measured to expected scatter of the points that noise explains."""
 _REPEATED = 0.25
 """Largest variance of every n-th point, relative to the variance of all points, for a period n above one."""
 _BLOCKS = 10

@@ -121,7 +121,7 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""Maximum number of points in tests of the shape, from the end of a record; more cost only time."""
+"""Maximum number of points in tests of the shape, from the end of a record; more points only cost time."""
 ABOVE_NOISE = 5.0
 """Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
@@ -138,7 +138,7 @@ _LOW_PERIOD = 4
 """Longest period that counts as short; mains hum at half the drive frequency causes such periods."""
 CHAOTIC_K = 0.9
 _BEYOND_CHANCE = 3.5
-"""Minimum `margin` for a series replaced by normal scores; a rank test alone errs once in 40."""
+"""Minimum `margin` if values are replaced by normal scores; a rank test alone errs once in 40 cases."""
 _ASYMMETRIC = 2.5
 """Minimum `margin` of the time symmetry; in 4 % of cases, noise in one of two coordinates exceeds it."""
 _SURELY = 3.0

@@ -179,7 +179,7 @@ def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
 
 
 _LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
-"""Range of frequencies c of the 0-1 test; others cause resonances (Gottwald and Melbourne, section 3.1)."""
+"""Range of c in the 0-1 test; other frequencies cause resonances (Gottwald and Melbourne, section 3.1)."""
 _FREQUENCIES = 100
 _CUT = 10
 """The mean square displacement is computed for lags up to the series length divided by this number."""

@@ -190,7 +190,7 @@ class CurvePeak:
     relative_sd: float
     """Relative standard deviation of the magnitude; NaN if unknown."""
     half_power_width_hz: float | None
-    """Width at half power; None if the curve ends or exceeds the peak before it falls to half power."""
+    """Width at half power; None if the curve ends or exceeds the peak before falling to half power."""
 
     @property
     def damping_ratio(self) -> float | None:

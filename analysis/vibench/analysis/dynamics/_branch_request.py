@@ -39,7 +39,7 @@ class BranchMethod(StrEnum):
     BALANCE = "balance"
     """Harmonic balance, as many harmonics as needed; for motions of the drive's period, no rigid stops."""
     FIRST_ORDER = "first-order"
-    """Harmonic balance with one harmonic, the paper's eq. 5; power laws only."""
+    """Harmonic balance with one harmonic, the paper's eq. 5; for power laws only."""
 
 
 class BranchRequest(SpecimenChoice):

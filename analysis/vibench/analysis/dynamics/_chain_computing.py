@@ -50,7 +50,7 @@ DECIBELS = 20.0 / math.log(10.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChainRun(Tabular):
-    """Results of one chain with one drive; arrays have one value per cell, counted from the base."""
+    """Results of one chain with one drive; arrays have one value per cell, starting at the base."""
 
     DOCUMENT: ClassVar = (
         "cells frequency_hz over_hz transmission transmission_error target impacts observed_s energy_j "
@@ -64,7 +64,7 @@ class ChainRun(Tabular):
     over_hz: Reals
     """Frequencies of the transmission, shape (m,); a single frequency under a steady sine."""
     transmission: Reals
-    """Ratio of the amplitude of x of m0 to the base amplitude at each frequency, shape (m, cells)."""
+    """Amplitude of m0's displacement x over the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
     """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
     target: TargetReport | None = None
@@ -257,7 +257,7 @@ def _time_run(
 
 
 def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
-    """Compute the responses in a run from rest, then energies and motion in its continuation."""
+    """Compute the responses in a run from rest, then energies and motion while the run continues."""
     whole_s, observed_s = request.settle_s + request.duration_s, request.duration_s
     relative_error, target = np.full(chain.size, math.nan), None
     if request.has_target:

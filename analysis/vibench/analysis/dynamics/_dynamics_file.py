@@ -172,7 +172,7 @@ def _write_column(group: h5py.Group, name: str, values: object) -> None:
 
 @contextmanager
 def _new_file(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
-    """Create a new HDF5 file with the kind and request of its results; remove it if writing fails."""
+    """Create a new HDF5 file with the kind and request of its results; remove the file if writing fails."""
     with new_file(path) as unfinished, open_hdf5_to_write(unfinished, "x") as file:
         file.attrs["format"] = kind
         file.attrs["format_version"] = FORMAT_VERSION

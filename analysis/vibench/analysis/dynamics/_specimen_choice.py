@@ -41,7 +41,7 @@ class SpecimenChoice(FrozenModel):
     gap_m: PositiveFloat | None = None
     """Clearance at both stops; the specimen's own if not given."""
     described: SpecimenTable | None = None
-    """All values of the specimen, stored with the result; read from its file by default."""
+    """All values of the specimen, stored with the result; read from the specimen's file by default."""
 
     @model_validator(mode="after")
     def _is_a_specimen(self) -> Self:

@@ -117,7 +117,7 @@ class SpectrumPoint:
     motion: str
     source: str
     blocks: int
-    """Smallest number of independent blocks behind a standard error; few blocks give wide intervals."""
+    """Smallest number of independent blocks for a standard error; few blocks give wide intervals."""
     impact_rate_hz: float
     outcome: str
     elapsed_s: float
@@ -130,7 +130,7 @@ class SpectrumPoint:
 
     @property
     def sum_difference(self) -> float:
-        """Relative difference of the sum of the exponents from `dampers_per_s`."""
+        """Relative difference between the sum of the exponents and `dampers_per_s`."""
         return self.sum_per_s / self.dampers_per_s - 1.0 if self.dampers_per_s else math.nan
 
 
@@ -187,7 +187,7 @@ class ExponentSpectrum(Tabular):
 
     @property
     def cost_sentence(self) -> str:
-        """Return a sentence on the points, the check of their sums of exponents, and the computing time."""
+        """Return a sentence on the points, the check of the sums of exponents, and the computing time."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
             check = "the contact dissipates energy, so sums of exponents are not checked against the dampers"

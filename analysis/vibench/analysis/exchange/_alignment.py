@@ -75,7 +75,7 @@ class Alignment:
 
     rate_hz: float
     places: int
-    """Length of the axis in sample intervals, from the earliest sample to the last one in all channels."""
+    """Length of the axis in sample intervals, from the earliest to the last sample of all channels."""
     pieces: tuple[tuple[Piece, ...], ...]
     """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]

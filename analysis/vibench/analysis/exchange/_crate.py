@@ -170,7 +170,7 @@ def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
 
 
 def _licence_name(address: str) -> str:
-    """Return a Creative Commons licence's name, such as "CC BY 4.0"; else the address's last part."""
+    """Return the name of a Creative Commons licence ("CC BY 4.0"), otherwise the end of the address."""
     found = _CREATIVE_COMMONS.search(address)
     if found is None:
         return address.rstrip("/").rpartition("/")[2]

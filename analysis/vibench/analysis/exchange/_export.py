@@ -29,7 +29,7 @@ _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 def require_unused(path: Path) -> None:
-    """Raise InvalidRequest when the path exists, or its folder does not."""
+    """Raise InvalidRequest when the path exists, or its folder does not exist."""
     if path.exists():
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():

@@ -88,7 +88,7 @@ def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int
 
 
 def _mark_unwritten(dataset: h5py.Dataset, axis: int, start: int, values: Reals) -> None:
-    """Replace samples of chunks that were never written by NaN; HDF5 returns a fill value for them."""
+    """Set samples of unwritten chunks to NaN; HDF5 returns a fill value for these samples."""
     length, corner = dataset.chunks[axis], [0] * dataset.ndim
     for corner[axis] in range(start - start % length, start + len(values), length):
         if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:
@@ -161,7 +161,7 @@ def _value(dataset: h5py.Dataset) -> Any:
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> float:
-    """Return an attribute as a number; if it has one number per row or column, the number at ``place``."""
+    """Return an attribute as a number: the number at ``place`` if there is one per row or column."""
     numbers = np.ravel(dataset.attrs.get(name, otherwise))
     if numbers.size not in {1, min(dataset.shape)}:
         raise UnusableData(f"{dataset.name}: {name} has {numbers.size} numbers; export the file again")

@@ -71,7 +71,7 @@ def held_values(
 
 
 def _runs(source: Source, channel: SourceChannel) -> tuple[list[tuple[int, int]], float]:
-    """Return the runs of `_LONGER` or more equal values, and the smallest step between values."""
+    """Return the runs of at least `_LONGER` equal values, and the smallest step between values."""
     runs: list[tuple[int, int]] = []
     first, place, before, step = 0, 0, np.nan, np.inf
     for block in source.blocks(channel):

@@ -239,7 +239,7 @@ def _require_samples(writer: RecordingWriter, path: Path) -> None:
 
 
 def _origin(wanted: tuple[_ChannelImport, ...], mapping: ImportMapping, path: Path) -> Origin:
-    """Return the origin of the recording; it is simulated if any channel is simulated."""
+    """Return the origin of the recording; one simulated channel makes the recording simulated."""
     origins = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and origins - {mapping.origin}:
         raise InvalidRequest(
@@ -311,7 +311,7 @@ def _peak(source: Source, channel: SourceChannel, name: str) -> float:
 
 
 def _power_of_two_above(peak: float, name: str) -> float:
-    """Return the smallest power of two that is at least ``peak``; ``name`` is used in the error.
+    """Return the smallest power of two that is at least ``peak``; ``name`` appears in the error.
 
     Raises UnusableData when a recording cannot store the peak.
     """

@@ -148,7 +148,7 @@ class ChannelMapping(FrozenModel):
 
 
 class Part(FrozenModel):
-    """Start and end of a part of the plan in the file [s since its first sample]."""
+    """Start and end of a part of the plan in the file [s since the file's first sample]."""
 
     start_s: NonNegativeFloat
     stop_s: PositiveFloat

@@ -131,7 +131,7 @@ class SourceChannel:
     origin: Origin | None = None
     """Whether the channel was measured or simulated; None if unknown."""
     full_scale: float | None = None
-    """Largest value of the file format, if this is also the range of the converter."""
+    """Largest value of the file format, if this is also the full scale of the converter."""
     rate_bounds_hz: tuple[float, float] | None = None
     """Bounds of the sample rate [Hz], if the times have few digits."""
     start_s: float | None = None

@@ -246,7 +246,7 @@ class TimeAxis:
 
     @property
     def moments(self) -> tuple[object, ...]:
-        """Start and runs of the times; they are equal for channels sampled at the same times."""
+        """Start and runs of the times; both are equal for channels sampled at the same times."""
         return round(self.start / self.interval, 2), self.runs
 
     def of(self, channel: SourceChannel) -> SourceChannel:
@@ -342,7 +342,7 @@ def _resolution(times: Reals, interval: float) -> Reals:
 
 
 def _jitter(times: Reals, distance: Reals, interval: float, unit: float) -> float:
-    """Return the largest range of distances from a line, minus the part that rounding explains."""
+    """Return the largest range of the times' distances from a line, minus the part due to rounding."""
     width = min(_BIN, times.size)
     starts = np.minimum(np.arange(0, times.size, width), times.size - width)
     rows, off = (sliding_window_view(each, width)[starts] for each in (times, distance))

@@ -66,9 +66,9 @@ ORDERS = {b"RIFF": "<", b"RIFX": ">"}
 """Byte order by first bytes of the file; RF64 files above 4 GiB store sizes elsewhere and are not read."""
 FIRST_CHUNK = 12
 FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
-"""Size of a format chunk, and of a format chunk that states how many bits of a sample are used."""
+"""Size of a plain format chunk, and of one that states the number of used bits per sample."""
 UNKNOWN_SIZE = 2**32 - 1
-"""Size field of a streamed file, whose size was unknown when it was written."""
+"""Size field of a streamed file, written before the size was known."""
 
 
 @contextmanager

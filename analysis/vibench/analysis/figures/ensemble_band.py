@@ -44,7 +44,7 @@ def draw_band(
 ) -> Reals | None:
     """Draw the 95 % band of one quantity as an area, and return its median; None without several draws.
 
-    ``along`` contains the abscissae of the quantity; ``shown`` converts its values to those of the axis.
+    ``along`` contains the abscissae of the quantity; ``shown`` converts the quantity's values to axis values.
     """
     found = overlay.quantity(name)
     if found is None or overlay.run.draws == 1:
@@ -79,7 +79,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
 
 
 def agreement_text(overlay: AbstractOverlay[Any]) -> str:
-    """Return the end of a sentence with agreement and escape rate; empty if simulated from base motion."""
+    """Return the end of a sentence: agreement and escape rate; empty if base motion drives the simulation."""
     if not overlay.run.driven.by_voltage:
         return ""
     parts = [*overlay.agreement]

@@ -1,4 +1,4 @@
-"""Figures of motion estimated from one recording: p = y - z between the stops, and the impacts."""
+"""Figures of the motion estimated from one recording: p = y - z between the stops, and the impacts."""
 
 import numpy as np
 from matplotlib.axes import Axes

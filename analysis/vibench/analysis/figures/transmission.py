@@ -35,7 +35,7 @@ _BELOW = 0.5
 
 
 def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
-    """Draw the transmission with bounds, phase and coherence, and the simulation with its difference."""
+    """Draw the measured and simulated transmission, their difference, and bounds, phase and coherence."""
     at = model_resonances(specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen)
     with style.figure_style():
         figure = style.new_figure(_HEIGHT_IN)

@@ -191,7 +191,7 @@ def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onse
 
 
 def _is_raised(plan: DwellPlan) -> bool:
-    """Return whether a dwell was reached from silence by rising levels at its own frequency."""
+    """Return whether a dwell was reached from silence by rising levels at the same frequency."""
     return isinstance(plan, Dwell) and all(
         abs(each.frequency_hz - plan.frequency_hz) < _SAME_HZ and each.amplitude_vpp <= plan.amplitude_vpp
         for each in plan.lead_in

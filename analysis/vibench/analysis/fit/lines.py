@@ -64,7 +64,7 @@ def loaded_response(
 
 
 def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
-    """Return m0 over base for the three masses without additional loads."""
+    """Return m0's response relative to the base for the three masses without additional loads."""
     return loaded_response(specimen, frequency_hz, (0.0, 0.0))
 
 
@@ -141,7 +141,7 @@ class Lines:
         return bool(np.any(np.abs(at[:count] - self.start[:count]) > _MOST_OFF))
 
     def residuals(self, at: Reals, model: Model) -> Reals:
-        """Return measured minus model in standard deviations: magnitudes, phases, and a stated scale."""
+        """Return measured minus modelled values [standard deviations]: magnitudes, phases and a scale."""
         count = len(self.free)
         high_pass, delay = at[count : count + CHANNEL_PHASES]
         rest = at[count + CHANNEL_PHASES :]

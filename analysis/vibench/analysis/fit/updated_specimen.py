@@ -72,7 +72,7 @@ class TableFit:
 
 
 def fit_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
-    """Fit the shaker to weak noise and compare its mass with the bench; None without a described shaker.
+    """Fit the shaker to weak noise and compare its mass with the described one; None without a description.
 
     The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when no
     shaker explains the transmission from voltage to base.

@@ -17,7 +17,7 @@ _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
 """Usual length [s] and minimum number of the pieces into which the drive is divided to compare energies."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""A drive of hits has over 0.9 of its energy in the strongest 0.05 of the time; noise has 0.06 of it."""
+"""In the strongest 0.05 of the time, a drive of hits has over 0.9 of its energy, and noise has 0.06."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0

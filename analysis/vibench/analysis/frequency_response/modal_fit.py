@@ -269,7 +269,7 @@ class Lines:
 
     @property
     def narrowest_hz(self) -> float:
-        """Smallest half-power bandwidth whose damping a boxcar window resolves [Hz]; 0 for other windows."""
+        """Smallest half-power bandwidth [Hz] at which a boxcar resolves damping; 0 for other windows."""
         leakage = self._leakage
         return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
 

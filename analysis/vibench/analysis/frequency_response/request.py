@@ -41,7 +41,7 @@ class FrequencyResponseView:
 
     @property
     def power(self) -> int:
-        """Power of i omega relative to displacement over displacement; 0 for a force."""
+        """Power of i omega that converts displacement over displacement to this view; 0 for a force."""
         return 0 if self.is_force else self.response.derivatives - self.base.derivatives
 
     @property

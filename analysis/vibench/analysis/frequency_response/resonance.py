@@ -24,7 +24,7 @@ from .results import FrequencyResponse
 _REACH_BANDWIDTHS = 2.0
 """Largest distance from a peak [half-power bandwidths] at which spectral lines are used in its fit."""
 _LEAST_LINES = 8
-"""Minimum number of lines for a fit: 8 complex values determine 2 pole and up to 10 linear parameters."""
+"""Minimum number of lines for a fit: 8 complex values determine a pole (2) and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
 """Minimum height of a peak above the valley beside it, in standard deviations of the difference."""
 _MOST_MODES = 3

@@ -30,7 +30,7 @@ class Estimator(StrEnum):
 
 
 def require_estimator(estimator: Estimator, noise_ratio: float | None, confidence: float) -> None:
-    """Raise InvalidRequest for a missing, useless or invalid noise ratio, and for an invalid confidence."""
+    """Raise InvalidRequest for a missing, unneeded or invalid noise ratio, and for an invalid confidence."""
     if estimator is Estimator.HV and noise_ratio is None:
         raise InvalidRequest(
             "hv was requested without a noise ratio; give the ratio of the noise densities of "
@@ -158,7 +158,7 @@ class FrequencyResponse(Tabular):
         return replace(self, value=turned, settings=settings)
 
     def without_gain(self, gain: Complexes) -> "FrequencyResponse":
-        """Divide by the gain ratio of the response sensor to the drive sensor, shape (lines,)."""
+        """Divide by the ratio of the response sensor's gain to the drive sensor's, shape (lines,)."""
         return replace(self, value=self.value / gain)
 
     def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
