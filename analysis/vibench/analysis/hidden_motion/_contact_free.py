@@ -225,7 +225,7 @@ def free_loss(impacts: FreeImpacts) -> float | None:
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
-    """Return the gap from each impact: |p| minus the depth for its impulse [m], shape (impacts,).
+    """Return the gap from each impact: |p| minus the depth for this impulse [m], shape (impacts,).
 
     NaN on a side with too few impacts.
     """

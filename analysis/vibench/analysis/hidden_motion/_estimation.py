@@ -210,7 +210,7 @@ _FREE_S = 3.0
 def search_start(
     described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
-    """Return start values found without a contact model, with their prior or the reason if it is missing."""
+    """Return start values found without a contact model, and their prior; without a prior, the reason."""
     rate = motion.sample_rate_hz
     fitted, sds = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)

@@ -16,7 +16,7 @@ from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_ta
 _DIFFUSION_OF_GAP = 7e-6
 """Model error: random displacement of each mass relative to the gap, per root millisecond."""
 _DIFFUSION_OF_SPEED = 2e-5
-"""Random velocity of each mass relative to gap times highest natural frequency, per root millisecond."""
+"""Random velocity of each mass relative to (gap x highest natural frequency), per root millisecond."""
 _DRIFT_M_PER_S2 = 1e-3
 """Random walk of the accelerometer's slow error [m/s2] per root second."""
 _ACCELERATION_EXCESS = 1.5

@@ -59,7 +59,7 @@ class Forecaster:
     ) -> Forecast | None:
         """Return the forecast of p after ``at``; ``states`` are the states at the newest samples.
 
-        None if the filter cannot follow the forecast base motion to its end.
+        None if the filter cannot follow the forecast base motion to the end.
         """
         rate = motion.sample_rate_hz
         numbers = motion.first_sample + at.sample - np.arange(states.shape[0] - 1, -1, -1)

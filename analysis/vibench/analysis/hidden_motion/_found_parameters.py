@@ -24,11 +24,11 @@ from ._tracking_model import TrackedSpecimen
 _STRETCH_S = 1.2
 """Length of the part of the motion in which each restart searches for parameters [s]."""
 _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
-"""Smallest and largest number of restarts; in a short motion, they differ only in their start values."""
+"""Smallest and largest number of restarts; in a short motion, restarts differ only in start values."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
-"""Largest mean squared innovation of a track with which the described parameters are only refined."""
+"""The described parameters are only refined if a track's mean squared innovation is at most this."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts [standard deviations] of gaps found without a contact model, tried if tracking fails."""
 _LARGEST_SD = 0.5

@@ -78,7 +78,7 @@ class MassCheck:
 
 @dataclass
 class MeasuredMass:
-    """A sensor on m1 or m2 over the samples of a motion, compared with the pieces of a track."""
+    """A sensor on m1 or m2 during a motion, compared with the pieces of a track."""
 
     channel: str
     velocity: Reals
@@ -120,7 +120,7 @@ class MeasuredMass:
 
 
 def measured_masses(recording: Recording, motion: PreparedMotion) -> Iterator[MeasuredMass]:
-    """Yield the sensors on m1 and m2 over the samples of a motion, corrected for their dynamics."""
+    """Yield the signals of sensors on m1 and m2 during a motion, corrected for sensor dynamics."""
     rate_hz, start = motion.sample_rate_hz, motion.first_sample
     stop = start + motion.samples
     for role in response_roles(recording):

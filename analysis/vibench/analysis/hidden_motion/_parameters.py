@@ -40,7 +40,7 @@ class Search(NamedTuple):
     """Smallest prior standard deviation about a value found without a contact model."""
     claimed: float = 1.0
     """Ratio of actual errors to the filter's standard deviation; the random walk makes the ratio smaller than
-    1. It was determined on 31 random rigs; the slow tests check other rigs."""
+    1. The ratio was determined on 31 random rigs; the slow tests check other rigs."""
 
 
 SEARCHES = {

@@ -190,7 +190,7 @@ def _join_runs(one: FilterPredictions, other: FilterPredictions) -> FilterPredic
 
 
 def reliable_samples(run: FilterPredictions, sample_rate_hz: float) -> int:
-    """Return the number of samples in a lost run up to the last good innovations."""
+    """Return the number of samples up to the last good innovations in a run that lost the track."""
     squared = run.nis
     used = ~np.isnan(squared)
     width = max(1, round(_LOOK_S * sample_rate_hz))

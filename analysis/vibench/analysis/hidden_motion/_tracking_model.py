@@ -12,7 +12,7 @@ from ..errors import InvalidRequest
 from ..signals.arrays import Reals
 
 STATES = 8
-"""States: X, Y, Z and their rates relative to the base, base velocity W, error B of its acceleration, SI.
+"""States: X, Y, Z and their rates relative to the base, base velocity W, error B of the acceleration, SI.
 
 Deviations of the estimated parameters follow these states. Equations: docs/hidden-motion.md.
 """

@@ -14,7 +14,7 @@ from ._outline import Samples
 from ._ring import RingWindow
 
 _LEAST_SHARE = 0.5
-"""Minimum fraction of a signal's power near its strongest spectral line if the signal is a sine."""
+"""Minimum fraction of the power near the strongest spectral line for a signal to count as a sine."""
 _NEIGHBOURS = 3
 """Number of neighbouring lines on each side; enough for a sine under a Hann window, even in a slow sweep."""
 _LEAST_LINE = 4
@@ -96,7 +96,7 @@ _STRETCH_PERIODS = 25
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
 _LEAST_KEPT = 0.9
-"""Minimum ratio of final to initial drive amplitude in a point's samples; a lower ratio is a ramp-down."""
+"""Minimum ratio of final to initial drive amplitude in a point's samples; a lower ratio means a ramp-down."""
 _STEEPEST_POWER = 2
 """Largest n in a sweep whose voltage is proportional to frequency^n (constant displacement)."""
 

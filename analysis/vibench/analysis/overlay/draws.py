@@ -106,7 +106,7 @@ class UnseenNoise:
     """Standard deviation of the estimated variance [V²]."""
 
     def random_rms_v(self, rng: np.random.Generator) -> float:
-        """Return a random rms of the noise per sample, within its uncertainty [V]."""
+        """Return a random rms noise per sample, within the uncertainty of the noise [V]."""
         return float(np.sqrt(max(0.0, self.power + self.sd * rng.standard_normal()))) if self.sd else 0.0
 
 
@@ -168,7 +168,7 @@ _FRAME_SAMPLES = 1 << 15
 _BATCH_FRAMES = 16
 """Number of frames per batch of about 10 MB."""
 _LEVEL_LINES = 256
-"""Number of lines whose median is the noise level; a few lines of the drive hardly change it."""
+"""Number of lines whose median is the noise level; a few lines of the drive hardly change this level."""
 _SURELY = 20.0
 """Ratio of a line's power to the noise level; noise alone exceeds this ratio once in 5e8 lines."""
 
@@ -267,7 +267,7 @@ CLOCK_TOLERANCE = 50e-6
 _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
 """Lead-in before the evaluated part, fade-in at the start of the lead-in, fade-out after the part [s]."""
 _NOISE = 0.15
-"""Uncertainty of the natural logarithm of a channel's noise, which is estimated in its quietest part."""
+"""Uncertainty of ln(noise of a channel); the noise is estimated in the channel's quietest part."""
 _MORE = 3
 _HOPELESS = 0.2
 """No more draws are made if enough draws for a comparison are less probable than this."""

@@ -126,7 +126,7 @@ class SimulatedChannels(RecordedChannels):
 def under_base_motion(
     recording: Recording, measurement: Measurement, specimen: Specimen
 ) -> SimulatedChannels:
-    """Simulate a specimen from rest, driven by the base motion of a recording, at its full sample rate.
+    """Simulate a specimen from rest, driven by a recording's base motion, at the recording's full rate.
 
     Raises UnusableData when samples were lost, or the simulation did not finish.
     """

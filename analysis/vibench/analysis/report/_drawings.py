@@ -218,7 +218,7 @@ def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
 
 
 def _opposite_sweeps(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
-    """Pair each upward sweep with the first downward sweep of the same level that overlaps its band."""
+    """Pair each upward sweep with the first downward sweep of the same level and an overlapping band."""
     for up in sweeps:
         plan = up.analysis.excitation
         for down in sweeps:
@@ -267,7 +267,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
 STEPPED: Drawing[Any, Any] = Drawing(
     _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
 )
-"""Presentation of stepped recordings; other packages may replace parts of it for their kinds."""
+"""Presentation of stepped recordings; other packages may replace parts for their kinds of excitation."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(

@@ -18,7 +18,7 @@ from ..figures.style import DrawnFigure
 
 Rows = tuple[tuple[str, str], ...]
 LONGEST_CAPTION = 225
-"""Maximum number of characters of title and caption together, which fill three lines of a figure's column."""
+"""Maximum number of characters of title and caption together: three lines of a figure's column."""
 MOST_OPEN_CARDS = 12
 """Maximum number of cards shown unfolded, which keeps the page short."""
 _LARGEST_SVG_BYTES = 300_000

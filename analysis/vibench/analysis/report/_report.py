@@ -171,7 +171,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
-    """Draw each map, with levels and Response I of stepped sines and sweeps on it."""
+    """Draw each map, overlaid with levels and Response I of stepped sines and sweeps."""
     levels = _recorded_levels(results, CurveKind.RESPONSE_I)
     for number, found in enumerate(maps, start=1):
         drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())

@@ -245,7 +245,7 @@ def without_copies(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
 
 
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
-    """Return the channels other than m0's, each with the recordings that contain it.
+    """Return the channels other than m0's, each with the recordings that contain this channel.
 
     A force channel is included only for noise recordings, where it gives the apparent mass. Unreadable
     recordings are left out; their analysis reports the reason.

@@ -122,7 +122,7 @@ class Decimator:
         self._given = 0
 
     def add(self, block: Reals) -> Reals:
-        """Add samples, shape (channels, n), and return the output that is complete, shape (channels, m)."""
+        """Add samples, shape (channels, n), and return the completed output samples, shape (channels, m)."""
         self._received += block.shape[1]
         if self._factor == 1:
             return block

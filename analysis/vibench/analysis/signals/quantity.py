@@ -120,7 +120,7 @@ def converted_signal(
 
 @dataclass(frozen=True, eq=False)
 class SteadyLine:
-    """Steady sine of known frequency: the real part of a rotating phasor, the product of rows and columns."""
+    """Steady sine of known frequency: real part of a phasor that is the product of row and column factors."""
 
     rows: Complexes
     """Phasor at the first sample of every row, shape (rows,)."""

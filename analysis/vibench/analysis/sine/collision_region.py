@@ -16,7 +16,7 @@ _NOISE_FACTOR = 4.0
 _DISTORTION = 0.02
 """Largest residual of a smooth motion relative to order 1, from high harmonics of amplifier and shaker."""
 _RINGING = 2.0
-"""Minimum ratio of the residual to the residual that a simulation of the sweep without contact has."""
+"""Minimum ratio of the residual to the residual in a simulation of the sweep without contact."""
 _TOO_FAST = 0.5
 """Residual relative to order 1 that collisions usually exceed; larger ringing can hide collisions."""
 _IMPACTS = 0.1

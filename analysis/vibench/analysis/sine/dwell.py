@@ -132,7 +132,7 @@ _FEWEST_BLOCKS = 4
 _SLOW = 0.5
 """Largest correlation of neighbouring random blocks; ten random blocks exceed it in 1 % of records."""
 _ONCE = 0.5
-"""Fraction of the variance at one cycle per record above which the change may continue after the record."""
+"""If more than this fraction of the variance is at one cycle per record, the change may still continue."""
 _TREND, _CLEAR_TREND = 2.0, 8.0
 """Ratios of a trend's square to its variance: random below the first value, slow change above the second.
 
@@ -291,7 +291,7 @@ class DwellResponse(Tabular):
     noise_displacement_m: float
     """RMS displacement noise [m]: from the velocity noise or, if larger, as measured without drive."""
     displacement: ConvertedSignal
-    """x over the record [m]; the window lies in its settled part."""
+    """x over the record [m]; the window lies in the settled part."""
     is_clear: Flags
     """Flags of the window's samples that no drop-out affects, shape (samples,)."""
     spectrum: AmplitudeSpectrum

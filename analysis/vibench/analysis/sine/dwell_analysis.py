@@ -36,7 +36,7 @@ _CLEAR_MOTION = 0.8
 """Minimum fraction of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Deviation of a maximum from the median, relative to the median deviation, that only a burst exceeds."""
+"""Only a burst has a maximum that deviates from the median by more than this many median deviations."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
@@ -226,7 +226,7 @@ _REACH = 0.1
 
 @dataclass(frozen=True)
 class TerminalLevel:
-    """Displacement within a band around a frequency, such as that of a bound mode."""
+    """Displacement within a band around a frequency, such as a bound mode's frequency."""
 
     DOCUMENT: ClassVar = "towards_hz low_hz high_hz peak_hz rms_m relative_sd decibel_re_drive_line=decibel"
 

@@ -64,7 +64,7 @@ class SteppedResponse(Tabular):
     direction: tuple[str, ...]
     """Direction of each step, ``"up"`` or ``"down"``."""
     amplitude_vpp: Reals
-    """Generator voltage, peak to peak [V]; NaN if feedback set it."""
+    """Generator voltage, peak to peak [V]; NaN if feedback set the voltage."""
     drive_amplitude_m: Reals
     sd_drive_amplitude_m: Reals
     response_i: Reals
@@ -199,7 +199,7 @@ class NotedJump:
 
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Return the jumps between two frequencies that are as close together as requested."""
+    """Return the jumps whose two frequencies are as close together as requested."""
     return tuple(
         NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
         for each in notes

@@ -30,7 +30,7 @@ from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
-"""Margin on each side of the drive's band, relative to the band's end; the filter falls in its outer half."""
+"""Margin beside the drive's band, relative to the band's end; the filter falls in the margin's outer half."""
 _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
@@ -121,10 +121,10 @@ _LINES = 1 << 15
 _BRIDGE_PERIODS = 3.0
 """Periods of the lower band edge in which an error from bridging decays from 3 to 0.02 times the motion."""
 _ROOM = 1.1
-"""Factor on the length of the longer intervals, because the first one may start slightly below the band."""
+"""Factor on the length of the longer intervals, because the first may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
-"""Sixth difference with unit gain for white noise, which removes the smooth motion."""
+"""Sixth difference, which removes the smooth motion and has unit gain for white noise."""
 
 
 @dataclass(frozen=True)

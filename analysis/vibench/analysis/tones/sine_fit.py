@@ -16,7 +16,7 @@ from ..spectra.spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spec
 from .order_tracking import track_orders
 
 _NOISE_NEIGHBOURS = 50
-"""Number of spectral lines on each side of a peak whose median is the noise floor."""
+"""Number of spectral lines on each side of a peak; the median of these lines is the noise floor."""
 _LEAST_RATIO = 5.0
 """Smallest ratio of a peak to the noise floor."""
 

@@ -1,4 +1,4 @@
-"""Expected uncertainty of a plan before the measurement, and recording times that reach its targets."""
+"""Expected uncertainty of a plan's results, and recording times that reach the plan's targets."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -121,7 +121,7 @@ def _scatter(found: DwellResponse) -> tuple[float, float]:
 
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
-    """Return the peak voltage at the terminal: as set, or as feedback needs for its base level."""
+    """Return the peak voltage at the terminal: as set, or as feedback needs for the base level."""
     excitation = measurement.excitation
     if not isinstance(excitation, HeldDwell):
         return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()

@@ -1,4 +1,4 @@
-"""Uncertainty budgets of each kind of measurement: the causes that act on its results, and their sizes."""
+"""Uncertainty budgets of each kind of measurement: the causes of uncertainty, and their sizes."""
 
 from collections.abc import Iterator
 from dataclasses import replace
