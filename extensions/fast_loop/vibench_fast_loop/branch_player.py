@@ -1,4 +1,4 @@
-"""Player of settings on a fast loop, which measures base and m0 until their standard errors are small."""
+"""Player of controller settings; it measures base and m0 until the standard errors are small."""
 
 from collections.abc import Generator
 from dataclasses import dataclass

@@ -230,7 +230,7 @@ _EACH = 5
 _LEAD, _TRIAL = 3, 8
 """Number of changes before the evaluated changes; number of changes in the trial that finds the size."""
 _CHANGED = (0, 2)
-"""Indices of the perturbed coefficients (first and third harmonic); the specimen drives the table at both."""
+"""Indices of the perturbed coefficients: first and third harmonic, at which the specimen drives the table."""
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
 """Size of the drive's changes in the trial, and their maximum size, relative to the first coefficient."""
 _SAME, _ERRORS = 0.01, 3.0

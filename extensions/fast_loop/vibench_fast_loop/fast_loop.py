@@ -1,4 +1,4 @@
-"""Law of a rig's fast loop, calibration of its coefficients, and prediction of whether it holds a branch."""
+"""Law and calibration of a rig's fast loop, and a prediction of whether the loop holds a branch."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -65,8 +65,8 @@ class FastLoop:
     def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
         """Return the harmonics of the displacements of base and m0 [m], shapes (blocks, orders).
 
-        A sample is the mean since the previous sample, which delays it by half a step and attenuates it
-        slightly; both effects are corrected.
+        A sample is the mean since the previous sample, so it is late by half a step and slightly too small.
+        Both effects are corrected.
         """
         orders, rate_hz = np.arange(1, len(blocks[0].base)), self.plant.timing.rate_hz
         turning = 2j * pi * frequency_hz * orders

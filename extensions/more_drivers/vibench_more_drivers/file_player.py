@@ -98,7 +98,7 @@ class FilePlayer:
     def read(self, samples: int) -> Block:
         """Return the next samples.
 
-        Raises InstrumentLost at the end of the recording, DataLost at a gap of the recording.
+        Raises InstrumentLost at the end of the recording, DataLost at a gap in the recording.
         """
         if not self._is_running or samples < 1:
             raise InstrumentError(
