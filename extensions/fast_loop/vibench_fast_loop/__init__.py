@@ -1,7 +1,7 @@
 """The fast loop: a real-time controller that holds branches of periodic motion, stable or unstable.
 
-An extension of vibench that is found by the entry points in its ``pyproject.toml``. It adds a kind of
-excitation with its controller, analysis, figure and form, the drive, and the simulated instrument.
+An extension of vibench that is found by the entry points in its ``pyproject.toml``. It adds the drive, the
+simulated instrument, and a kind of excitation with its controller, analysis, figure and form.
 
 A controller samples base and m0, and sets the amplifier voltage after a latency. `plant` models one control
 step of table, specimen and delayed voltages. `law` designs a linear law that damps the specimen (a Kalman

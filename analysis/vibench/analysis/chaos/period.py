@@ -63,7 +63,7 @@ class Points(Tabular):
 
 
 def shortest_period(points: Points) -> int | None:
-    """Return the fewest drive periods after which all points repeat within noise; None if they do not.
+    """Return the smallest number of drive periods after which all points repeat within noise, or None.
 
     To test period n, every nth point is compared over the whole record, because slow changes are small from
     one period to the next. In addition to their noise, these points may scatter by 0.2 % of the orbit

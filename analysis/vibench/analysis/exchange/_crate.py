@@ -1,6 +1,6 @@
 """Pack a folder of recordings as a Research Object Crate, a zip file for a data repository.
 
-In RO-Crate 1.1, ``ro-crate-metadata.json`` describes every file. For recordings it also contains the
+In RO-Crate 1.1, ``ro-crate-metadata.json`` describes every file. For recordings, it also contains the
 excitation, the reason why the run ended, channels, units and software.
 """
 

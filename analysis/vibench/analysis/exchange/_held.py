@@ -40,8 +40,8 @@ def held_values(
     """Yield first sample, end and description of each stretch without new values.
 
     A driven channel is not constant for a period of the lowest frequency. Exceptions are weak signals of a
-    coarse converter (also until the next hit or burst), and exact zeros before a hit or, in drive and base,
-    between hits or bursts.
+    coarse converter (also until the next hit or burst), exact zeros before a hit, and exact zeros between
+    hits or bursts in drive and base.
     """
     quantity, _ = mapped.kind
     if mapped.role not in KNOWN_ROLES and quantity not in _VIBRATING:

@@ -164,8 +164,8 @@ def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Onse
 
     The lower bound is the largest relative motion without collisions at which m0 moves as predicted, because
     masses may also collide smoothly. The upper bound is the smallest linear motion of a colliding dwell,
-    unless its collisions may persist from a higher level or another frequency. As collisions disturb the
-    base, this motion is scaled from the largest dwell without collisions by the generator amplitude.
+    unless its collisions may persist from a higher level or another frequency. Collisions disturb the base,
+    so this motion is scaled from the largest dwell without collisions by the generator amplitude.
     """
     rest = list(dwells)
     while rest:

@@ -41,7 +41,7 @@ _MOST_EXCESS = 1.25
 _ALLOWED = 0.02
 """Allowed relative deviation of a sensor from the track due to mounting, alignment and local modes."""
 _MOST_EXPECTED = 0.2
-"""Largest expected deviation for a verdict; impacts act as noise in an accelerometer on a colliding mass."""
+"""Largest expected deviation with a verdict; impacts act as noise in an accelerometer on a colliding mass."""
 _MOST_SCALE = 0.05
 """Largest deviation of measured / tracked velocity from 1; calibrations may err by a few per cent."""
 

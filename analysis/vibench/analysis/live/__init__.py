@@ -2,7 +2,7 @@
 
 Live pictures cover the newest seconds: time histories, spectra, transmission, Responses I and II, phase
 portrait, levels and impact count. Each picture is computed when it is drawn. A finished recording is drawn
-from the smallest and largest of every 128 samples, which its file contains (docs/decisions/0020-overview.md).
+from the smallest and largest of every 128 samples, which its file stores (docs/decisions/0020-overview.md).
 An impact of three samples is therefore always visible. This package imports no Qt.
 
 >>> import numpy as np

@@ -1,6 +1,6 @@
 """Analyse recordings and campaigns, each recording by the excitation in its plan.
 
 The result of a recording is a noise, sweep, dwell or stepped-sine result, with or without an overlaid
-simulation. A recording that cannot be analysed is reported with the reason, and the others continue. Results
-are also available as JSON, with units in the keys and an uncertainty for each number.
+simulation. A recording that cannot be analysed is reported with the reason; the others are still analysed.
+Results are also available as JSON, with units in the keys and an uncertainty for each number.
 """

@@ -371,8 +371,8 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
     Returns
     -------
-    Budgets (JCGM 100:2008). A dwell has budgets for A0 and Responses I and II, a sweep or stepped sine for
-    its largest responses, noise for frequency, damping and transmissibility at each resonance. Budgets of a
+    Budgets (JCGM 100:2008). They cover A0 and Responses I and II of a dwell, the largest responses of a sweep
+    or stepped sine, and frequency, damping and transmissibility of each resonance in noise. Budgets of a
     recording that lasted until a bound was met are widened: see `Budget.widen`.
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.overlay)

@@ -36,7 +36,7 @@ def standard_uncertainty(values: Reals | Complexes) -> float:
     """Return the standard uncertainty of the mean of a few values; twice this value covers 95 % of cases.
 
     The uncertainty is the standard error times the ratio of Student's t to the normal deviate (JCGM 100:2008,
-    G.3.2). For complex values it applies to the real and to the imaginary part separately.
+    G.3.2). For complex values, this applies to the real and to the imaginary part separately.
     """
     count, parts = values.size, 2 if np.iscomplexobj(values) else 1
     error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)

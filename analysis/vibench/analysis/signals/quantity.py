@@ -91,7 +91,7 @@ def converted_signal(
         The band to keep, 0 < low < high <= half the sample rate; choose ``low_hz`` well below the
         lowest line of interest and above the drift.
     lines_hz
-        Frequencies of steady lines, if known. Those in the band are converted in closed form, because a line
+        Frequencies of steady lines, if known. Lines in the band are converted in closed form, because a line
         cut off at an end would ring by 3e-4 at the band edge.
     """
     if not 0 < low_hz < high_hz <= sample_rate_hz / 2:

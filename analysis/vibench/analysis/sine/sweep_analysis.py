@@ -59,8 +59,8 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
     """Return the jumps of Response II that have a smooth motion on at least one side.
 
-    Without a description of the specimen, only jumps where collisions begin or end are returned: others may
-    be the ringing of a fast sweep.
+    Without a description of the specimen, only jumps where collisions begin or end are returned: other jumps
+    may be the ringing of a fast sweep.
     """
     smooth = ~colliding.is_colliding
     where = (response.time_s, response.frequency_hz, response.response_ii, smooth)

@@ -35,10 +35,10 @@ class Peak:
 def largest_peak(spectrum: AmplitudeSpectrum, low_hz: float, high_hz: float) -> Peak | None:
     """Return the largest peak of a Hann spectrum in a band; None if no peak stands above the noise.
 
-    For a sine between two lines, d = (2a - 1) / (a + 1) is its distance from the larger line [lines]; a is
-    the ratio of the smaller to the larger line (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355). The
-    amplitude is the larger line times (pi d / sin(pi d)) (1 - d^2). The band must be at least two lines away
-    from 0 and from half the sample rate.
+    For a sine between two lines, d = (2a - 1) / (a + 1) is the sine's distance from the larger line [lines];
+    a is the ratio of the smaller to the larger line (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
+    The amplitude is the larger line times (pi d / sin(pi d)) (1 - d^2). The band must be at least two lines
+    away from 0 and from half the sample rate.
     """
     amplitude = spectrum.amplitude
     first = max(2, int(np.ceil(low_hz / spectrum.spacing_hz)))

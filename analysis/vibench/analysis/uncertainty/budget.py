@@ -113,8 +113,8 @@ class Budget(Tabular):
         """Return the widened budget of a recording that ended when its scatter was small enough.
 
         Such a recording often ends because its scatter is underestimated. The factor gives 95 % coverage for
-        any target: `benchmarks/until_coverage.py --rule`. It applies to Gaussian records of ten parts that
-        are checked up to nine times, at intervals that grow by the square root of two.
+        any target: `benchmarks/until_coverage.py --rule`. The factor applies to Gaussian records of ten parts
+        that are checked up to nine times, at intervals that grow by the square root of two.
         """
         parts = tuple(
             replace(each, relative=WIDENING * each.relative, source=f"{each.source}, which ended the record")

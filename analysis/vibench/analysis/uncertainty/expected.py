@@ -206,8 +206,8 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
     """Return the expected uncertainty of a plan's results; opens no instrument.
 
     For noise, the results are frequency, damping and transmissibility at each resonance of the linear
-    specimen. For a sine, they are both Responses over at most 5 s. The random error of a Response is the
-    scatter of three simulated runs, analysed like recordings; it is not stated if the runs settle on
+    specimen. For a sine, the results are both Responses over at most 5 s. The random error of a Response is
+    the scatter of three simulated runs, analysed like recordings; it is not stated if the runs settle on
     different motions. This error falls with the square root of the time. Other kinds of plan, and rigs
     without a channel for the motion of m0 or for the acceleration of the base, have no expected results.
 
