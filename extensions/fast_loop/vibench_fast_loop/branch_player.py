@@ -51,7 +51,7 @@ class LoopLook:
 
     @property
     def ratio_u(self) -> float:
-        """Standard error of the real and of the imaginary part of this ratio."""
+        """Standard error of the real and of the imaginary part of `ratio`."""
         shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
         return float(abs(self.ratio) * np.hypot(*shares))
 

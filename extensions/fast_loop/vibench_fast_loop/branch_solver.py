@@ -46,7 +46,7 @@ class MeasuredPoint:
     ratio: complex
     """Complex ratio of the fundamentals of m0 and base."""
     noise: Vector
-    """Standard errors of the residual, and of the real and the imaginary part of this ratio."""
+    """Standard errors of the residual, and of the real and the imaginary part of `ratio`."""
 
     @property
     def place(self) -> Vector:

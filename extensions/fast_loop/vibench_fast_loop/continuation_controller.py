@@ -65,7 +65,7 @@ most this fraction of the level. Both limits are small, because a motion with im
 _SLOPES = 0.05, 1.0
 """Bounds on the slope, the change of the base level per step of the first coefficient, at the start."""
 _LEAST_CHANGE = 0.01
-"""Smallest change of the first coefficient from which this slope is computed [steps]."""
+"""Smallest change of the first coefficient [steps] from which the slope of the base level is computed."""
 _CLOSER, _CLOSE = 0.3, 0.7
 """Fractions of the tolerance used for fundamental and harmonics; small, because folds move with the level."""
 _BEND_HZ = 0.05

@@ -32,7 +32,7 @@ class Points(Tabular):
     value: Reals
     """Displacement and velocity, each divided by the size of the orbit, shape (periods, 2)."""
     noise: Reals
-    """Standard deviation of the noise of displacement and velocity, divided by the same sizes, shape (2,)."""
+    """Standard deviation of the noise of each coordinate, divided by the size of the orbit, shape (2,)."""
 
     def __post_init__(self) -> None:
         """Raise InvalidRequest for wrong shapes or invalid noise, UnusableData for non-finite points."""

@@ -198,7 +198,7 @@ class ChainAnswer(Tabular):
 SAMPLES_PER_PERIOD = 8
 """Samples per period of the highest relevant frequency, enough for mean energies."""
 MOST_NUMBERS = 3e7
-"""Maximum number of values stored for a run: 0.25 GB."""
+"""Maximum number of values stored for a run; they take 0.25 GB."""
 SHOWN_PERIODS = 16
 STRETCHES = 400
 """Maximum number of equal parts of a sweep or recording; the RMS of each part is shown."""

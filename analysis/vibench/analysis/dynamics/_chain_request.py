@@ -24,7 +24,7 @@ class ChainDrive(StrEnum):
     NONE = "none"
     """No motion: only bands, gaps and transmissibility without contact."""
     STEADY = "steady"
-    """A steady sine at each frequency, each from rest."""
+    """A steady sine at each frequency, starting from rest."""
     SWEPT = "swept"
     """A linear sine sweep, up or down."""
     RECORDED = "recorded"
@@ -41,11 +41,11 @@ class ChainRequest(SpecimenChoice):
     drive: ChainDrive = ChainDrive.STEADY
     """Drive of the base: none, a steady sine, a sweep, or a recorded motion."""
     amplitude_m: PositiveFloat = 20e-6
-    """Amplitude of the base displacement of a sine."""
+    """Amplitude of the base displacement of steady sines or a sweep."""
     start_hz: PositiveFloat = 220.0
-    """First frequency of a sine."""
+    """First frequency of steady sines or a sweep."""
     stop_hz: PositiveFloat = 220.0
-    """Last frequency of a sine; below the first for a sweep downwards."""
+    """Last frequency of steady sines or a sweep; below the first for a downward sweep."""
     step_hz: PositiveFloat = 10.0
     """Step between the frequencies of steady sines."""
     recording: str = ""

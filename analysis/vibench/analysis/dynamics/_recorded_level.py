@@ -15,7 +15,7 @@ class RecordedLevel:
 
     name: str
     pairs: Sequence[tuple[float, float]]
-    """Frequency [Hz] and amplitude of the base [m]."""
+    """Frequency [Hz] and base amplitude [m]."""
     measured: Sequence[Curve]
     """Curves of Response I of m0."""
     specimen: Specimen | None

@@ -123,7 +123,7 @@ def _tables(recording: Recording) -> Iterator[Table]:
 
 
 def _table(name: str, arrays: Mapping[str, ResultArray], axes: tuple[str, ...]) -> Table:
-    """Return one table of all arrays with these axes, with one row per grid point."""
+    """Return one table of all arrays with the given axes, with one row per grid point."""
     grid = np.meshgrid(*(arrays[axis].values for axis in axes), indexing="ij")
     columns = {f"{axis} [{arrays[axis].unit}]": values for axis, values in zip(axes, grid, strict=True)}
     for key, array in arrays.items():

@@ -65,7 +65,7 @@ class ChannelMapping(FrozenModel):
     """Name of the channel in the file, as `vibench import FILE` lists it."""
     role: str = Field(pattern=f"^{ROLE_PATTERN.pattern}$")
     """Name of the channel in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``,
-    ``m0_acceleration``, ``m0_displacement``, or any other."""
+    ``m0_acceleration``, ``m0_displacement``, or any other name."""
     quantity: str = ""
     unit: str = ""
     """Unit of the value in UDUNITS notation; may be left out for the channels that an analysis needs."""

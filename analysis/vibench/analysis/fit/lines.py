@@ -25,7 +25,7 @@ The line's own scatter is estimated from few averages. If it were used, lines wi
 would be selected, and a correct model refused.
 """
 _NEIGHBOURS = 31
-"""Number of neighbouring spectral lines for the median scatter."""
+"""Number of neighbouring spectral lines over which the median scatter is taken."""
 _MOST_OFF = np.log(1e4)
 """Largest |ln| of the ratio of a parameter to its value at the start of the search."""
 LEAST_DAMPING_TIME_S = 1e-8
@@ -130,7 +130,7 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Return the specimen with these parameters, each limited to `_MOST_OFF` from its start value."""
+        """Return the specimen with the given parameters, each limited to `_MOST_OFF` from its start value."""
         begun = self.start[: len(self.free)]
         values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))

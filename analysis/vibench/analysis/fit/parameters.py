@@ -65,7 +65,7 @@ class FittedValue:
     value: float
     low: float
     high: float
-    """Bounds with the confidence of the fit."""
+    """Bounds at the confidence level of the fit."""
     sd: float
     """Standard deviation; NaN if only bounds are known."""
     nominal: float

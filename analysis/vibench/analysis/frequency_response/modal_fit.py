@@ -70,12 +70,12 @@ class Resonance:
 
     @property
     def quality_factor(self) -> float:
-        """Quality factor, 1 / (2 damping ratio)."""
+        """Quality factor: 1 / (2 x damping ratio)."""
         return 0.5 / self.damping_ratio
 
     @property
     def half_power_bandwidth_hz(self) -> float:
-        """Half-power bandwidth, 2 damping ratio times frequency."""
+        """Half-power bandwidth: 2 x damping ratio x frequency."""
         return 2 * self.damping_ratio * self.frequency_hz
 
 
@@ -224,7 +224,7 @@ _FINE_POINTS = 401
 _STEP = 1e-6
 _WORST_CONDITION = 1e14
 _MOST_STEPS = 40
-"""Maximum number of steps of a fit."""
+"""Maximum number of iteration steps of a fit."""
 _STEADY_AVERAGES = 49.0
 """Equivalent number of averages of a scatter that is smoothed over neighbouring spectral lines."""
 _LEAST_LINES_ABOUT = 8
@@ -365,7 +365,7 @@ class _Sums:
         return self._lines.independent(_rates(self._lines.modes, poles, factors))
 
     def misfit(self, poles: Reals) -> Reals:
-        """Return the residual with the best factors for these poles."""
+        """Return the residual with the best factors for the given poles."""
         return self.factors(poles)[1]
 
     def misfit_rates(self, poles: Reals) -> Reals:

@@ -56,7 +56,7 @@ class Scan:
 
     @property
     def points(self) -> tuple[ScanPoint, ...]:
-        """Point of the specimen in each measurement."""
+        """Measured point of the specimen, one per measurement."""
         return tuple(point for each in self.analyses if (point := each.facts.measurement.point) is not None)
 
     @property

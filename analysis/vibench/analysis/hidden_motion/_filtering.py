@@ -130,7 +130,7 @@ class FilterPredictions:
 
     @property
     def record(self) -> Structure:
-        """Return the record for the native engine."""
+        """Return these predictions as a `TrackRecord` for the native engine."""
         return native_engine().new("TrackRecord", **self.arrays)
 
 

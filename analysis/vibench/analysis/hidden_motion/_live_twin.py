@@ -257,7 +257,7 @@ class LiveTwin:
 
     def _begin_anew(self, sample: int) -> None:
         self.next_sample = sample
-        """Index of the next sample in the recording."""
+        """Index of the next sample, counted from the start of the recording."""
         self._raw, self._used = np.empty((2, 0)), HALF_LENGTH
         nothing = np.empty(0)
         self._motion = PreparedMotion(

@@ -59,12 +59,12 @@ def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
 
 @dataclass(frozen=True, eq=False)
 class StepTables:
-    """Tables of a specimen for the filter."""
+    """Tables that the filter needs for a specimen."""
 
     flow: Reals
     """Matrix from state, base acceleration and its increment to the next state, no stops; shape (8, 10)."""
     small_flow: Reals
-    """The same matrix for a small step, shape (8, 10)."""
+    """Matrix like `flow`, but for a small step, shape (8, 10)."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""

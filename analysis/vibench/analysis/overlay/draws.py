@@ -434,7 +434,7 @@ def all_draws(
 
 
 def _chance_of_enough(alike: float, made: int, most: int) -> float:
-    """Return the chance that `FEWEST_DRAWS` of ``most`` draws are alike, after ``alike`` of ``made`` were."""
+    """Return the chance of `FEWEST_DRAWS` alike draws in ``most``, given ``alike`` in the first ``made``."""
     further = scipy.stats.betabinom(most - made, 1 + alike, 1 + made - alike)
     return float(further.sf(FEWEST_DRAWS - alike - 1))
 

@@ -43,7 +43,7 @@ class Jump:
     time_s: float
     before: float
     after: float
-    """Response before and after, in the order of time."""
+    """Response before and after the jump, in the order of time."""
     standard_errors: float
     """Size of the jump in ln(response), divided by its standard error."""
 
@@ -197,7 +197,7 @@ class LevelJump:
     before_vpp: float
     after_vpp: float
     factor: float
-    """Response II after the jump divided by Response II before."""
+    """Response II after the jump divided by Response II before the jump."""
 
 
 def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:

@@ -294,7 +294,7 @@ class TrackedResonance:
     harmonic: int
     """Harmonic of the drive at which m0 resonates."""
     subharmonic: int
-    """Number of drive periods in a period of m0."""
+    """Number of drive periods in one period of m0's motion."""
     mode_hz: float | None
     """Natural frequency, fitted to both flanks of the resonance; None if undetermined."""
     u_mode_hz: float | None

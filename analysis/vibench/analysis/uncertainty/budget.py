@@ -12,7 +12,7 @@ from ..recordings.channels import BASE, described_sensor
 from ..tables import Tabular, plus_minus
 
 COVERAGE = 2.0
-"""Coverage factor of expanded uncertainties: about 95 %."""
+"""Coverage factor of expanded uncertainties, for a coverage of about 95 %."""
 WIDENING = 1.4
 """Factor on the scatter of a recording that ended because its scatter was small; see `Budget.widen`."""
 
