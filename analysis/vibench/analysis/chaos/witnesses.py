@@ -86,7 +86,7 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Ratio of neighbours' distance to typical distance above which the attractor's size limits the growth."""
+"""Distance of neighbours, relative to typical distances, at which the attractor's size stops the growth."""
 _ABOVE_NOISE = 3.0
 """Minimum ratio of the neighbours' distance to the noise at the steps to which the line is fitted."""
 _SHORTEST_FIT = 3

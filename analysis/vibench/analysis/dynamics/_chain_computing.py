@@ -149,7 +149,7 @@ class ChainAnswer(Tabular):
 
     @property
     def shown_cells(self) -> tuple[tuple[int, int, str], ...]:
-        """Length, index and name of cells to draw: the last of every chain, or several of a single chain."""
+        """Chain length, index and name of cells to draw: each chain's last, or several of a single chain."""
         lengths = self.request.lengths
         if len(lengths) > 1:
             return tuple((cells, cells - 1, f"{count_text(cells, 'cell')}: last") for cells in lengths)

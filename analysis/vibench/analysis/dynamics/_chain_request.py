@@ -37,7 +37,7 @@ class ChainRequest(SpecimenChoice):
     others: tuple[SpecimenTable, ...] = ()
     """Further specimens in the unit of the chain, after the first."""
     lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
-    """Number of cells; several numbers to study chains of different lengths."""
+    """Number of cells; give several numbers to study chains of different lengths."""
     drive: ChainDrive = ChainDrive.STEADY
     """Drive of the base: none, a steady sine, a sweep, or a recorded motion."""
     amplitude_m: PositiveFloat = 20e-6

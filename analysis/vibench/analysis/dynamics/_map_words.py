@@ -78,7 +78,7 @@ def map_caption(results: MapResults) -> str:
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return a specimen's name, and its differences from the shipped specimen of that name or the paper's."""
+    """Return a specimen's name, and how it differs from the shipped one of that name, or else the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"

@@ -80,7 +80,7 @@ TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d")
 _NO_UNITS = {*SECONDS, "-", "1", "#", "samples"}
 MOST_RUNS = 10_000
 FARTHEST = 2**40
-"""Largest counted gap between two times [sample intervals]."""
+"""Largest gap between two times that can be counted [sample intervals]."""
 _DATENUM = (693_000, 770_000)
 """Range of MATLAB's ``datenum`` (days since the year 0) that is taken as a date: 1897 to 2108."""
 _LONGEST_PAUSE = 10

@@ -65,7 +65,7 @@ class Suspect:
 
 
 def suspects(lines: Lines, usual: LineFit, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
-    """Fit without each assumption in turn; return the assumptions by likelihood and number of parameters.
+    """Fit without each assumption in turn; return them ranked by likelihood and number of parameters.
 
     Parameters
     ----------

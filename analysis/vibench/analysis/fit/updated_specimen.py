@@ -237,7 +237,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
 
 
 def culprits_text(suspects: Sequence[Suspect]) -> str:
-    """Return the possible causes of a misfit as text, with all causes that the data do not distinguish."""
+    """Return the possible causes of a misfit as text, including all that the data cannot tell apart."""
     best = suspects[0]
     alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
     named = ", or ".join(alike)

@@ -265,7 +265,7 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
 
 
 def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Return the deviation of each value from the median of its side; NaN for values without a side."""
+    """Return the deviation of each value from the median on the same side; NaN for values without a side."""
     apart = np.full(values.size, np.nan)
     for each in sides:
         apart[each] = values[each] - np.median(values[each])

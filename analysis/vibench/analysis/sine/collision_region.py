@@ -35,7 +35,7 @@ _RISE = 1.2
 _ALONE = 10.0
 """Ratio of the residual to noise, distortion and ringing above which one interval may have impacts."""
 _UNLIKE = 2.0
-"""Factor between Response II and Response II without contact above which an interval may have impacts."""
+"""If Response II differs by this factor from the value without contact, an interval may have impacts."""
 _QUIET = 0.7
 """Ratio of the residual to noise, distortion and ringing below which an interval has no impacts."""
 _VOTE_S = 1.0

@@ -63,9 +63,9 @@ def jumps(
     """Return the jumps of a response over time.
 
     At each interval, straight lines are fitted to the logarithm of the response before and after. A jump is a
-    local maximum of the difference of both lines, of at least 1.5 dB and 8 standard errors. Resonances of a
-    linear specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump maximises
-    the likelihood; its bounds come from the likelihood ratio.
+    local maximum of the difference between both lines, of at least 1.5 dB and 8 standard errors. Resonances
+    of a linear specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump
+    maximises the likelihood; its bounds come from the likelihood ratio.
 
     Parameters
     ----------
