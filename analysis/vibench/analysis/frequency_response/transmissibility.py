@@ -28,8 +28,8 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     """Return the standard deviation of ln(magnitude) for weighting lines in a fit.
 
     With two realisations, the estimate of one line can be 100 times too small, and a few lines would dominate
-    a fit. Instead, noise levels are assumed smooth over neighbouring lines. y - H x has the variance a + b
-    |H|^2 + c |dH|^2: a and b come from the sensors, c comes from leakage, with the step dH between lines. The
+    a fit. Instead, noise levels are assumed smooth over neighbouring lines. y - H x has the variance
+    a + b |H|^2 + c |dH|^2. Here a and b are due to sensors, c to leakage; dH is the step between lines. The
     levels are maximum likelihood estimates for chi-square distributed variances.
 
     Parameters

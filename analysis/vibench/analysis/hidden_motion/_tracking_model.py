@@ -64,7 +64,7 @@ class StepTables:
     flow: Reals
     """Matrix from state, base acceleration and its increment to the next state, no stops; shape (8, 10)."""
     small_flow: Reals
-    """Matrix like `flow`, but for a small step, shape (8, 10)."""
+    """Matrix like `flow`, for a small step instead of a sample, shape (8, 10)."""
     small_steps: int
     stop: Reals
     """A `TrackedStop` of native/structures.hpp, shape (8,)."""
