@@ -70,8 +70,8 @@ CLOSE = 3e-3
 KNOWN = 0.03
 """Relative distance from a known periodic motion, below which a run may be approaching that motion."""
 MOST_PUSH = 1000.0
-"""Changes of the start scale with the gap, or with this many drive amplitudes if that is less."""
-LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.1
+"""Changes of the start are proportional to the gap, or to this many drive amplitudes if that is less."""
+LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.2
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
@@ -160,7 +160,6 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     Without a requested time, it ends after a minute, or after two seconds if the requested error certainly
     takes longer than a minute. Raises ValueError when the scene has no target, the specimen cannot be
     simulated, or the requested time is too short for one drive period.
-
     """
     if scene.target is None:
         msg = "A scene without a target cannot be refined: give it Target(error=...) or Target(time_s=...)."
@@ -168,8 +167,7 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     clock = _Clock(scene.target)
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     if plan_of(scene, motion).method is Method.CLOSED_FORM:
-        found = solve_closed_form(scene, motion, Question.ANSWER)
-        yield clock.report(found, is_final=True)
+        yield clock.report(solve_closed_form(scene, motion, Question.ANSWER), is_final=True)
         return
     yield from _Refinement(scene, motion, clock).answers()
 
@@ -207,7 +205,9 @@ class _Refinement:
         self._part_s = min(1.0 / frequency_hz, FIRST_CYCLES / max(fastest, frequency_hz))
         self._begin = FollowedRun(scene.specimen, scene.drive, LOOSE, scene.start.state)
         self._pushes = self._random_changes(1)
-        self._main, self._twin = self._begin.copy(), self._begin.copy(TIGHT).with_push(self._pushes[0])
+        # Only a motion that does not settle needs a strict twin; an undamped motion never settles.
+        strict = TIGHT if motion.slowest_rate >= 0.0 else Accuracy.STANDARD.tolerance
+        self._main, self._twin = self._begin.copy(), self._begin.copy(strict).with_push(self._pushes[0])
         self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
@@ -243,9 +243,9 @@ class _Refinement:
             raise ValueError(msg)
 
     def _all(self) -> Iterator[ScenePrediction]:
-        settle_s = self._settle_s
+        settle_s = math.ceil(self._settle_s * self._frequency_hz) / self._frequency_hz
         while self._main.time_s < settle_s:
-            look_s = self._next_look_s(self._main)
+            look_s = min(self._next_look_s(self._main), settle_s)
             ours, other = self._follow_parts(self._main, look_s), self._follow_parts(self._twin, look_s)
             if self._is_lost:
                 yield self._lost_result()
@@ -479,17 +479,17 @@ class _Refinement:
 
     def _one_start(self) -> Iterator[ScenePrediction]:
         """Yield results for a motion that does not repeat and does not depend sensitively on its start."""
-        main, twin, periods = self._main, self._twin, self._window_periods
-        for tolerance in (None, TIGHTEST):
-            if tolerance is not None:
-                until_s = main.time_s - periods / self._frequency_hz
+        main, twin, until_s = self._main, self._twin, self._main.time_s
+        for tolerance in (TIGHT, TIGHTEST):
+            if tolerance == TIGHTEST:
                 main = self._begin.copy(TIGHT)
                 rounded = ROUNDED * self._scene.drive.amplitude_m * SIDES * self._scales
                 twin = self._begin.copy(TIGHTEST).with_push(rounded)
-                if self._follow_parts(main, until_s) is None or self._follow_parts(twin, until_s) is None:
-                    return
-            windows = [self._observe_next(each, periods) for each in (main, twin)]
-            if windows[0] is None or windows[1] is None:
+            elif twin.tolerance > TIGHT:
+                twin = self._begin.copy(TIGHT).with_push(self._pushes[0])
+            are_there = all(self._follow_parts(each, until_s) is not None for each in (main, twin))
+            windows = [self._observe_next(each, self._window_periods) for each in (main, twin) if are_there]
+            if len(windows) < 2 or windows[0] is None or windows[1] is None:
                 if not self._has_answered:
                     yield from self._interim()
                 return
