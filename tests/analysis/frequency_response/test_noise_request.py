@@ -92,9 +92,12 @@ def test_segments_that_touch_lost_or_overloaded_samples_are_left_out_and_counted
 @pytest.mark.thorough
 def test_an_overloaded_realisation_is_left_out(noise_file):
     overload = Overload("base_acceleration", round(3.2 * RATE), round(3.2 * RATE) + 4)
-    found = response(noise_file(overloads=(overload,)))
+    path = noise_file(overloads=(overload,))
+    found = response(path)
     assert found.left_out == 1
     assert found.overloaded_samples == 5
+    (check,) = (each for each in analyse(path).checks if each.what == "Overloads")
+    assert check.text.endswith("hits with such samples are left out of the transmission")
     both = (overload, Overload("m0_velocity", round(7.2 * RATE), round(7.2 * RATE)))
     with pytest.raises(NotEnoughData, match="6 samples near full scale"):
         response(noise_file(overloads=both))

@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import ValidationError
 
-from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
+from vibench.acquisition.plan import EXCITATION_KINDS, Family, StreamedNoise
 from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig, size_of_unit
 
@@ -114,14 +114,20 @@ def _stretches(facts: RecordingFacts) -> Check:
 
 
 def _overloads(facts: RecordingFacts) -> Check:
-    flat = [
-        f"{each.header.role} at {' and '.join(f'{value:.4g}' for value in each.flat_tops)} {each.header.unit}"
+    is_noise = facts.measurement.excitation.family is Family.NOISE
+    left_out = "realisations, segments or hits with such samples are left out of the transmission"
+    flat = {
+        each.header.role: f"{each.header.role} at {' and '.join(f'{value:.4g}' for value in each.flat_tops)} "
+        f"{each.header.unit}"
         for each in facts.channels
         if each.flat_tops and not (facts.dropouts and each.header.role == facts.response)
-    ]
+    }
     if flat:
-        text = f"flat tops: {', '.join(flat)}; peaks are cut, so Responses I and II are wrong; measure again"
-        return Check("Overloads", Verdict.WARNING, text)
+        result = "the transmission is" if is_noise else "Responses I and II are"
+        what = f"peaks are cut, so {result} wrong; measure again"
+        if is_noise and flat.keys() <= facts.overload_s.keys():
+            what = left_out
+        return Check("Overloads", Verdict.WARNING, f"flat tops: {', '.join(flat.values())}; {what}")
     if not facts.overload_s:
         imported = facts.bench.get("imported", {})
         mapped = imported.get("mapping", {}).get("channels", ())
@@ -132,7 +138,8 @@ def _overloads(facts: RecordingFacts) -> Check:
             return Check("Overloads", Verdict.NOTE, text)
         return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
-    what = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
+    doubt = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
+    what = left_out if is_noise else doubt
     if facts.dropouts and facts.response in facts.overload_s:
         what = (
             "the vibrometer lost its light for longer than can be bridged, or peaks were cut: check the "
