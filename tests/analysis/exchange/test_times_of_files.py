@@ -1,5 +1,6 @@
 """Times in imported files: each generated file is aligned, has its lost samples counted, or is refused."""
 
+from functools import partial
 from itertools import product
 
 import h5py
@@ -12,6 +13,7 @@ from vibench.analysis import InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.exchange import ImportMapping, import_recording
 from vibench.analysis.recordings.channel_levels import channel_levels
+from vibench.analysis.recordings.channels import alignment_error_s
 from vibench.analysis.recordings.checks import Verdict
 
 nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
@@ -263,6 +265,39 @@ def test_start_times_and_rates_stored_beside_channels_are_read(tmp_path, suffix,
     content["sample_rate_hz"] = RATE_HZ * 1.05
     with pytest.raises(InvalidRequest, match="samples/s"):
         import_recording(path, validate(content, ImportMapping, "test"), tmp_path / "wrong.h5")
+
+
+@pytest.mark.parametrize("late_s", [0.0025, 2.5 / RATE_HZ])
+@pytest.mark.parametrize("digits", [4, 5, 6, 12])
+@pytest.mark.parametrize("kind", ["times", "start"])
+def test_a_start_with_few_digits_is_refused_or_stored_with_its_error(tmp_path, kind, digits, late_s):
+    """The true delay of the second channel is within the stored error of the delay from the file."""
+    times = np.arange(SAMPLES) / RATE_HZ
+    first, second = motion(times), motion(times + late_s)
+    path, names = tmp_path / "a.mat", ("run.a.y", "run.b.y")
+    start = f"{late_s:.{digits}f}"
+    about = [{"t": times}, {"t": np.round(times + late_s, digits)}]
+    if kind == "start":
+        about = [{"increment": 1 / RATE_HZ, "start": each} for each in ("0", start)]
+    savemat(
+        path, {"run": {n: {"y": y, **more} for n, y, more in zip("ab", (first, second), about, strict=True)}}
+    )
+    content = mapping("h5", RATE_HZ).model_dump()
+    content["channels"][0]["source"], content["channels"][1]["source"] = names
+    read = partial(import_recording, path, validate(content, ImportMapping, "test"), tmp_path / "made.h5")
+    if (kind, digits) == ("start", 4):
+        with pytest.raises(InvalidRequest, match="too few digits"):
+            read()
+        return
+    made = read()
+    with open_recording(made) as recording:
+        response = recording.read("m0_velocity")
+        whole = np.flatnonzero(~np.isnan(response))[0]
+        (delay_s,) = (each.delay_s for each in recording.channels if each.role == "m0_velocity")
+        error_s = alignment_error_s(recording, "drive_voltage", "m0_velocity")
+    off_s = abs(whole / RATE_HZ - delay_s - late_s)
+    assert off_s <= error_s + 1e-3 / RATE_HZ
+    assert error_s < 0.2 / RATE_HZ
 
 
 def test_a_mapping_may_override_file_times_and_the_recording_notes_it(tmp_path):

@@ -15,6 +15,7 @@ from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.overlay.driven_rig import Driven
 from vibench.analysis.overlay.overlay import PHASE
 from vibench.analysis.overlay.shaker_fit import fit_shaker
+from vibench.analysis.recordings.channels import ALIGNMENT_ERRORS
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 
@@ -87,7 +88,19 @@ def test_the_phase_shows_that_a_channel_is_delayed(recordings, name, late_sample
     assert shifted.agreement[0].endswith(f"disagree with the twin: {PHASE}")
 
 
-def test_the_json_document_and_the_figures_show_the_draws(chaotic_dwell):
+def test_the_phase_bound_contains_the_error_of_times_with_few_digits(recordings):
+    """An imported channel is late by half a sample, because its start was rounded to a whole sample."""
+    with open_recording(recordings / "noise.h5") as recording:
+        late_s = 0.5 / recording.sample_rate_hz
+        m0 = recording.channel("m0_velocity")
+        others = tuple(each for each in recording.channels if each is not m0)
+        bench = {**recording.bench, "imported": {ALIGNMENT_ERRORS: {"m0_velocity": late_s}}}
+        late = replace(recording, channels=(*others, replace(m0, delay_s=m0.delay_s - late_s)), bench=bench)
+        found = overlay(late, analyse(late))
+    assert all(each.agrees for each in found.ensemble)
+
+
+def test_json_and_figures_show_the_draws(chaotic_dwell):
     said = json.loads(json.dumps(result_summary(chaotic_dwell)))["simulated"]
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]

@@ -80,6 +80,8 @@ class Alignment:
     """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]
     """Delay of each channel that remains after rounding to whole intervals; at most half an interval."""
+    errors_s: tuple[float, ...]
+    """Largest error of each channel's start relative to the other channels, from the digits of the times."""
     remarks: tuple[str, ...]
     """Remarks on the times in the file, and on times that the mapping replaces."""
     is_contradicted: bool
@@ -101,6 +103,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
     rate_hz = _rate_hz(placed, mapping, path)
     _require_one_shift(placed, mapping, path)
     offsets = _offsets(placed, rate_hz, path)
+    errors_s = tuple(0.0 if _are_whole(offsets) else each.start_error_s for each in placed)
     cut = [
         tuple(replace(one, place=one.place + round(offset)) for one in pieces(each))
         for each, offset in zip(placed, offsets, strict=True)
@@ -115,9 +118,10 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
     places = min(each[-1].end for each in cut)
     if places <= max(each[0].place for each in cut):
         raise InvalidRequest(f"the channels of {path.name} do not overlap in time; choose channels that do")
-    for each, offset, own in zip(placed, offsets, cut, strict=True):
+    for each, offset, own, error_s in zip(placed, offsets, cut, errors_s, strict=True):
         if offset:
-            remarks[f"{each.title} starts {offset / rate_hz:.6g} s after the first channel"] = None
+            known = f", known to {error_s:.1g} s" if error_s else ""
+            remarks[f"{each.title} starts {offset / rate_hz:.6g} s after the first channel{known}"] = None
         if len(own) > 1 or own[-1].end - own[0].place != each.samples:
             missing = own[-1].end - own[0].place - sum(one.samples for one in own)
             remarks[f"the times of {each.title} jump; {missing} samples are lost there"] = None
@@ -126,7 +130,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
             remarks[f"the times of {each.title} have too few digits to show every lost sample"] = None
     late_s = tuple((offset - round(offset)) / rate_hz for offset in offsets)
     is_contradicted = any(_is_contradicted(each, mapping) for each in channels)
-    return Alignment(rate_hz, places, tuple(cut), late_s, tuple(remarks), is_contradicted)
+    return Alignment(rate_hz, places, tuple(cut), late_s, errors_s, tuple(remarks), is_contradicted)
 
 
 def _or_ignore(channels: Sequence[SourceChannel]) -> str:
@@ -261,9 +265,16 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
             f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
             f"only channels with a stated start, or only the others{_or_ignore(channels)}"
         )
-    if max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels)) * rate_hz > _APART:
+    offsets = [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]
+    error_s = max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels))
+    if error_s * rate_hz > _APART and not _are_whole(offsets):
         raise InvalidRequest(
             f"the channels of {path.name} start at different times, stated with too few digits to align "
             f"them; export them with the same start{_or_ignore(channels)}"
         )
-    return [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]
+    return offsets
+
+
+def _are_whole(offsets: Sequence[float]) -> bool:
+    """Return whether channels are whole samples apart, as with one clock, so that few digits suffice."""
+    return all(abs(each - round(each)) < _APART / 100 for each in offsets)

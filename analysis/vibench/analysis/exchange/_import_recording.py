@@ -30,7 +30,7 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest, UnusableData
-from ..recordings.channels import DRIVE
+from ..recordings.channels import ALIGNMENT_ERRORS, DRIVE
 from ..signals.arrays import Reals, runs_of
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
@@ -346,6 +346,9 @@ def _bench(
             "mapping": mapping.model_dump(mode="json"),
             "channels": [asdict(each.source) for each in wanted],
             "time": list(aligned.remarks),
+            ALIGNMENT_ERRORS: {
+                each.mapped.role: error for each, error in zip(wanted, aligned.errors_s, strict=True)
+            },
             "time_contradicted": aligned.is_contradicted,
             "held": list(held),
         },

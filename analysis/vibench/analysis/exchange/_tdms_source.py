@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
 from ._source_channel import Source, SourceChannel, exact_step, scale_among, unit_among
-from ._times import restarts, stated_start_s, stated_times
+from ._times import restarts, stated_start, stated_times
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
@@ -124,12 +124,13 @@ def _channel(
     starts_s = {
         first: start_s
         for first, each in (statements[channel.path] if own else {}).items()
-        if (start_s := stated_start_s(each)) is not None and first < len(channel)
+        if (start_s := stated_start(each)[0]) is not None and first < len(channel)
     }
     runs, jumps = restarts(starts_s, times["sample_rate_hz"], len(channel))
     times["time_trouble"] = times["time_trouble"] or jumps
     if channel.path in segments and len(runs) == 1:
         times["shifts"] += (("samples of segments", segments[channel.path]),)
+    times["start_error_s"] += START_ERROR_S
     times["start_s"] = next(iter(starts_s.values()), times["start_s"])
     step = exact_step(channel.dtype)
     unknown = [f"{n} = {v}" for n, v in own if _SCALE_TYPE.fullmatch(n) and v not in SCALES]
@@ -140,7 +141,6 @@ def _channel(
         step=step,
         unit="s" if channel.dtype.kind == "M" else unit_among(own),
         stated_scale=", ".join(unknown) or scale_among(own, are_counts=step is not None),
-        start_error_s=START_ERROR_S,
         runs=runs,
         **times,
     )

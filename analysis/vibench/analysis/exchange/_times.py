@@ -52,6 +52,7 @@ _TIME = re.compile(
     re.IGNORECASE,
 )
 _QUANTITY = re.compile(r"\s*([-+]?\d*\.?\d+\.?(?:e[-+]?\d+)?)\s*([a-z/\u00b5\u03bc]*)\s*", re.IGNORECASE)
+_LAST_DIGIT = re.compile(r"\.(?P<decimals>\d*)(?:e(?P<power>[-+]?\d+))?", re.IGNORECASE)
 SAME_RATE = 1e-4
 """Relative tolerance between two stated sample rates; different clocks deviate by less."""
 EVEN = 1e-3
@@ -96,6 +97,7 @@ def stated_times(
     ``"dt_ms"``, ``"Sample rate [kHz]"``. If no fact states a rate, rates stated elsewhere in the file apply.
     """
     facts = tuple(facts)
+    start_s, start_error_s = stated_start(facts)
     units = {name.strip().casefold(): _text(value).strip() for name, value in facts if "unit" in name.lower()}
     axis = next((unit for name, unit in units.items() if _AXIS_UNIT.fullmatch(name)), "")
     others = (each for each in elsewhere if _RATE.fullmatch(each[0].strip()))
@@ -111,7 +113,8 @@ def stated_times(
     return {
         "sample_rate_hz": rates_hz[0] if rates_hz else None,
         "time_trouble": trouble,
-        "start_s": stated_start_s(facts),
+        "start_s": start_s,
+        "start_error_s": start_error_s,
         "shifts": tuple(
             (name, _text(value))
             for name, value in facts
@@ -152,22 +155,33 @@ def _are_several(value: Any) -> bool:
     return 1 < np.size(value) <= MOST_CHANNELS and np.ravel(value).dtype.kind in "iufSU"
 
 
-def stated_start_s(facts: Iterable[tuple[str, Any]]) -> float | None:
-    """Return the stated time of a channel's first sample [s]; the channel's own facts take precedence.
+def stated_start(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, float]:
+    """Return the stated time of a channel's first sample and its rounding error [s].
 
-    If the file states a date and an offset, as in NI waveforms, their sum is returned.
+    The channel's own facts take precedence. If the file states a date and an offset, as in NI waveforms,
+    their sum is returned.
     """
-    moments_s, offsets_s = [], []
+    moments, offsets = [], []
     for name, value in facts:
         if (found := _START.fullmatch(name.strip())) is None:
             continue
         number, unit = _number(value)
         if isfinite(number):
             unit = found["unit"] or unit or ("d" if _DATENUM[0] < number < _DATENUM[1] else "")
-            offsets_s.append(number * SECONDS.get(unit.casefold(), 1.0))
+            second = SECONDS.get(unit.casefold(), 1.0)
+            offsets.append((number * second, _rounding(value) * second if number else 0.0))
         elif (moment_s := _moment(value)) is not None:
-            moments_s.append(moment_s)
-    return sum((*moments_s[:1], *offsets_s[:1])) if moments_s or offsets_s else None
+            moments.append((moment_s, _rounding(value, whole=0.0)))
+    used = (*moments[:1], *offsets[:1])
+    return (sum(start_s for start_s, _ in used) if used else None), sum(error_s for _, error_s in used)
+
+
+def _rounding(value: Any, *, whole: float = 0.5) -> float:
+    """Return half the last digit of a number or date that is written as text; ``whole`` without decimals."""
+    if np.asarray(value).dtype.kind not in "SUO":
+        return 0.0
+    digits = _LAST_DIGIT.search(_text(value))
+    return whole if digits is None else 0.5 * 10.0 ** (int(digits["power"] or 0) - len(digits["decimals"]))
 
 
 def _moment(value: Any) -> float | None:
@@ -274,7 +288,7 @@ class TimeAxis:
             # If the times begin at zero, they are relative to the stated start of the channel.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
-            start_error_s=self.rounding * second,
+            start_error_s=self.rounding * second + channel.start_error_s,
             runs=self.runs,
             time_unit=unit,
             time_trouble=trouble,
@@ -367,6 +381,9 @@ class _Scan:
         self._runs = [(0, 0)]
         self._kept: list[Reals] = []
         self._jitter = 0.0
+        self._digit = rounding if self.is_coarse else 0.0
+        self._squares, self._products = np.zeros((2, 2)), np.zeros(2)
+        self._spreads: list[float] = []
         self._trouble = ""
 
     def add(self, block: Reals) -> None:
@@ -387,14 +404,18 @@ class _Scan:
         self._runs += [(self._samples + int(at), int(places[at])) for at in jumps]
         distance = block - self._start - self._interval * places
         unit = self._rounding if self.is_coarse else 0.0
+        self._digit = max(self._digit, float(np.max(_resolution(block[np.newaxis], self._interval))))
         if block.size > 2:
             self._jitter = max(self._jitter, _jitter(block, distance, self._interval, unit))
         kept = np.arange(block.size)
+        parts = [(first, distance[first : first + _BIN]) for first in range(0, block.size, _BIN)]
+        self._spreads += [float(np.ptp(part)) for _, part in parts]
         if block.size > _BIN:
-            starts = range(0, block.size, _BIN)
-            parts = [(first, distance[first : first + _BIN]) for first in starts]
             kept = np.array([first + find(part) for first, part in parts for find in (np.argmin, np.argmax)])
         self._kept.append(np.stack((places[kept], distance[kept])))
+        powers = np.stack((np.ones(block.size), places)).astype(np.float64)
+        self._squares += powers @ powers.T
+        self._products += powers @ distance
         self._last = (float(block[-1]), int(places[-1]))
         self._samples += block.size
 
@@ -402,12 +423,11 @@ class _Scan:
         """Return the time axis fitted to all times that were added."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
-        slope, offset = 0.0, float(np.mean(distance))
-        if np.ptp(places):
-            fitted = np.polyfit(places / span, distance, 1)
-            # In a short file, a line fitted to few extremes may be worse than one from the first to the last.
-            if np.ptp(distance - fitted[0] * places / span) < np.ptp(distance):
-                slope, offset = float(fitted[0]), float(fitted[1])
+        scale = np.array([1.0, 1.0 / span])
+        # The errors of rounding cancel in a line through all times.
+        offset, slope = np.linalg.lstsq(
+            self._squares * np.outer(scale, scale), self._products * scale, rcond=None
+        )[0].tolist()
         off = distance - slope * places / span - offset
         spread, interval = float(np.ptp(off)), self._interval + slope / span
         allowed = (
@@ -431,7 +451,9 @@ class _Scan:
         # Rounded times may have equal intervals even if samples are lost, so the mapping must state the rate.
         uncertainty = 1e-12 * interval * self.is_inferred if is_exact else spread / span
         start = self._start if is_exact else self._start + offset
-        rounding = 2 * self._rounding / max(self._samples, 1) ** 0.5
+        # If the times repeat a pattern, all may be shifted by the part of a digit that their spread leaves.
+        local = min(spread, float(np.median(self._spreads or [0.0])), self._digit) * (not is_exact)
+        rounding = 2 * self._digit / max(self._samples, 1) ** 0.5 + (self._digit - local) / 2
         return TimeAxis(start, interval, uncertainty, rounding, tuple(self._runs), trouble)
 
 

@@ -20,14 +20,14 @@ from vibench.sim.shaker.loaded_shaker import MotionFailed
 from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, RecordedChannels
+from ..recordings.channels import BASE, RecordedChannels, alignment_error_s
 from ..recordings.response import VELOCITY, noise_as_read
 from ..signals.arrays import Complexes, Reals, Samples
 from ..sine.dwell import silence_before
 from .driven_rig import Driven, DrivenRig, acceleration_per_volt, carried_mass, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
 from .shaker_fit import FittedShaker
-from .simulated_channels import SimulatedChannels, base_band_hz, under_base_motion
+from .simulated_channels import SimulatedChannels, advance, base_band_hz, under_base_motion
 
 _FEWEST_LINES = 50
 """Minimum number of spectral lines in silence; this number determines the noise level to 25 %."""
@@ -455,9 +455,13 @@ def _random_channels(
     if rms_v > 0.0:
         volts = _with_noise(volts.copy(), rig.role, rms_v, recording.sample_rate_hz, rng)
     motion = _simulate_motion(replace(rig, table=table), volts, recording, noise, rng)
+    velocity, error_s = motion.m0_velocity, alignment_error_s(recording, BASE, rig.response)
+    if error_s > 0.0:  # the file has too few digits to align its channels exactly
+        by_samples = error_s * rng.uniform(-1.0, 1.0) * recording.sample_rate_hz
+        velocity = advance(velocity.astype(np.float64), by_samples).astype(np.float32)
     return SimulatedChannels(
         recording,
-        velocity=motion.m0_velocity,
+        velocity=velocity,
         impacts_at_s=(motion.impact_times_s, motion.impacts),
         base_acceleration=motion.base_acceleration,
         has_sensors=True,

@@ -97,6 +97,16 @@ class Stretch:
         return self.stop - self.start
 
 
+ALIGNMENT_ERRORS = "alignment_errors_s"
+"""Entry of an import's facts: the largest error of each channel's start relative to the others [s]."""
+
+
+def alignment_error_s(recording: Recording, *roles: str) -> float:
+    """Return the largest error of the time between channels, from the digits of the times in their file."""
+    errors_s = recording.bench.get("imported", {}).get(ALIGNMENT_ERRORS, {})
+    return float(sum(errors_s.get(role, 0.0) for role in roles))
+
+
 class Channels(Protocol):
     """The channels that an estimator uses, recorded or simulated."""
 
