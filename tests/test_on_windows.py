@@ -76,6 +76,7 @@ def test_posix_functions_that_the_windows_tests_remove_exist_on_this_system():
     assert int(call("-c", program).stdout) > 25
 
 
+@pytest.mark.thorough
 def test_windows_locks_mark_a_bench_and_a_recording_as_in_use(here):
     said = call("-c", LOCKS.format(folder=str(here))).stdout.splitlines()
     assert "is in use by process" in said[0]

@@ -14,6 +14,7 @@ def walk():
     return WALKS["amplitude_to_engine"]()
 
 
+@pytest.mark.thorough
 def test_a_prediction_reaches_the_engine_within_six_call_frames(walk):
     assert walk.frames[0].endswith("predict.py:predict")
     assert walk.frames[-1].endswith("library.py:Engine.run")

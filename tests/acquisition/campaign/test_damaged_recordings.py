@@ -157,6 +157,7 @@ def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, fold
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("damage", [truncate, change_the_scale, copy_other_point, replace_by_a_folder])
 def test_the_list_of_planned_recordings_marks_damaged_ones_as_incomplete(folder, damage):
     damage(folder)

@@ -74,6 +74,7 @@ def test_progress_counts_the_recordings(recordings):
     assert recordings[1] == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
 
 
+@pytest.mark.thorough
 def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(bench, recordings):
     folder, _ = recordings
     before = {path: path.read_bytes() for path in folder.iterdir()}

@@ -191,6 +191,7 @@ def test_a_lost_generator_raises_an_error(bench_of, rig, tmp_path):
         virtual.faults.heal()
 
 
+@pytest.mark.thorough
 def test_the_bench_report_is_a_table_and_round_trips_through_json(check_rig, rig, tmp_path):
     report = check_rig(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
     assert BenchReport.model_validate_json(report.model_dump_json()) == report

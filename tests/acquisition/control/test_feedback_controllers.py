@@ -72,6 +72,7 @@ def test_jumps_up_and_down_are_bracketed_around_the_folds(sweep_bench):
         assert low - 0.3 <= fold <= high + 0.3
 
 
+@pytest.mark.thorough
 def test_every_recorded_step_states_its_pass_its_branch_and_its_direction(sweep_bench):
     steps = [numbers for label, numbers, *_ in sweep_bench.segments if label == "step"]
     assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]

@@ -220,6 +220,7 @@ class TestRefusals:
             with pytest.raises(OSError, match="refused"):
                 socket.create_connection((host, address.port), 1.0)
 
+    @pytest.mark.thorough
     @pytest.mark.parametrize(
         "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
     )

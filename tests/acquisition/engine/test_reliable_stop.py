@@ -213,6 +213,7 @@ def resident_bytes(pid):
 
 
 class TestAnnouncements:
+    @pytest.mark.thorough
     def test_an_announcement_whose_process_number_was_reused_is_ignored(self, process):
         told = the_engine(process.pid)
         with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:

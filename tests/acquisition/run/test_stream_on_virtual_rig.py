@@ -103,6 +103,7 @@ def test_the_output_is_silent_between_the_check_and_the_ramp(streamed):
     assert np.std(quiet) == pytest.approx(NOISE_V, rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_low_level_check_plays_through_the_analogue_output(streamed):
     assert "drive 0.01993 V (0.01993 V expected)" in streamed.log
     check = streamed.drive_v[streamed.segments["check"]]
@@ -143,6 +144,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     assert np.max(np.abs(left)) < 1e-3
 
 
+@pytest.mark.thorough
 def test_the_check_through_the_analogue_output_finds_a_raised_amplifier_gain(tmp_path):
     turned = changed(RIG, amplifier={"gain_db": 20.0})
     with open_bench(turned) as bench:

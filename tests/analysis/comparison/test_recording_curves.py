@@ -30,6 +30,7 @@ def test_a_transmission_curve_sent_to_another_process_keeps_its_bounds(compariso
     assert "drive" in curve.note
 
 
+@pytest.mark.thorough
 def test_a_comparison_keeps_the_whole_result_for_reports(comparison):
     result, failures = stored_result(comparison)
     assert result.analysis.facts.name == comparison.name == "streamed"

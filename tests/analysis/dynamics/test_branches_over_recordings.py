@@ -105,6 +105,7 @@ def narrow_file(monkeypatch, tmp_path):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "command", [("branches", "--like"), ("chain", "--cells", "1", "--duration", "0.1", "--recording")]
 )
@@ -122,6 +123,7 @@ def test_a_recording_also_defines_the_specimen(command, narrow_file):
     assert "[4.5e-05, 4.5e-05] m instead of gaps [3e-05, 3e-05] m." in warning
 
 
+@pytest.mark.thorough
 def test_a_map_and_a_report_state_another_specimen_than_the_recordings(narrow_file, diagram, tmp_path):
     plan = tmp_path / "map.toml"
     level = "{ start = 1e-7, stop = 1e-5, points = 2 }"

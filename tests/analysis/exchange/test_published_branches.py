@@ -32,6 +32,7 @@ def test_published_stable_motions_have_the_stated_frequency_and_amplitude(cycles
         assert found.invasive < 0.025
 
 
+@pytest.mark.thorough
 def test_published_unstable_amplitudes_are_below_the_stable_ones_and_fall_with_wind_speed(cycles):
     stable, unstable = (
         [cycles[f"{kind}_v{each}"] for each in speeds]

@@ -99,6 +99,7 @@ def test_drawing_the_same_figure_twice_gives_identical_files(noise_file):
     assert drawn[0] == drawn[1]
 
 
+@pytest.mark.thorough
 def test_noise_levels_are_drawn_from_weak_to_strong(noise_file, tmp_path):
     found = result(noise_file(), Simulation.LEFT_OUT).analysis
     drawn = transmission_levels_figure([found, found])

@@ -46,6 +46,7 @@ def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful
     assert np.all(width[:2] < 1.4 * best)
 
 
+@pytest.mark.thorough
 def test_uninformative_statistics_leave_bounds_as_wide_as_those_of_the_prior(cases):
     wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
     assert np.median(wide) > 0.85 * 2.0

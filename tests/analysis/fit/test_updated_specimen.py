@@ -74,6 +74,7 @@ def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(fitt
     assert 0.3 < fitted_model.reduced_chi_square < 3
 
 
+@pytest.mark.thorough
 def test_the_report_shows_fitted_and_described_values(campaign, fitted_model):
     said = list(findings(replace(campaign, model_sentences=fitted_model.sentences)))
     assert said[: len(fitted_model.sentences)] == list(fitted_model.sentences)

@@ -307,6 +307,7 @@ def test_requests_that_can_give_no_result_are_refused_with_a_readable_message(wo
         estimate(slow)
 
 
+@pytest.mark.thorough
 def test_the_hidden_motion_figures_show_the_motion_and_its_impacts(world_recording):
     recorded = world_recording(260.0, 1.5, seed=41)
     motion = estimate(recorded, numbers=Numbers.AS_DESCRIBED)

@@ -39,6 +39,7 @@ def test_the_relative_displacement_of_the_live_twin_matches_the_simulation(dwell
         assert end - (each.first + each.p.size) == 16 + 307
 
 
+@pytest.mark.thorough
 def test_gaps_and_mass_are_identified_during_the_run(dwell):
     running, *_ = dwell
     found = {each.what: each for each in running.twin.found}

@@ -42,6 +42,7 @@ def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 
 
+@pytest.mark.thorough
 def test_the_accuracy_page_lists_every_accuracy_level_for_every_motion(benchmark, page_of):
     page = page_of(benchmark)
     for each in benchmark.motions:

@@ -54,6 +54,7 @@ def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal
         assert loud.decibel > quiet.decibel + 30
 
 
+@pytest.mark.thorough
 def test_all_three_estimators_give_the_closed_form_on_every_line_of_noise(noise_file):
     found = analyse(noise_file())
     assert isinstance(found, NoiseAnalysis)

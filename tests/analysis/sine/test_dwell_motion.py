@@ -22,6 +22,7 @@ def test_a_weak_dwell_is_periodic_with_the_drive_and_a_colliding_dwell_is_not(an
     assert strong.evidence.spread > 50 * weak.evidence.spread
 
 
+@pytest.mark.thorough
 def test_there_is_one_poincare_point_per_drive_period_and_it_lies_on_the_orbit(analyses):
     section = analyses["weak"].motion.section
     assert np.diff(section.time_s) == pytest.approx(1 / 260.0, rel=1e-4)

@@ -34,6 +34,7 @@ def test_the_specimen_jumps_up_at_a_higher_level_than_down(analysis):
     assert hysteresis_vpp((rise, fall)) == pytest.approx((0.3, 0.7 - fall.after_vpp))
 
 
+@pytest.mark.thorough
 def test_the_motion_between_the_jumps_depends_on_the_direction_of_the_level(analysis):
     found = analysis.response
     up, down = (

@@ -151,6 +151,7 @@ def test_a_feedback_law_whose_delay_makes_motions_unstable_is_reported():
     assert hold.at_hz == pytest.approx(112.0, abs=0.5)
 
 
+@pytest.mark.thorough
 def test_no_law_holds_the_branch_with_a_latency_above_a_millisecond():
     unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     largest = [

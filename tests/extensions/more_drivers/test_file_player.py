@@ -70,6 +70,7 @@ def test_the_end_of_the_played_recording_is_reported(playing, original):
             bench.digitizer.read(1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("daq", "said"),
     [
@@ -87,6 +88,7 @@ def test_playback_needs_no_valid_calibration(playing):
         open_bench(calibrated_on(playing(options={}), "2001-01-01"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("change", ["samples", "seal"])
 def test_an_altered_recording_is_not_played_back(playing, original, change):
     with h5py.File(original, "r+") as file:
@@ -98,6 +100,7 @@ def test_an_altered_recording_is_not_played_back(playing, original, change):
         open_bench(playing(), calibration=CalibrationRule.WAIVED)
 
 
+@pytest.mark.thorough
 def test_playback_under_another_plan_is_refused(playing, tmp_path):
     other = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"frequency_hz": 255.0})})
     with (

@@ -54,6 +54,7 @@ def test_saving_a_plot_on_a_full_disk_gives_one_dialog(lasting_window, own, monk
     assert content(own) == {}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ending", ["csv", "uff", "mat", "nxs", "note"])
 def test_exports_and_notes_on_a_full_disk_give_one_sentence_errors(own, ending):
     path = own / "dwell.h5"

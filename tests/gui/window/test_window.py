@@ -18,6 +18,7 @@ def test_every_page_opens_with_its_shortcut(lasting_window, qtbot):
         assert lasting_window.page is lasting_window.pages[name], name
 
 
+@pytest.mark.thorough
 def test_the_pages_are_in_the_order_of_the_work_steps(lasting_window):
     names = list(PAGES)
     assert list(lasting_window.pages) == names

@@ -39,6 +39,7 @@ def final_motions(engine):
             yield np.concatenate([run.motion, seen, np.ravel(run.changes)])
 
 
+@pytest.mark.thorough
 def test_batches_give_identical_results_for_every_register_width(build):
     families = [each for each in usable_families() if each != "x86_64"]  # x86_64 has no fused multiply-add
     starts = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 6)) * np.repeat([1.5e-5, 0.05], 3)
@@ -57,6 +58,7 @@ def test_batches_give_identical_results_for_every_register_width(build):
         assert np.array_equal(answer, answers[0])
 
 
+@pytest.mark.thorough
 def test_the_engine_gives_identical_results_for_every_processor_family(build):
     engines = [Engine(build.compile_engine(family)) for family in usable_families()]
     for engine in engines:

@@ -156,6 +156,7 @@ def test_a_larger_computing_budget_follows_more_initial_states(short_chaos):
         replace(SHORT_CHAOS, budget_s=-1.0)
 
 
+@pytest.mark.thorough
 def test_a_prediction_as_json_lists_every_motion(several_attractors):
     said = several_attractors.to_dict()["ensemble"]
     assert set(said) - {"asked"} == set(Ensemble.__dataclass_fields__) - {"requested_motion"}
