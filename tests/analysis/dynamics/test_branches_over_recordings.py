@@ -18,8 +18,10 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
 from vibench.analysis.report import write_report
+from vibench.analysis.report._drawings import limits
 from vibench.analysis.report._report import draw_branches, draw_maps
 from vibench.cli.__main__ import app
+from vibench.sim import gong2025
 from vibench.sim.maps import open_map
 
 
@@ -138,6 +140,15 @@ def test_a_map_and_a_report_state_another_specimen_than_the_recordings(narrow_fi
     (motions,) = draw_maps(results, [open_map(tmp_path / "map" / "map.h5")])
     for drawn in (branches, motions):
         assert "not the one described in narrow: gaps [4.5e-05" in drawn.caption
+
+
+def test_a_report_states_that_another_specimen_was_simulated(narrow_file):
+    asked = ((narrow_file,), "steps", Simulation.UNDER_BASE)
+    (sentence,) = (
+        each for each in limits(analyse_files(*asked, specimen=gong2025())) if "not the one" in each
+    )
+    assert sentence.startswith("The simulated specimen is not the one described in narrow: gaps [4.5e-05, ")
+    assert not any("not the one" in each for each in limits(analyse_files(*asked)))
 
 
 def test_branches_of_another_parameter_are_not_drawn_into_a_map(diagram, tmp_path):

@@ -9,8 +9,10 @@ import numpy as np
 
 from vibench.acquisition.instruments import PlugInKind
 from vibench.acquisition.plan import EXCITATION_KINDS, Family, excitation_text, rows_by_kind
+from vibench.sim import Specimen
 
 from ..chaos.verdict import MotionKind
+from ..dynamics import specimen_difference
 from ..figures.backbone import backbone_figure
 from ..figures.bench_levels import bench_levels_figure
 from ..figures.dwells import dwells_figure
@@ -43,6 +45,7 @@ from ..overlay.draws import CLOCK_TOLERANCE
 from ..overlay.overlay import AbstractOverlay
 from ..overlay.prediction import PREDICTION_S, WINDOW_S
 from ..recordings.checks import AbstractAnalysis
+from ..recordings.facts import known_specimen
 from ..results.campaign_results import CampaignResults, budgets_of
 from ..sine.stepped_response import feedback_sentences, tracked_resonances
 from ..tables import plus_minus
@@ -107,14 +110,33 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
         yield f"Simulated: {agreement or f'{simulated.response_i:.3g} and {simulated.response_ii:.3g}'}."
 
 
+def _specimen_differences(results: CampaignResults) -> Iterator[str]:
+    """Yield a sentence for each overlaid specimen that is not the one described in its recordings."""
+    names: dict[tuple[Specimen, Specimen | None], list[str]] = {}
+    for each in results.results:
+        if each.overlay is not None:
+            facts = each.analysis.facts
+            pair = each.overlay.run.specimen, known_specimen(facts.bench)
+            names.setdefault(pair, []).append(facts.name)
+    for pair, alike in names.items():
+        if difference := specimen_difference(*pair, ", ".join(alike)):
+            yield difference
+
+
 def limits(results: CampaignResults) -> Iterator[str]:
-    """Yield sentences on the limits of a campaign's results."""
+    """Yield sentences on the limits of these results."""
+    differences = tuple(_specimen_differences(results))
     if any(each.is_simulated for each in results.facts):
         yield (
             "The instruments were simulated: the samples result from a simulated generator, amplifier, "
-            "shaker, specimen, vibrometer and converter. The overlaid simulation uses the same model: "
-            "agreement shows that the processing from generator to figure is correct, not that the model is."
+            "shaker, specimen, vibrometer and converter."
         )
+        if not differences:
+            yield (
+                "The overlaid simulation uses the same model: agreement shows that the processing from "
+                "generator to figure is correct, not that the model is."
+            )
+    yield from differences
     runs = [each.overlay.run for each in results.results if each.overlay is not None]
     if runs:
         specimen = runs[0].specimen
