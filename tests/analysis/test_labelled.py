@@ -190,6 +190,7 @@ PURE_HERE = {
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
     "SurrogateTest.least_margin",
+    *(f"TargetReport.{name}" for name in ("error", "wanted_error", "unseen_share", "starts", "windows")),
     *(f"{kind}.{name}" for kind in ("SweptMotion", "SweepResponse") for name in _OF_A_SWEEP),
     "Divergence.size",
     "Divergence.last",

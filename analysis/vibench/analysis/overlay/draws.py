@@ -397,7 +397,8 @@ def all_draws(
     """Return all draws of a source, each analysed like the recording.
 
     Fewer draws are made if the first draws agree clearly. Up to three times as many draws are made if few of
-    them show the ``measured`` kind of motion. Raises UnusableData when a simulation did not finish.
+    them show the ``measured`` kind of motion, unless enough such draws are improbable. Raises UnusableData
+    when a simulation did not finish.
     """
     responses: list[R] = []
 
@@ -419,10 +420,12 @@ def all_draws(
         most = usual if source.most == 1 else _MORE * usual
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
-            if np.median(np.concatenate([each.count for each in curves])) >= FEWEST_DRAWS and (
-                # More draws than the default were requested for narrower bands, so compute all of them.
-                len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves))
-            ):
+            alike = float(np.median(np.concatenate([each.count for each in curves])))
+            # More draws than the default were requested for narrower bands, so compute all of them.
+            if alike < FEWEST_DRAWS:
+                if _chance_of_enough(alike, len(found), most) < _HOPELESS:
+                    break
+            elif len(found) >= usual or (usual <= DRAWS and all(each.agrees_clearly for each in curves)):
                 break
             stop = min(len(found) + _FURTHER_DRAWS, usual if len(found) < usual else most)
             found += pool.map(estimate_draw, range(len(found), stop))

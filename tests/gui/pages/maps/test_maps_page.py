@@ -89,7 +89,7 @@ def test_clicking_a_point_of_a_map_shows_its_motion_and_opens_it_on_the_simulate
 
 
 def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
-    page.map.show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
+    page.map.show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), (), None))
     across, up = page.map.levels[0].getOriginalDataset()
     assert across.tolist() == [100.0, 140.0]
     assert up.tolist() == [6e-6, 7e-6]
@@ -125,7 +125,7 @@ def test_empty_axes_show_the_ranges_entered_in_the_form(context, qtbot, closing)
     page = closing(MapsPage(context))
     page.resize(900, 700)
     page.show()
-    page.map.show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), ()))
+    page.map.show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), (), None))
     page.form.show_value(MapRequest(**SMALL))
     qtbot.wait(50)
     (left, right), (low, high) = page.map.in_sight

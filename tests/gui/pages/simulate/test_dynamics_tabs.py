@@ -106,8 +106,8 @@ def test_exponents_are_drawn_with_their_intervals(page):
         view._grow(
             (
                 SpectrumPoint(
-                    place, 5e-6, six, low, high, -260.0, -260.0, 4.4, 4.3, 4.5, "chaotic", "", "", 40, 300.0,
-                    "", 1.0,
+                    place, 5e-6, six, low, high, -260.0, -260.0, 4.4, 4.3, 4.5, "chaotic", 4.0, "", "",
+                    40, 300.0, "", 1.0,
                 ),
             )
         )  # fmt: skip
@@ -115,7 +115,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
     assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
-    assert "2 chaotic; sums of exponents differ from the damping rate" in view.summary.text()
+    assert "2 chaotic while observed; sums of exponents differ from the damping rate" in view.summary.text()
     assert not view._compare.isEnabled()
 
 
