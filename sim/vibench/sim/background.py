@@ -71,7 +71,7 @@ def _ignore(*_: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """Call of a function in another process, with the callbacks for its messages."""
+    """Function call to run in another process, with the callbacks that receive its messages."""
 
     work: Callable[..., Any]
     on_part: Callable[[Any], None]
@@ -129,7 +129,7 @@ class Pool:
         *args: Asked.args,
         **kwargs: Asked.kwargs,
     ) -> Job:
-        """Call ``function`` in a worker for at most ``longest_s``, then ``on_answer`` or ``on_error``."""
+        """Run ``function`` in a worker for at most ``longest_s``; then call ``on_answer`` or ``on_error``."""
         work = partial(_without_parts, partial(function, *args, **kwargs))
         return self.begin(Job(work, _ignore, on_answer, on_error, self._longest_s))
 
@@ -141,7 +141,7 @@ class Pool:
         on_error: Callable[[BaseException], None],
         question: Question,
     ) -> Job:
-        """Call ``function(question, tell, cancelled)`` in a worker; ``on_part`` receives what it tells."""
+        """Run ``function(question, tell, cancelled)`` in a worker; ``tell`` passes results to ``on_part``."""
         return self.begin(Job(partial(function, question), on_part, on_end, on_error, math.inf))
 
     def begin(self, job: Job) -> Job:

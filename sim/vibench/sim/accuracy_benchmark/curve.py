@@ -122,7 +122,7 @@ def _shoot(scene: Scene) -> Answer | None:
 
 
 def _first_order(scene: Scene) -> Answer | None:
-    """Return the responses of the stable motion with the smallest amplitude, which is reached from rest."""
+    """Return the responses of the stable motion of smallest amplitude: the motion reached from rest."""
     spring = spring_of(scene.specimen)
     if not isinstance(spring, PowerSpring):
         return None

@@ -33,11 +33,11 @@ from ._motion_search import MotionSearch, orbit_states, periodic_motions, simple
 
 INTERPOLATED = 0.06
 """Largest distance of a branch from the chord between two neighbouring points, relative to the chord's
-length. It follows from the largest rotation of the tangent in one step."""
+length. The value follows from the largest rotation of the tangent in one step."""
 SAME_MOTION = 1e-5
 """Additional distance between scaled states that `lies_on` allows for rounding errors."""
 LATE, LEAST_LATE_S = 0.25, 0.1
-"""Extra time to end a branch after the time limit: fraction of the limit, and smallest value [s]."""
+"""Extra time allowed to end a branch after the time limit: fraction of the limit, and smallest value [s]."""
 LENGTHS = 10.0
 """Length of the whole parameter range in the scaled units of branch following."""
 
@@ -114,7 +114,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches through new motions, and branches that fork off these, until a time limit."""
+    """Yield branches through new motions, and branches that fork off them, until a time limit."""
     known: list[FoundBranch] = []
     last_s = until_s + max(LEAST_LATE_S, LATE * (until_s - time.monotonic()))
     for value in np.linspace(*bounds, search.places):

@@ -45,7 +45,7 @@ class MotionSearch:
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Computing time limit for the search and all branches [s]; the branch in progress is then cut off."""
+    """Limit of the computing time for the search and all branches [s]; it cuts off the branch in progress."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -162,7 +162,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Return the simplest periodic motion of ``periods`` drive periods, by shooting from a state, or None."""
+    """Return the simplest motion that repeats after ``periods`` drive periods, found by shooting, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:

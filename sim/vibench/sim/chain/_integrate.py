@@ -29,7 +29,7 @@ STATES_PER_CELL = 6
 MOST_WINDOWS = 10**11
 """Largest number of windows of a run; `check_work` usually refuses even much shorter runs."""
 SLICE_CELL_WINDOWS = 1 << 12
-"""Product of windows and cells between two checks of a time limit; takes some milliseconds."""
+"""Product of the numbers of windows and cells between two time-limit checks; takes a few milliseconds."""
 
 
 class ChainRun:

@@ -31,7 +31,7 @@ class ChainResponse:
     accuracy: Accuracy
     duration_s: float
     window_s: float
-    """Length of the window at the end of the run from which `largest_m` is taken [s]."""
+    """Length of the window, at the end of the run, in which `largest_m` is determined [s]."""
     line_periods: int
     """Number of whole drive periods, at the end of the window, from which `lines_m` is computed."""
     largest_m: Floats
@@ -129,7 +129,7 @@ def chain_response(
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     """Return the response of a specimen as the response of a chain of one cell.
 
-    The spectral line of z follows from m0's equation of motion times exp(-i omega t), integrated by parts.
+    The line of z follows from m0's equation of motion, multiplied by exp(-i omega t) and integrated by parts.
     """
     drive = one.drive
     omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz

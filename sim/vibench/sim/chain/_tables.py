@@ -49,7 +49,7 @@ class ChainTables(NamedTuple):
     windows: Vector
     """Window lengths, the longest first, shape (windows,) [s]."""
     clash: Vector
-    """For each window length, the distance in cells within which only one may be in contact, (windows,)."""
+    """For each window length, distance [cells] within which only one cell may be in contact, (windows,)."""
 
 
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:

@@ -28,8 +28,8 @@ FIRST_S, FIRST_SHARE = 0.1, 0.75
 """Computing time that the first period may take [s], or share of the time limit if that is longer, because
 callers compute a second period."""
 HOPELESS, STEADILY = 10.0, 0.5
-"""Expected time / default limit above which an error is out of reach; ratio of the errors with all and with
-half the windows above which the error falls only with the square root of the time."""
+"""Ratio of expected time to default limit above which the run ends early. Ratio of the error with all windows
+to that with half of them, above which the error is assumed to fall with the square root of the time."""
 
 
 class TargetedResponse(NamedTuple):

@@ -150,7 +150,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Return the effects of the force's repeated time integrals on p, relative to the second integral's."""
+    """Return the effect of each repeated time integral of the force on p, relative to the second integral."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -276,7 +276,7 @@ def follow_batch(
 
     Returns
     -------
-    Result of each motion; None for a motion that failed, whose state is left unchanged.
+    Result of each motion; None for a motion that failed; the state of this motion is unchanged.
 
     Raises ValueError when batches do not support the specimen, or a motion is in contact.
     """

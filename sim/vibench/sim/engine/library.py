@@ -199,7 +199,7 @@ class Engine:
         return tables
 
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
-        """Determine whether m1 is in contact and store this in ``state``; return 0, or -1 if refused."""
+        """Store in ``state`` whether m1 is in contact; return 0, or -1 if the input is refused."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(

@@ -47,7 +47,7 @@ KNOWN_MOTION = (
 KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 SLICE_STEPS = 1 << 20
-"""Number of steps between two checks of a time limit; they take a few milliseconds."""
+"""Number of time steps between two time-limit checks; these steps take a few milliseconds."""
 _END_S: ContextVar[float] = ContextVar("end of the computing time", default=math.inf)
 
 
@@ -84,7 +84,7 @@ def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def next_slice(steps_left: int, size: int) -> int:
-    """Check the time limit; return the number of steps until the next check; all if no limit is set."""
+    """Check the time limit; return the number of steps until the next check, or all steps without a limit."""
     check_time()
     return min(steps_left, size) if _END_S.get() < math.inf else steps_left
 

@@ -58,8 +58,8 @@ def _about_middle() -> Table:
 ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""Largest distance of the maximum from mid-phi [rad]. At this distance eight terms have an error of 1e-7, at
-a tenth of it only rounding errors."""
+"""Largest distance of the maximum from mid-phi [rad]. At this distance eight terms have an error of 1e-7; at
+a tenth of this distance, only rounding errors."""
 
 
 def _top_of(terms: Vector) -> float:
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions and their scalars, tabulated over the press; each starts from the one before."""
+    """Return collisions and their scalars, tabulated over the press; each solution starts from the last."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # At zero press, the scaled duration of a collision is 2.943 and its depth nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943

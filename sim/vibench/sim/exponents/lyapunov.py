@@ -99,7 +99,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error [1/s]: half the difference of two cycles for multipliers, 0 for modes."""
+    """Standard error [1/s]; for Floquet multipliers half the difference of two cycles, for modes 0."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
@@ -235,7 +235,7 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
 def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
-    """Return a periodic motion's exponent and error [1/s]: mean of two cycles, and half their difference."""
+    """Return a periodic motion's exponent (mean of two cycles) and error (half their difference) [1/s]."""
     from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
 
     length, state, found = cycle * run.interval.length_s, run.section[-1], []

@@ -214,7 +214,7 @@ def run_with_tangent(
 
 
 def _parts(specimen: Specimen, interval_s: float) -> int:
-    """Return the number of parts of an interval, enough to keep tangent vectors numerically independent."""
+    """Return how many parts an interval needs for the tangent vectors to stay numerically independent."""
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
@@ -235,7 +235,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 # Physica D 7 (1983) 181). An exponent averaged over such a run describes neither of the two motions.
 
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
-"""Relative change of state per cycle. Below the first limit a motion repeats; above the second it changes."""
+"""Relative change of state per cycle: a motion repeats below the first limit, changes above the second."""
 LONGEST_CYCLE = 16
 """Longest cycle of a periodic motion that is detected, in intervals."""
 SURE = 3.0

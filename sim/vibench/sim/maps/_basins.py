@@ -28,7 +28,7 @@ FEWEST_UNCERTAIN = 100
 MOST_UNCERTAIN = 0.5
 """Largest share of uncertain initial states at each distance that the fit uses."""
 SPREAD = 4.0
-"""Smallest ratio between the largest and smallest distances of a fit; less gives no reliable slope."""
+"""Smallest ratio of the largest to the smallest distance of a fit; below it the slope is not reliable."""
 
 
 @dataclass(frozen=True)

@@ -161,7 +161,7 @@ class MapResults(GridResults[Map]):
         return self._describe_motions(self.motion_numbers.reshape(-1), self.audit)
 
     def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
-        """Return the motions of a cell, the most common first; `place`: its indices (second, first)."""
+        """Return the motions of the cell at `place` (second index, first index), the most common first."""
         points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
         cell = np.moveaxis(points, -2, -1)[place]
         known = cell[self._labels[cell] >= 0]

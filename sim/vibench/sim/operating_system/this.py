@@ -127,7 +127,7 @@ UNKNOWN = ""
 
 
 class Place(Enum):
-    """Place where a process was started; its number identifies it only if the place is `HERE`."""
+    """Place where a process was started; a process number is unique only within one place."""
 
     HERE = auto()
     CONTAINER = auto()

@@ -108,7 +108,7 @@ def balance(
     options
         Harmonics and tolerance.
     start
-        Initial guess, which decides between several motions; by default `first_guess`. Strong contact needs a
+        Initial guess, which selects one of several motions; by default `first_guess`. Strong contact needs a
         close guess, such as a solution at a neighbouring drive or an integrated orbit.
     """
     if not (0.0 < frequency_hz < math.inf and 0.0 < amplitude_m < math.inf):

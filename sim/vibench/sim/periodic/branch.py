@@ -13,7 +13,7 @@ from ..specimen.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance within which a multiplier counts as on the unit circle, as is usual without damping."""
+"""Distance within which a multiplier counts as on the unit circle; without damping, many are."""
 
 
 class Parameter(StrEnum):
@@ -150,7 +150,7 @@ class OrbitSigns:
     apart: Vector = field(default_factory=lambda: np.zeros(0))
     """Closure error over half the period, as for a simpler motion, shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
-    """Bifurcation where this branch meets one whose motions are mirrored or have half the period."""
+    """Bifurcation where this branch meets a branch whose motions are mirrored or have half the period."""
     grazing_distance: float = math.inf
     """Distance from grazing: (distance to the stop) / gap or, at a contact, (dp/dt) / (gap * 2 pi f)."""
 
@@ -200,7 +200,7 @@ IS_SIMPLER = 1e-7
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch has passed its end, a motion that is mirrored or has half the period."""
+    """Return whether a branch has passed its end, at a motion that is mirrored or has half the period."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -32,7 +32,7 @@ class FrequencyPath:
     amplitudes_m: tuple[float, ...]
     """Drive amplitude at each of the frequencies, or one constant amplitude [m]."""
     frequencies_hz: tuple[float, ...] = ()
-    """Ascending frequencies [Hz], between which the amplitude is a monotone cubic; constant outside."""
+    """Ascending frequencies [Hz]; the amplitude is a monotone cubic between them, and constant outside."""
     parameter: ClassVar = Parameter.FREQUENCY
 
     def __post_init__(self) -> None:

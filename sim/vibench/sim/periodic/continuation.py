@@ -78,7 +78,7 @@ class ArcPoint:
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
-"""Number of Newton iterations at which the step length is unchanged; fewer make the next step longer."""
+"""Number of Newton iterations that leaves the step length unchanged; after fewer, the next step is longer."""
 FARTHEST_ASIDE = 0.5
 """Largest allowed Newton correction, relative to the step length; a larger one could reach another branch."""
 LEAP_GROWTH = 10.0
@@ -250,7 +250,7 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
 
 
 def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the ratio of the next step length to this one, from iterations and the tangent's rotation."""
+    """Return the ratio of the next step length to this one, from iteration count and tangent rotation."""
     effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
     bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
     return min(2.0, max(0.5, min(effort, bend)))

@@ -2,8 +2,8 @@
 
 With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is P (1 + G N(|P|))
 = P_lin. G is the compliance at the spring, N the describing function of the spring, and P_lin the solution
-without the spring. The squared magnitude is an equation with a few powers of |P|; all its zeros are found, so
-no branch is missed.
+without the spring. Squared magnitudes give an equation in a few powers of |P|; all its zeros are found, so no
+branch is missed.
 
 `positive_zeros` finds all positive zeros of a sum of a few powers. Companion matrices would miss some, for
 example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: a sum of m powers,

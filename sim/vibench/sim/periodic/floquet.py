@@ -111,7 +111,7 @@ class _Departures:
         return np.asarray(result)
 
     def _steps(self, turn: float) -> int:
-        """Return the number of Magnus steps for a phase ``turn`` of the fastest motion [rad]."""
+        """Return the number of Magnus steps for a phase advance ``turn`` of the fastest motion [rad]."""
         needed = math.ceil(STEPS_PER_TURN * turn)
         if self._spring.kinks:
             return max(CONTACT_STEPS, needed)

@@ -115,8 +115,8 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m] to ``stop``.
 
-    The branch ends at ``stop``, or at its starting value if it turns back to it. Folds are passed by
-    pseudo-arclength continuation (Keller 1977).
+    The branch ends at ``stop``, or at the starting value if the branch turns back that far. Folds are passed
+    by pseudo-arclength continuation (Keller 1977).
 
     Raises ValueError when the orbit did not converge, or ``stop`` is not allowed.
     """

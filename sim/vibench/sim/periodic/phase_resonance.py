@@ -33,7 +33,7 @@ FREQUENCY_SHARE = 0.1
 FARTHEST = 20.0
 """Largest change of frequency or level that Newton's iteration may try, in units of arc length."""
 STRAYED = 1e3
-"""Largest state [gaps] that Newton's iteration may try; on a hard spring, larger ones take minutes."""
+"""Largest state [gaps] that Newton's iteration may try; with a hard spring, larger states take minutes."""
 DIFFERENCE = 1e-6
 """Step of the finite differences for derivatives of the phase, relative to the scale of each unknown."""
 SCAN_POINTS = 400

@@ -204,7 +204,7 @@ DRIFT_SHARE = 0.25
 
 
 class SettlingCourse:
-    """Run of a motion until it repeats or certainly never will; then it is observed.
+    """Run that lasts until the motion repeats or certainly never will; then the motion is observed.
 
     A repeating motion is observed over one of its periods, any other motion over a window. Because chaos may
     end, a chaotic motion is integrated further, without a tangent vector, as far as a budget allows.
@@ -216,7 +216,7 @@ class SettlingCourse:
     window_s
         Length of the window for a non-repeating motion [s]; rounded to equal parts of whole drive periods.
     longest_s
-        Longest simulated time [s], at least a window; a motion still unclear then counts as undecided.
+        Longest simulated time [s], at least a window; a motion that is still unclear counts as undecided.
     alone_s
         Nominal computing cost for integrating chaos further [s]; zero for no further integration.
     by_itself_s
@@ -249,7 +249,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Integrate until it is clear whether the motion repeats; return it if it must be continued."""
+        """Integrate until it is clear whether the motion repeats; return a motion that must be continued."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:

@@ -34,9 +34,9 @@ FLIGHT, STEPS = 5e-5, 3.5e-4
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 """Computing cost of an impact: on a Hertz or rigid stop, and on a linear gap [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Cost factors of contacts with a tangent vector (Hertz, others); it needs time steps in collisions."""
+"""Cost factors of contacts (Hertz, others) with a tangent vector, which needs time steps in collisions."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Tolerance below which contacts take more computing time, and the factor by which they do."""
+"""Tolerance below which contacts take more computing time, and the factor of this increase."""
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
 TANGENT_STEPS = 4
@@ -103,7 +103,7 @@ class Stretch:
 
 
 class FollowedRun:
-    """Motion of a specimen from a start (initial state), which is integrated step by step.
+    """Motion of a specimen, integrated step by step from a start (initial state).
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """

@@ -66,7 +66,7 @@ class LinearMotion:
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def transient_share(self, time_s: float) -> float:
-        """Return the ratio of transient to steady motion at a time [s]; the larger one of x and p."""
+        """Return the ratio of transient to steady motion at a time [s]: the larger ratio of x and p."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
@@ -141,7 +141,7 @@ SLOW = 0.9
 """Ratio of drive frequency to lowest natural frequency, below which a motion counts as slow."""
 MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
-"""Impacts per drive period if p without stops equals the gap; it grows as the cube root of p / gap."""
+"""Number of impacts per drive period if p without stops equals the gap; grows as the cube root of p / gap."""
 HALF_PRESSED = 150.0
 """Ratio of p without stops to the gap at which m1 touches a stop during half of the time."""
 MICROMETRES = 1e6

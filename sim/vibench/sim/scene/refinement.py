@@ -50,7 +50,7 @@ from .solve import Question, solve_closed_form
 from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
-"""Default limit of the computing time, and time above which a requested error is out of reach [s]."""
+"""Default limit of the computing time, and expected time above which an error is out of reach [s]."""
 HOPELESS_S = 2.0
 """Computing time if no time is requested and the requested error takes longer than the default limit [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
@@ -75,7 +75,7 @@ LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.2
 """Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
 up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
 LOOKS = 8
-"""Number of checks, before its window, of a run from another start."""
+"""Number of checks of a run from another start, before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
 SAME = 1e-3
 """Largest relative change of the state after a period for a motion that repeats."""
@@ -374,7 +374,7 @@ class _Refinement:
         return now < CLOSE and now < max(0.5 * before, 0.03 * CLOSE)
 
     def _away_from(self, orbit: _Orbit | None, state: Floats, size: float) -> float:
-        """Return the distance of a state from a periodic motion, over ``size``; inf if the motion is None."""
+        """Return the distance of a state from a periodic motion, relative to ``size``; inf for no motion."""
         if orbit is None:
             return math.inf
         return float(np.abs((orbit.section - state) / self._scales).max(axis=1).min()) / size

@@ -197,7 +197,7 @@ def _change(after: Floats, before: Floats) -> float:
 FORGETTING = 8.0
 """Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
 FEWEST_TIMES = 40.0
-"""Ratio of the longest run to the longest decay time used; longer decay times are limited to it."""
+"""Ratio of the longest run to the longest decay time used; longer decay times are cut to this limit."""
 MOST_STATES = 2_000_000
 """Largest number of drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
@@ -222,7 +222,7 @@ class Pace:
     forgetting_s: float
     """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """Decay time without this limit [s]; an undamped mode, having no decay time, gets the limit."""
+    """Decay time without the limit of ``forgetting_s`` [s]; for an undamped mode it is the limit."""
     sharpness: Sharpness
     nearly: Sharpness
     """Tolerances of the least accurate level, for motions that are nearly settled."""

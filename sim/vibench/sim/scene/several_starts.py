@@ -275,7 +275,7 @@ class SeveralStarts:
 SAME = 1e-3
 """Largest relative difference of responses between runs of the same motion."""
 APART = 2.0
-"""Chaotic motions count as different if their responses differ by more than this many scatter limits."""
+"""Difference of responses [scatter limits] above which chaotic motions count as different."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
