@@ -65,7 +65,7 @@ def at_most(name: str, unit: str, high: float) -> Expectation:
 
 
 def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
-    """Return one requirement per expected peak: its frequency must be met within ``within_hz``."""
+    """Return one requirement per expected peak: the measured frequency must agree within ``within_hz``."""
     return tuple(about(f"{each:g} Hz peak", "Hz", each, within_hz) for each in wanted_hz)
 
 
@@ -128,7 +128,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """With the defaults, the claim holds only for some initial states; which ones is a matter of chance."""
+    """With the defaults, the claim holds only for some initial states; chance decides for which of them."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
@@ -208,7 +208,7 @@ def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
-    """Measure a claim with a case's options; if it fails, try alternatives until one makes it hold."""
+    """Measure a claim with a case's options; if it fails, try alternatives until it holds."""
     findings = [finding(claim, evidence, case)]
     for alternative in claim.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:

@@ -1,4 +1,4 @@
-"""Fig. 4: linear and colliding motion at 5 um: response, p, exponent, and time signal at 260 Hz."""
+"""Fig. 4: motion at 5 um with and without stops. Response, p and exponent; time signal at 260 Hz."""
 
 from vibench.analysis import report
 from vibench.sim import Harmonic

@@ -33,7 +33,7 @@ COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Content of the page."""
+    """Content of the page on the paper's claims."""
 
     sections: Mapping[str, tuple[Judgement, ...]]
     scores: tuple[DampingScore, ...]

@@ -55,13 +55,13 @@ def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
 
 
 def stretches(flags: Flags) -> NDArray[np.intp]:
-    """Return the first index and the end of each run of consecutive flags, shape (runs, 2)."""
+    """Return the first index of each run of true flags, and the first index after it, shape (runs, 2)."""
     changes = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
     return np.flatnonzero(changes).reshape(-1, 2)
 
 
 def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
-    """Shade the flagged frequencies, each to the midpoints between it and its neighbours."""
+    """Shade each flagged frequency, as far as the midpoints between it and its neighbours."""
     between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
     edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
     for first, end in stretches(flags):

@@ -16,7 +16,7 @@ _HALF_BAND_HZ = 10.0
 _LOOKED_HZ = ((150.0, 245.0), (350.0, 500.0))
 """Search ranges of the two broad peaks: around each terminal resonance, but away from the drive."""
 _ABSENT, _PRESENT = 0.01, 0.1
-"""Largest level of an absent spectral line and smallest level of a present one, relative to the drive's."""
+"""Largest level of an absent line and smallest level of a present line, relative to the drive's line."""
 _NEAR_HZ = 20.0
 """Tolerance of the broad peaks, small enough to exclude the linear resonances."""
 _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")

@@ -22,7 +22,7 @@ from .responses import Reals
 APART_M = 1e-11
 """Distance of the neighbouring motion, for exponents [m]; far below indentations, above rounding errors."""
 READING_S = 1e-3
-"""Interval at which the distance of the neighbour is measured and reset [s]."""
+"""Interval at which the distance of the neighbouring motion is measured and reset [s]."""
 LOST_M = 1.0
 """Displacement beyond which a motion has diverged [m]."""
 SLOWEST_PER_S = 1e-9

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 SPECTRUM_HZ = 600.0
 _RATE_HZ = 8192.0
 _STRETCHES = 600
-"""Number of sections of the outline, which shows the smallest and largest value of each."""
+"""Number of sections of the outline, which shows the smallest and largest value in each section."""
 _DECADES = 5.0
 
 

@@ -1,4 +1,4 @@
-"""Error against computing time for one scene and every suitable method, measured on this machine.
+"""Curve of error against computing time, for one scene and every suitable method, on this machine.
 
 `vibench.sim.accuracy_benchmark.curve` computes the points of this curve.
 

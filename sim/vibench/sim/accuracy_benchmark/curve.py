@@ -1,4 +1,4 @@
-"""Error against computing time for every method that can solve a scene, measured on this machine."""
+"""Curve of error against computing time, for every method that can solve a scene, on this machine."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -43,15 +43,15 @@ class CurvePoint:
 
 
 Answer = tuple[Floats, float | None]
-"""Responses I and II of x, then of p, and the largest of their relative errors (None: not estimated)."""
+"""Responses I and II of x, then of p, and their largest relative error (None if not estimated)."""
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     """Yield error and computing time of all suitable methods for a scene with a target.
 
-    The first points are the successive results of `refine_scene`, until the target is met. They take at most
-    half of the time limit; methods that exceed the remaining time are left out. Raises ValueError when the
-    scene has no target, or cannot be simulated.
+    The first points are the successive results of `refine_scene`, until the target is met. These points take
+    at most half of the time limit; methods that exceed the remaining time are left out. Raises ValueError
+    when the scene has no target, or cannot be simulated.
     """
     end_s = time.monotonic()
     next(refine_scene(scene))  # not timed: the first solution includes work done once per process

@@ -1,4 +1,4 @@
-"""Branches of exact motions and of harmonic balances, found by a search or at bifurcations."""
+"""Branches of exact motions and of harmonic-balance solutions, found by a search or at bifurcations."""
 
 import math
 import time

@@ -66,7 +66,7 @@ class CellResponse(NamedTuple):
     link: Complex
     """Stiffness of the link to the previous cell, K = k0 + i w c0 [N/m]."""
     stiffness: Complex
-    """Ratio of force on m0 to its displacement if the link is left out, S(w) - w^2 m0 [N/m]."""
+    """Ratio of the force on m0 to the displacement of m0 without the link, S(w) - w^2 m0 [N/m]."""
     inner: Complex
     """Ratio y / x: displacement of m1 over that of m0."""
     middle: Complex

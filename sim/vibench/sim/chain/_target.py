@@ -142,7 +142,7 @@ def _errors(windows: Sequence[ChainResponse]) -> Floats:
 def error_of_lines(lines: Complex) -> Floats:
     """Return the relative error of the mean amplitude of spectral lines of shape (windows, cells).
 
-    It is the larger of Student's interval from pairs of windows and the difference between both halves.
+    It is the larger of Student's interval from pairs of windows and the difference between the two halves.
     """
     count = len(lines) // 2
     if count < FEWEST_PAIRS:

@@ -1,4 +1,4 @@
-"""Growth of small changes: Lyapunov exponents with standard errors, and whether a motion is chaotic.
+"""Growth of small perturbations: Lyapunov exponents with standard errors, and detection of chaos.
 
 A small perturbation of the state is propagated exactly, through all contacts. Its mean growth rate [1/s] is
 the exponent. The standard error allows for correlated growth (docs/decisions/0007-lyapunov.md). If the motion

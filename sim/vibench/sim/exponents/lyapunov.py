@@ -2,7 +2,7 @@
 
 A tangent vector is propagated exactly with and without contact; its mean growth rate is the exponent. The
 final motion decides the method: decay of the modes if no impact will follow, Floquet multipliers if the
-motion has become periodic, otherwise the mean growth. Its standard error allows for correlation of successive
+motion has become periodic, otherwise the mean growth. The standard error allows for correlation of successive
 intervals. Chaos that ends during the run is reported separately.
 """
 

@@ -3,7 +3,7 @@
 Six tangent vectors span all directions of the state. They are propagated together and orthogonalised
 repeatedly; their growth rates are the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9).
 The sum of the exponents is the mean rate of change of the logarithm of a volume in state space. For every
-elastic law and any motion it must be -tr(M^-1 C), which the tests check.
+elastic law and any motion this rate must be -tr(M^-1 C), which the tests check.
 """
 
 import math

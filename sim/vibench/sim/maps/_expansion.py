@@ -139,8 +139,8 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return a number per cell, shape (rows, columns); cells that reach the same motions have equal numbers.
-    Their first initial states must also reach the same motion. ``label``: shape (rows, initial states,
-    columns).
+    The first initial states of such cells must also reach the same motion. ``label``: shape (rows, initial
+    states, columns).
     """
     rows, starts, columns = label.shape
     if starts == 1:

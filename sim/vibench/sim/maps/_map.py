@@ -97,7 +97,7 @@ def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
     """Return the largest energy stored in a stop [J], from the penetration; None without elastic stops.
 
-    Also None if the gaps differ and abs(p) exceeds the smaller one: it is unknown which stop was reached.
+    Also None if the gaps differ and abs(p) exceeds the smaller gap: it is unknown which stop was reached.
     """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:

@@ -207,7 +207,7 @@ class BalanceFamily:
         )
 
     def refine(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
-        """Return the family with twice the harmonics (new ones are zero); None if at the limit already."""
+        """Return the family with twice the harmonics (new harmonics are zero); None at the limit."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
         if more <= highest:

@@ -2,8 +2,8 @@
 
 The equations P_k + compliance_k F_k(P) = linear_k U, one for each harmonic in the solution, are solved by a
 damped Newton iteration with the exact Jacobian. The alternating frequency-time scheme gives the force F.
-Contact needs many harmonics (51 to 400), power laws few. Harmonics are added until the estimated effect of
-the neglected ones is small enough.
+Contact needs many harmonics (51 to 400); power laws need few. Harmonics are added until the estimated effect
+of the neglected ones is small enough.
 """
 
 import math

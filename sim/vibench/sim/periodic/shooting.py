@@ -279,7 +279,7 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
 def _missing(derivative: Table, gone: Vector, size: float) -> float:
     """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1.
 
-    The integration error grows with ``size``, the state divided by its scale, if that is above 1.
+    The integration error grows with ``size``, the state divided by its scale, if this ratio is above 1.
     """
     slope = derivative - np.eye(6)
     if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):

@@ -67,7 +67,7 @@ class FixedCourse:
     """Run of a motion for a given time, observed at its end.
 
     The state is checked once per drive period. A motion that does not repeat after the expected transient is
-    described by the growth of perturbations and by statistics. For these, a tangent vector is propagated and
+    described by the growth of perturbations and by statistics. For both, a tangent vector is propagated and
     the peaks of blocks are stored.
     """
 
@@ -84,7 +84,7 @@ class FixedCourse:
         """Return None: with a fixed duration the motion is not integrated further."""
 
     def observe(self) -> SceneRun:
-        """Observe the motion in the window at its end and classify it."""
+        """Observe the motion in the window at the end of the run, and classify the motion."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
         last = follow_with_section(run, duration.duration_s - duration.window_s)
@@ -118,9 +118,9 @@ def classify(
 ) -> SceneRun:
     """Classify a motion from its response window and the stretches of the run before the window.
 
-    The stretches before the window are as long as its blocks. A motion that repeats counts as periodic only
-    if Newton's iteration finds a stable periodic motion nearby. Chaos also comes close to unstable periodic
-    motions, and lingers where a periodic motion has just vanished in a fold.
+    The stretches before the window are as long as the blocks of the window. A motion that repeats counts as
+    periodic only if Newton's iteration finds a stable periodic motion nearby. Chaos also comes close to
+    unstable periodic motions, and lingers where a periodic motion has just vanished in a fold.
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
@@ -327,7 +327,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the numbers of drive periods in a slice (between two checks), and of slices in a window."""
+    """Return the number of drive periods between two checks (a slice), and of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))

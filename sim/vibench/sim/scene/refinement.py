@@ -54,7 +54,7 @@ LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
 HOPELESS_S = 2.0
 """Computing time if no time is requested and the requested error takes longer than the default limit [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
-"""Time until a first result is due [s], and nominal cost it may still use after the time limit [s]."""
+"""Time until a first result is due, and nominal cost that this result may use after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 BATCH_PARTS, MOST_TOGETHER = 8, 64

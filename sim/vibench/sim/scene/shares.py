@@ -32,7 +32,7 @@ def normal_quantile(tail: float) -> float:
 
 
 def poisson_mean(fewer_than: int, probability: float) -> float:
-    """Return the mean of a Poisson distribution with ``probability`` of a count below ``fewer_than``."""
+    """Return the mean at which a Poisson count is below ``fewer_than`` with the given ``probability``."""
 
     def cumulative(mean: float) -> float:
         terms = (k * math.log(mean) - mean - math.lgamma(k + 1.0) for k in range(fewer_than))
@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Return the argument in 0 to ``high`` at which a decreasing function equals ``value``, by bisection."""
+    """Return the argument, 0 to ``high``, at which a decreasing function equals ``value``, by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)

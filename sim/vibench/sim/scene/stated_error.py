@@ -31,7 +31,7 @@ below a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Number of parts of a window that are compared with it; a part's leakage is this many times larger."""
+"""Number of parts of a window that are compared with all of it; leakage in a part is that much larger."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0
@@ -135,7 +135,7 @@ def _by_window(seen: SceneRun) -> Floats:
 
 
 def _rounding(answer: Floats) -> Floats:
-    """Return the relative rounding errors of responses; a line has the same absolute error as the peak."""
+    """Return the relative rounding errors of responses; line and peak have the same absolute error."""
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
@@ -212,7 +212,7 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 
 
 def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
-    """Integrate a motion from its start with a smaller tolerance, until it separates or the window ends.
+    """Integrate a motion from its start with a smaller tolerance, until the runs separate or the window ends.
 
     The start is offset by a rounding error. Otherwise exact motion between contacts would be compared with
     itself. A motion that amplifies rounding errors would then appear exact.

@@ -31,7 +31,7 @@ SLICE_S = 0.5
 PARTS = 4
 """Number of parts of a stretch in which growth is measured, to see if a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Time for which states are stored [decay times of the slowest mode]; at *standard*, settling takes ten."""
+"""Time for which states are stored [decay times of the slowest mode]; settling at *standard* takes ten."""
 
 
 class StatesAlone:
@@ -86,7 +86,7 @@ class StatesAlone:
 
     @property
     def wandered_until_s(self) -> float:
-        """Last time at which two successive periods differed [s]; the current time if none repeats."""
+        """Last time at which two successive periods differed [s]; the current time before any repetition."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
@@ -126,7 +126,7 @@ class StatesAlone:
         return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
-        """Integrate for ``length_s`` with a tangent vector; return its growth (empty for zero length)."""
+        """Integrate for ``length_s``; return the growth of a tangent vector (empty for zero length)."""
         self.run.follow_tangent()
         begin_s = self.run.time_s
         ends_s = [begin_s + length_s * (part + 1) / PARTS for part in range(PARTS)] if length_s > 0.0 else []
@@ -193,6 +193,6 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Integrate each motion in a batch for its number of periods; return the motions that need more."""
+    """Integrate each motion in a batch for its number of periods; return motions that need more periods."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
     return [each for (each, _), stretch in zip(ready, found, strict=True) if each.note(stretch) is None]

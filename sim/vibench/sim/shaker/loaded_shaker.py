@@ -1,8 +1,8 @@
 """Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
 All results are means over a time step. They are exact, because the voltage is constant in a step and the
-integrals of base acceleration and m0 velocity are known at both ends. Impacts do not alias in such means.
-They refer to the centre of the step, so that all channels agree in phase.
+integrals of base acceleration and m0 velocity are known at both ends. Impacts do not alias in such means. The
+means refer to the centre of the step, so that all channels agree in phase.
 """
 
 import math

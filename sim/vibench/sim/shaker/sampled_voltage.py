@@ -24,7 +24,7 @@ Gain = Callable[[FloatArray], ComplexArray]
 FINEST_STEP_HZ = 5e4
 """Lowest rate of steps [Hz]; the specimen's force on the table has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
-"""Ratio of the pass band's end to the sample rate; a cosine edge to half the sample rate follows."""
+"""Ratio of the pass band's end to the sample rate; a cosine edge follows, up to half the sample rate."""
 _MARGIN = 2048
 """Number of samples filtered on each side of a piece; beyond them, impulse responses are below 1e-8."""
 _PIECE = 1 << 15
@@ -159,7 +159,7 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Return factors for spectral lines of ``size`` samples: to time steps, or back through a sensor."""
+        """Return the factors of spectral lines for resampling to time steps or, with ``gain``, to samples."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)

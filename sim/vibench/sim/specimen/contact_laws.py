@@ -25,7 +25,7 @@ from .stops import (
 
 MOST_TERMS = 6
 HIGHEST_EXPONENT = 1001
-"""Largest exponent; with it a 0.1 % change of p changes the force by a factor of e, like a rigid wall."""
+"""Largest exponent, close to a rigid wall: a 0.1 % change of p changes the force by a factor of e."""
 
 
 @dataclass(frozen=True)

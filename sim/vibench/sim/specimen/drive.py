@@ -11,9 +11,9 @@ from .stops import Strict, require_positive
 FEWEST_SAMPLES = 4
 """Smallest number of samples of a sampled drive: a not-a-knot cubic spline needs four points."""
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
-"""Allowed base amplitudes [m]. Squares of smaller ones underflow; larger ones must be typing errors."""
+"""Allowed base amplitudes [m]. Squares of smaller values underflow; larger values must be typing errors."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Allowed frequencies [Hz]. Above them, powers of the frequency and numbers of periods overflow."""
+"""Allowed frequencies [Hz]. At higher ones, powers of the frequency and numbers of periods overflow."""
 
 
 @dataclass(frozen=True)

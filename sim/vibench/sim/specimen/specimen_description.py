@@ -46,13 +46,13 @@ SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
 """Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Largest number of descriptions of which each names the next one in ``model``."""
+"""Largest number of descriptions in a chain in which each names the next one in ``model``."""
 USUAL_SPECIMEN = "gong2025"
 """Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
 """Pairs of alternative keys; a specimen has exactly one key of each pair."""
 _ANY_GAP_M = 1e-5
-"""Arbitrary gap for the check whether a contact law is known."""
+"""Arbitrary gap, used only to check whether a contact law is known."""
 PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
 NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
@@ -131,7 +131,7 @@ class SpecimenDescription(_DescribedModel):
     masses_kg: PositiveTriple
     """Masses m0, m1, m2 [kg]."""
     single_frequencies_hz: PositiveTriple | None = None
-    """Frequencies f_i of each mass on its spring alone, k_i = m_i (2 pi f_i)^2; replace the stiffnesses."""
+    """Frequency f_i of each mass on its spring alone, k_i = m_i (2 pi f_i)^2; alternative to stiffnesses."""
     stiffnesses_n_per_m: PositiveTriple | None = None
     """Stiffnesses k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2) [N/m]."""
     damping_time_s: DampingTime | None = None

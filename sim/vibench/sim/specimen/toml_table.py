@@ -8,7 +8,7 @@ from typing import Any
 
 
 class UnreadableTomlError(ValueError):
-    """Error: a file cannot be read or is not TOML; the message begins with its path."""
+    """Error: a file cannot be read or is not TOML; the message begins with the file's path."""
 
 
 def toml_table(path: Path) -> dict[str, Any]:
@@ -58,7 +58,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it selects the kind of this table",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""Messages in TOML's terms, by pydantic's error type; they replace those of pydantic in Python's terms."""
+"""Messages in TOML's terms, by pydantic's error type; they replace pydantic's messages in Python's terms."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:

@@ -24,7 +24,7 @@ FORMAT_VERSION = 2
 """Version of the file format; increased whenever older readers would misread the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""HDF5 versions for which HDF5 writes superblock 0, which all readers since HDF5 1.8 support, also MATLAB."""
+"""HDF5 versions for which HDF5 writes superblock 0, which MATLAB and all readers since HDF5 1.8 support."""
 
 STUDY = "study_json"
 STATE = "state"
@@ -291,7 +291,7 @@ class GridPlan(FrozenModel, ABC):
         return self.model_dump_json()
 
     def digest_at(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
-        """Return the digest of a point: its number, the plan, and all values except the point's state."""
+        """Return the digest of a point's number, its plan, and all its values except the point state."""
         found = hashlib.sha256(f"{number} {self.text}".encode())
         for column in self.columns:
             if column.name not in (DIGEST, STATE):

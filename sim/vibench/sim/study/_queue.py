@@ -76,8 +76,8 @@ NOBODY = -1
 class PointScheduler:
     """Points still to be computed, in the order in which they are started.
 
-    The point with the longest computing time is started first, which keeps all workers busy to the end. Its
-    time includes all points that continue it. Each point is taken once, unless it is put back.
+    The point with the longest computing time is started first, which keeps all workers busy to the end. A
+    point's time includes all points that continue it. Each point is taken once, unless it is put back.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:

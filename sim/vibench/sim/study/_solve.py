@@ -176,9 +176,9 @@ def run_study(
 ) -> StudyEnd:
     """Compute every point that is missing in the store, the longest first.
 
-    Results do not depend on the executor or the order of computation. A point that continues another one
-    waits for its result. An error in a scene is stored as the result of its point. Raises StudyError when the
-    store or the executor fails; results stored earlier are safe.
+    Results do not depend on the executor or the order of computation. A point that continues another point
+    waits for the result of that point. An error in a scene is stored as the result of its point. Raises
+    StudyError when the store or the executor fails; results stored earlier are safe.
 
     Parameters
     ----------

@@ -183,14 +183,14 @@ TASK_CALLS: Mapping[str, TaskCall] = {
 
 Listener = Iterator[Any]
 _BY_OTHERS = math.inf
-"""Rig time [s] that stands for an event that only other calls can cause."""
+"""Value of rig time [s] for an event that only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
-    Like a reader, a listener waits for rig time. With time on demand, it advances time itself, and goes on
-    once the announced samples have been read.
+    Like a reader, a listener waits for rig time. With time on demand, the listener advances time, and
+    continues once the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"

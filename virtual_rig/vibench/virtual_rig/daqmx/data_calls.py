@@ -70,7 +70,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Return the number of unread samples per channel; time on demand advances if none is unread."""
+    """Return the number of unread samples per channel; advance time on demand if there are none."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -79,7 +79,7 @@ def available(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples. Time on demand advances if none was read since the last query."""
+    """Return the number of unread samples; advance time on demand if none was read since the last query."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -211,7 +211,7 @@ _SECONDS_1904_TO_1970 = 2_082_844_800
 
 
 def _read_array(task: Task, request: Any, convert: Callable[[Task, Reading], NDArray[Any]]) -> Fields:
-    """Read and convert samples, in the caller's layout; "all" means as many as fit into its array."""
+    """Read and convert samples in the caller's layout; "all" means as many as fit into the caller's array."""
     channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan

@@ -103,7 +103,7 @@ class Rig:
         self.changed.notify_all()
 
     def end(self, stream: Acquisition | Generation) -> None:
-        """Close a stream, which no longer advances with rig time."""
+        """Close a stream, so that it no longer advances with rig time."""
         stream.close()
         self._acquisitions = [other for other in self._acquisitions if other is not stream]
         self._generations = [other for other in self._generations if other is not stream]

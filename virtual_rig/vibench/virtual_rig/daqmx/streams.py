@@ -140,7 +140,7 @@ class Acquisition(Stream):
 
 
 LEAD_S = 0.005
-"""Lead of the samples passed to the world [s]: avoids gaps, but lets newly written samples act soon."""
+"""Lead of the samples passed to the world [s]: long enough to avoid gaps, short for a fast reaction."""
 
 
 class OutputBuffer:
@@ -192,7 +192,7 @@ class Generation(Stream):
         self._idle = device.idle
         self._memory = np.empty((len(self._outputs), 0))
         self._most_in_memory = 0 if self.repeats else device.memory
-        """Most samples that the device stores; a repeated buffer is not transferred in advance."""
+        """Largest number of samples stored in the device; 0 for a repeated buffer."""
         self._fetched = 0
         self._recent = np.empty((len(self._outputs), 0))
         self._is_open = True

@@ -59,7 +59,7 @@ class TdmsLog:
 
 _OWN_CLOCKS = ("", "onboardclock")
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
-"""Buffer sizes [samples per channel] up to each rate (NI-DAQmx Help, "How is buffer size determined?")."""
+"""Upper rate limits [Hz] with buffer sizes [samples] (NI-DAQmx Help, "How is buffer size determined?")."""
 
 
 class TaskState(IntEnum):

@@ -191,7 +191,7 @@ class ChannelOutput(Timeline):
         self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a burst or sweep that waits for a trigger; do nothing during a burst, or if none is waiting.
+        """Start a burst or sweep that waits for a trigger; do nothing if none is waiting or a burst runs.
 
         A gated burst never starts, because nothing is connected to the gate input.
         """

@@ -312,7 +312,7 @@ class ScpiDevice(Protocol):
 
 
 class ScpiSocket(socketserver.ThreadingTCPServer):
-    """A server for this computer only, since SCPI has no password; a context manager.
+    """A server for this computer only, because SCPI has no password; used as a context manager.
 
     Parameters
     ----------

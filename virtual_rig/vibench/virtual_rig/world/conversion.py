@@ -23,7 +23,7 @@ GROUP_DELAY_SAMPLES = 40
 """Common delay of all channels, in output samples: typical of a delta-sigma converter."""
 
 _HALF_WIDTH_SAMPLES = 32
-"""Half width of the filter: pass band up to 0.45 of the sample rate, -100 dB from 0.55 of it on."""
+"""Half width of the filter: pass band up to 0.45, and -100 dB from 0.55 of the sample rate."""
 _STOP_BAND_DB = 100.0
 _KAISER_BETA = 0.1102 * (_STOP_BAND_DB - 8.7)
 """Window parameter by Kaiser (1974); Oppenheim and Schafer, Discrete-Time Signal Processing, eq. 7.75."""
@@ -40,7 +40,7 @@ _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest delay of a channel for which the filter needs no future means [steps]; negative if ahead."""
+"""Smallest delay of a channel for which the filter needs no future means [steps]; a lead is negative."""
 
 
 class Decimator:
@@ -154,7 +154,7 @@ class InputStage:
         return self._cables.get(self.configured.physical_channel, OPEN_INPUT)
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
-        """Return volts at the converter, and whether any clips, for ``signals`` of shape (signals, steps)."""
+        """Return volts at the converter, and whether they clip, for ``signals`` of shape (signals, steps)."""
         offset_v, gain = _operating_point(self.configured, self.cable)
         signal = signals[self.cable.signal]
         match self.configured.coupling:
