@@ -54,7 +54,7 @@ class Case(FigureOptions):
     changed: tuple[str, ...] = ()
     """Options that differ from the program's defaults, in words."""
     draw: int = 0
-    """Number of the initial state: 0 is rest; each other state is a millionth of the gap away from it."""
+    """Number of the initial state: 0 is rest; each other state is a millionth of the gap away from rest."""
 
     def __post_init__(self) -> None:
         for what, value in (("a base amplitude", self.sweep_amplitude_m), ("an indentation", self.fit_m)):

@@ -54,7 +54,7 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """Branch of periodic motions, with the motions' period and symmetry, its origin and computing time."""
+    """Branch of periodic motions: their period and symmetry, the branch's origin, and its computing time."""
 
     branch: Branch
     shape: OrbitShape

@@ -45,7 +45,7 @@ class MotionSearch:
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Limit of the computing time for the search and all branches [s]; it cuts off the branch in progress."""
+    """Limit of the computing time for the search and all branches [s]; a branch in progress is cut off."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:

@@ -1,7 +1,7 @@
 """Chain of vibro-impact cells, coupled at their outer masses. SI units.
 
-Cell i is a `Specimen` whose (k0, c0) couple its m0 to the m0 of the previous cell; those of the first cell
-couple it to the base. The far end is free. Displacements have the order x1, y1, z1, x2, y2, z2, ...
+Cell i is a `Specimen` whose (k0, c0) couple its m0 to the m0 of the previous cell; the first cell is coupled
+to the base. The far end is free. Displacements have the order x1, y1, z1, x2, y2, z2, ...
 """
 
 from dataclasses import dataclass

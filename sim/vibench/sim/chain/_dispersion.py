@@ -74,7 +74,7 @@ class CellResponse(NamedTuple):
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> CellResponse:
-    """Return the response of a cell without contact to a motion of its m0, finite even if m1 resonates."""
+    """Return the response of a cell to a motion of its m0, without contact; finite even if m1 resonates."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping

@@ -143,7 +143,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces samples past the end due to rounding."""
+        """Return all samples, shape (samples, 6); ``last`` replaces any that rounding puts past the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 

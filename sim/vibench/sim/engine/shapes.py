@@ -31,7 +31,7 @@ HALF_FORCE = 1.25
 TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
 """Rows of a tabulated collision after the first sixteen, which are d/d(depth residuals). In order:
 d/d(residual at the end); d(duration)/d(residuals); depths at the points; derivatives of the depths with
-respect to press, its rate, and forces through dampers and through springs."""
+respect to press, rate of press, and forces through dampers and through springs."""
 SHAPE_ROWS = 23
 DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
 """Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to the maximum of

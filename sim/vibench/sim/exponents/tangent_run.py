@@ -1,9 +1,9 @@
 """Integration with tangent vectors, whose growth is recorded at equal intervals. SI units.
 
-Within an interval the tangent vectors are propagated exactly. At its end they are orthonormalised in the
-energy norm s' diag(K, M) s, and the logarithms of the divisors are recorded (Benettin, Galgani, Giorgilli and
-Strelcyn, Meccanica 15 (1980) 9 and 21). This norm is the energy without stops, which decays in free motion:
-any growth is due to impacts.
+Within an interval the tangent vectors are propagated exactly. At the end of the interval they are
+orthonormalised in the energy norm s' diag(K, M) s, and the logarithms of the divisors are recorded (Benettin,
+Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9 and 21). This norm is the energy without stops, which
+decays in free motion: any growth is due to impacts.
 """
 
 import math
@@ -270,7 +270,7 @@ class Settling:
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Return the final motion of a run and its first interval; ``scales`` as from `state_scales`."""
+    """Return the final motion of a run and the interval in which it begins; ``scales``: `state_scales`."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)

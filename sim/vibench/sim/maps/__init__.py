@@ -1,4 +1,4 @@
-"""Maps of motions: over two parameters, over two coordinates of the initial state, or along one of them.
+"""Maps of motions: over two parameters, over two coordinates of the initial state, or along one quantity.
 
 A map is a plan as in `vibench.sim.study`; each point is a settled motion with its kind, period, responses and
 impacts. Points on a coarse lattice are computed first, then points whose neighbours differ. All others are

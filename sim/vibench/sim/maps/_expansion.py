@@ -211,7 +211,7 @@ class MapEstimate:
         return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
-        """Return the elapsed time [s]; either the workers or the main process determine it."""
+        """Return the elapsed time [s], which either the workers or the main process determines."""
         return max(work_s / self.workers + work_s / points, points * POINT_S)
 
     @property

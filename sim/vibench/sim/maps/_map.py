@@ -76,7 +76,7 @@ def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
 
 
 LONGER = 64
-"""Factor in the motion labels kind * LONGER + period; it exceeds the longest detected period."""
+"""Factor in the motion labels kind * LONGER + period; larger than the longest detected period."""
 
 
 _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
@@ -205,7 +205,7 @@ class Range(FrozenModel):
 
     @property
     def edges(self) -> tuple[float, ...]:
-        """Edges of the cells around the values; one more than values."""
+        """Edges of the cells around the values; there is one more edge than values."""
         if self.spacing is Spacing.LINEAR:
             half = 0.5 * (self.stop - self.start) / (self.points - 1)
             return tuple(np.linspace(self.start - half, self.stop + half, self.points + 1).tolist())
@@ -247,7 +247,7 @@ class Map(GridPlan):
     damping_time_s: NonNegativeFloat | Range | None = None
     """Damping over stiffness, c_i / k_i [s]."""
     k0_n_per_m: Positive | None = None
-    """Stiffness between base and m0 [N/m]; c0 changes with it if the specimen has a damping time."""
+    """Stiffness between base and m0 [N/m]; c0 also changes if the specimen has a damping time."""
     k1_n_per_m: Positive | None = None
     """Stiffness between m2 and m1 [N/m]."""
     k2_n_per_m: Positive | None = None

@@ -168,7 +168,7 @@ class _Sketch:
         return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
 
     def _has_other_neighbour(self, fine: int) -> Mask:
-        """Return for each cell whether one of its eight neighbours has another motion, (rows, columns)."""
+        """Return whether any of a cell's eight neighbours has another motion, shape (rows, columns)."""
         rows, columns = (_lines(length, fine) for length in self.codes.shape)
         there = np.ix_(rows, columns)
         differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
@@ -201,7 +201,7 @@ def _lines(length: int, step: int) -> Indices:
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return whether each cell is on a lattice row and column: every ``step``-th one and the last."""
+    """Return whether each cell is in a lattice row and column: every ``step``-th, and the last one."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found

@@ -1,4 +1,4 @@
-"""Results of a map over its axes, computed or filled in, and the different motions in it."""
+"""Results of a map over its axes, computed or filled in, and the different motions in the map."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -166,7 +166,7 @@ def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -
 
 @dataclass(frozen=True, eq=False)
 class BalanceFamily:
-    """Balances with a fixed number of harmonics along a drive path; last coordinate: parameter / scale."""
+    """Balances with a fixed number of harmonics along a path; the last coordinate is parameter / scale."""
 
     problem: BalanceProblem
     path: DrivePath

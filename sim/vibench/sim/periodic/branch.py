@@ -79,8 +79,8 @@ class Branch:
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Estimated error of each point relative to the fundamental of p, shape (m,). In harmonic balance it
-    comes from neglected harmonics, in shooting from the closure error and the integration error."""
+    """Estimated error of each point relative to the fundamental of p, shape (m,). In harmonic balance the
+    error comes from neglected harmonics; in shooting, from closure and integration errors."""
     contacts: NDArray[np.int64]
     """Number of contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]

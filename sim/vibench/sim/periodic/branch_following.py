@@ -202,7 +202,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
 
 
 def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Reverse the order of one branch and join another to it; both start at the same point."""
+    """Join two branches that start at the same point, with the order of the first one reversed."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE

@@ -71,7 +71,7 @@ class ArcPoint:
     arc: float = 0.0
     """Arc length from the first point of the curve."""
     is_fold: bool = False
-    """Whether the parameter reverses here (a fold); such a point is inserted between two steps."""
+    """Whether the parameter reverses here (a fold); a fold is inserted between two steps."""
     end: ArcEnd | None = None
     """Reason why the curve ends at this point; None for all points before the last."""
 

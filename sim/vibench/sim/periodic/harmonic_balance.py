@@ -141,7 +141,7 @@ FEWEST_SAMPLES = 1024
 
 
 class ForceHarmonics(NamedTuple):
-    """Harmonics of the spring's force, and their derivatives with respect to those of the motion."""
+    """Harmonics of the spring's force, and their derivatives with respect to harmonics of the motion."""
 
     force: Complex
     """Harmonics F_k of the spring's force, shape (m,) [N]."""

@@ -48,7 +48,7 @@ class ExactFamily:
     def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
         """Return the closure error after a period, its Jacobian, and the ratio of two sets of scales.
 
-        Velocities are scaled by the drive frequency in the map, by the reference frequency in the family.
+        Velocities are scaled by the drive frequency in the map, but by the reference frequency in the family.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]

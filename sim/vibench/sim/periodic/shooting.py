@@ -85,12 +85,12 @@ class PeriodMap:
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
 
     def response(self, state: Vector, drive: Harmonic) -> Response:
-        """Return the responses of the motion from a state over its whole period."""
+        """Return the responses of the motion from a state for one period."""
         period_s = self.periods / drive.frequency_hz
         return steady_response(self.specimen, drive, Accuracy.REFERENCE, period_s, period_s, state)
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
-        """Return the motion from a state over its whole period, with ``samples`` samples per drive period."""
+        """Return the motion from a state for one period, with ``samples`` samples per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:

@@ -1,7 +1,7 @@
 """Runs of a scene's motion for a given time (`FixedCourse`) or until it settles (`SettlingCourse`).
 
 Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
-`watch` classifies the motion, and returns it if it must be integrated further. `observe` observes its end.
+`watch` classifies the motion, and returns it if it must go on. `observe` observes the end of the motion.
 Between these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
 """
 
@@ -77,7 +77,7 @@ class FixedCourse:
 
     @property
     def way(self) -> StatesAlone | None:
-        """Motion to integrate up to the expected settling time; None if it is integrated without checks."""
+        """Motion to integrate up to the expected settling time; None if no checks for repetition are made."""
         return self._lead.states
 
     def watch(self) -> None:
@@ -174,7 +174,7 @@ class Lead:
         periods = whole_periods(self._until_s, pace.frequency_hz)
         self._every = every = max(1, math.ceil(periods / MOST_LOOKS))
         self.states: StatesAlone | None = None
-        """Motion to integrate with checks for repetition; None if it is integrated without checks."""
+        """Motion to integrate with checks for repetition; None if no checks are made."""
         if pace.sharpness.noise < EXACTLY:
             exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
             slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
@@ -183,7 +183,7 @@ class Lead:
             self.states = states.aim(self._until_s)
 
     def end(self) -> tuple[Stretch, ...]:
-        """Integrate to the end of the part before the window, and return its stretches."""
+        """Integrate to the end of the part before the window, and return the stretches of this part."""
         run, states = self._run, self.states
         if states is None:
             rate_hz = self._frequency_hz / self._every

@@ -267,8 +267,8 @@ def follow_together(
 ) -> list[Stretch]:
     """Integrate motions of one specimen from the end of a drive period, and store a state per period.
 
-    They advance by ``periods`` in a batch, without tangent vector. A motion in contact is first integrated
-    alone for a period. After `TRIES` contacts, or a failure of the batch, it is integrated without batches.
+    The motions advance by ``periods`` in a batch, without tangent vector. A motion in contact is first
+    integrated alone for a period. After `TRIES` contacts, or if the batch fails, it is integrated alone.
     """
     flying = [place for place, run in enumerate(runs) if run.is_in_flight and run.tries < TRIES]
     starts_s = [runs[place].time_s for place in flying]
@@ -451,7 +451,7 @@ class LineSpectrum:
 
 
 def spectrum_of(window: ObservedWindow) -> LineSpectrum:
-    """Integrate a window again, with samples, and return the spectrum over its whole periods.
+    """Integrate a window again, with samples, and return the spectrum over the window's whole periods.
 
     Sampling does not change the motion: both runs agree to the last digit, even in chaos.
     """

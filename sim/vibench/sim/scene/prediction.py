@@ -32,7 +32,7 @@ class MotionKind(StrEnum):
     """The simulated time is too short to classify the motion."""
     CHAOTIC_SO_FAR = "chaotic so far"
     """Chaotic during the simulated time, but perhaps not for ever: chaos ended in runs from other starts, or
-    all runs were too short to tell. `Ensemble.escape` contains its lifetime."""
+    all runs were too short to tell. `Ensemble.escape` contains the lifetime of chaos."""
 
 
 class StartMemory(StrEnum):
@@ -84,8 +84,8 @@ class Ensemble:
     requested_motion: int
     """Index of the motion reached from the requested start; key ``asked`` in JSON."""
     unseen_share: float
-    """Upper 97.5 % confidence limit of the share of a motion that was not found. It allows for longer runs,
-    in which chaotic or undecided starts may reach such a motion."""
+    """Upper 97.5 % confidence limit of the share of a motion that was not found. The limit allows for longer
+    runs, in which chaotic or undecided starts may reach such a motion."""
     escape: EscapeRate | None
     """Rate at which chaos ends; None without chaos."""
     scatter: float | None

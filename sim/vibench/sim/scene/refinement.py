@@ -346,7 +346,7 @@ class _Refinement:
         return not float(np.abs(mine - theirs).max(initial=0.0)) < PARTED * size_m
 
     def _approaches(self, path: _Path, seen: Sequence[Stretch]) -> bool:
-        """Add new states to a run's path; return whether it now approaches a known stable periodic motion."""
+        """Add new states to a path; return whether the run now approaches a known stable periodic motion."""
         path.recent = recent = np.concatenate([path.recent, states_of(seen)])[-self._kept :]
         if self._motion.slowest_rate >= 0.0 or len(recent) < 2 * LOOK_PERIODS:
             return False

@@ -210,7 +210,7 @@ EXACTLY = 1e-9
 """Relative distance from the periodic motion below which the rest of a run is skipped; below the error of
 every accuracy level."""
 STEPPING = 100.0
-"""Ratio of the noise of time integration, whose steps differ from period to period, to its tolerance.
+"""Ratio of the noise to the tolerance of time integration, whose steps differ from period to period.
 Measured: at most 70 (p^7 at 130 Hz and 20 um)."""
 
 

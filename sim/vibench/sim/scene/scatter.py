@@ -68,7 +68,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
 def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
     """Return the 95 % limit of the relative difference between the responses in two windows, shape (4,).
 
-    ``blocks`` are the blocks before a window, followed by those of the window. None for too few blocks.
+    ``blocks`` are the blocks before a window, followed by the blocks of the window. None for too few blocks.
     """
     lines = blocks[-blocks_in_window:]
     along = [window_scatter([block.peak_x_m for block in blocks], blocks_in_window)]

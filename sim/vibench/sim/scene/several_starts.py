@@ -283,7 +283,7 @@ CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Return the starts grouped by motion; in each group the clearest one comes first and represents it."""
+    """Return the starts grouped by motion; the first start of a group is the clearest, and represents it."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -339,7 +339,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Kinds of motion that may still turn into another motion if the run is continued."""
 FEWEST_DRAWS = 3
-"""Smallest number of starts that reach a motion from which its scatter of Response I is estimated."""
+"""Smallest number of starts from which the scatter of Response I of their common motion is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Function that returns the relative error of the responses of a motion; None if unknown."""

@@ -105,7 +105,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without error estimates and without other starts.
 
-    The motion equals that of `solve_scene`, at a third of its computing time or less. Chaos is integrated as
+    The motion equals that of `solve_scene`, at a third of the computing time or less. Chaos is integrated as
     long as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
     Raises ValueError when the specimen cannot be simulated from this start.
@@ -130,8 +130,8 @@ class SolvedScene:
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
     """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
 
-    The result of a scene does not depend on the other scenes. In chaos it is another random sample than the
-    result of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
+    The result of a scene does not depend on the other scenes. In chaos it is a different random sample from
+    the result of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
     """
     found: list[SolvedScene] = []
     together: list[Scene] = []
@@ -176,7 +176,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[SolvedS
 
 @contextmanager
 def _count_time(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
-    """Divide the processor time of the `with` block equally among scenes, and add it to ``taken_s``."""
+    """Divide the processor time of the `with` block equally among scenes; add the shares to ``taken_s``."""
     began_s = time.thread_time()
     yield
     part_s = (time.thread_time() - began_s) / max(1, len(places))

@@ -42,7 +42,7 @@ ROUNDED = 1e-13
 """Offset of the start of the stricter run, relative to the drive amplitude. It is several times the
 accumulated rounding error of a run, because one offset is only one sample of rounding errors."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
-"""Signs of the offset of each coordinate; those of y and z are equal, so that p does not change."""
+"""Sign of the offset of each coordinate; y and z have the same sign, so that p does not change."""
 SLOWEST_RATIO = 0.9
 """Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 FIRST_LOOK = 16

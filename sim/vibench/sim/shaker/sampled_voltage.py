@@ -148,7 +148,7 @@ class _Resampling:
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
     def samples(self, means: FloatArray, gains: Sequence[Gain]) -> FloatArray:
-        """Return the samples of each sensor; ``means`` are its inputs over steps, shape (sensors, steps)."""
+        """Return the samples of each sensor from the mean inputs in each step, shape (sensors, steps)."""
         count = means.shape[1] // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
         padded = np.zeros((len(gains), size * self._ratio))

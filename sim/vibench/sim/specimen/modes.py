@@ -44,8 +44,8 @@ def angular_frequencies(frequency_hz: ArrayLike) -> Floats:
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
     """Return the transmissibility without contact: ratios of x, y, z and p to the base displacement.
 
-    For x, y, z it is (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises ValueError
-    when a frequency is negative or not finite.
+    For x, y, z the ratios are (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0), exact for any damping. Raises
+    ValueError when a frequency is negative or not finite.
 
     Parameters
     ----------

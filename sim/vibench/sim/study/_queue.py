@@ -148,7 +148,7 @@ class PointScheduler:
             self._push(follower)
 
     def put_back(self, number: int) -> None:
-        """Put a point that was taken from the queue back into it."""
+        """Return a point to the queue from which it was taken."""
         self._is_out[number] = False
         self._push(number)
 

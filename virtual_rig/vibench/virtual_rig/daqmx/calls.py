@@ -81,7 +81,7 @@ TaskCall = Callable[[Task, Any], Fields | None]
 
 
 def pick(request: Any, field: str) -> int:
-    """Return the number of an enum in a request: its raw number if given, else that of its named value."""
+    """Return the number of an enum in a request: its raw number if given, else the number of its name."""
     return int(getattr(request, f"{field}_raw") or getattr(request, field))
 
 

@@ -61,7 +61,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
 
 def default_samples(task: Task) -> int:
-    """Return how many samples "all" means: all of a finite task, or the unread ones of a continuous task."""
+    """Return how many samples "all" means: all of a finite task, or all unread ones of a continuous task."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:

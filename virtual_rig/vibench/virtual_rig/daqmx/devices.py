@@ -69,7 +69,7 @@ class AnalogInputs:
     detects_overloads: bool = False
     """Whether the device reports clipped inputs."""
     is_multiplexed: bool = False
-    """Whether the inputs of a task share one converter, and thus its highest rate."""
+    """Whether the inputs of a task share one converter, and thus the converter's highest rate."""
 
 
 @dataclass(frozen=True)
@@ -374,7 +374,7 @@ Channel = InputChannel | OutputChannel
 
 
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of virtual channels: the given names, or the physical names if none is given.
+    """Return the names of virtual channels: the given names or, by default, the physical names.
 
     ``given`` is a list or range with one name per channel, or a single name to which numbers are added.
     """

@@ -114,7 +114,7 @@ class Task:
 
     @property
     def kind(self) -> SampleTimingType:
-        """Effective timing: the configured one, or the device's default."""
+        """Effective timing: the configured timing, or the device's default."""
         return self.timing.kind or self.side.untimed
 
     @property
@@ -161,9 +161,9 @@ class Task:
 
     @property
     def _awaited_terminal(self) -> str:
-        """Terminal whose edge starts the task; empty if it begins without a trigger.
+        """Terminal whose edge starts the task; empty if the task starts without a trigger.
 
-        Another task's sample clock starts with that task, so its start trigger is awaited instead.
+        A task with another task's sample clock waits for that task's start trigger instead.
         """
         if self.timing.trigger_source:
             return self.timing.trigger_source

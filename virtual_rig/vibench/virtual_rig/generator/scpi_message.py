@@ -384,7 +384,7 @@ class ArbitraryMemory:
         self._waveforms[name].flags.writeable = False
 
     def copy(self, source: str, target: str) -> None:
-        """Copy a memory to another."""
+        """Copy one memory to another."""
         self._waveforms[target] = self.codes(source)
 
     def clear(self) -> None:

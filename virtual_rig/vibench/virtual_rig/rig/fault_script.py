@@ -159,7 +159,7 @@ class RigFaults:
     def fail_daq(self, call: str, code: int) -> Heal:
         """Make a DAQmx call fail with a code (``nidaqmx.error_codes``).
 
-        A fault of one call that reads samples applies to all of these calls, as a driver may use any.
+        If a call that reads samples fails, all calls that read samples fail: a driver may use any of them.
         """
         calls = _READS if call in _READS else (call,)
         return self._until(self._daq.faults.add(code, *calls))

@@ -73,7 +73,7 @@ class _Flight:
     """Pending data between host and instrument; they are lost if the cable or the instrument fails."""
 
     message: bytes = b""
-    """Parts received so far of an incomplete message."""
+    """Parts of an incomplete message that have been received so far."""
     reply: bytes = b""
     late_ms: float = 0.0
     """Remaining delay of the reply [ms]."""

@@ -114,7 +114,7 @@ class ClosedLoop(Protocol):
 
     @property
     def is_on(self) -> bool:
-        """Whether the loop or its delayed output drives the amplifier; `move` is called only if so."""
+        """Whether the loop or its delayed output drives the amplifier; `move` is called only in this case."""
 
     def move(
         self,
@@ -138,7 +138,7 @@ class World:
 
     Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
     for bit, for any block sizes. The class is thread-safe. `time_s` takes no lock, so an instrument may read
-    it while being rendered.
+    it while its output is rendered.
     """
 
     def __init__(
