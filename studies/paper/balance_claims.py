@@ -123,7 +123,7 @@ def _lowest(r: Reading, amplitude_m: float) -> Reals:
 
 
 def _agreement(r: Reading, amplitude_m: float) -> Values:
-    """Return for each response the fraction of frequencies with a first-order solution within 10 %."""
+    """For each response, return the fraction of frequencies with a first-order solution within 10 %."""
     curve, solutions = r.level(amplitude_m, CONTINUOUS), _solutions(r, amplitude_m)
     return tuple(
         np.mean(

@@ -235,4 +235,4 @@ NARROWER_FIT = change("fit", 0.45e-6)
 SEVENTH_COUNTS = change("sum", "power:3@0.05+5@0.15+7@0.8")
 COMPARED_LOWER = change("compared", 400.0)
 CLOSEST = together(NARROWER_FIT, SEVENTH_COUNTS, COMPARED_LOWER)
-"""The options for continuous models for which the largest number of claims holds."""
+"""The options of the continuous models with which the most claims hold."""

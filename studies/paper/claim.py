@@ -87,7 +87,7 @@ class Claim:
     tried: tuple[Alternative, ...]
     """Alternatives to test, in this order, if the claim fails with the defaults."""
     remark: str
-    """Comment on a failed claim, without measured numbers, which the page states itself."""
+    """Comment on a failed claim, without measured numbers, because the page states them."""
     draws: int
     """Number of initial states: several if the numbers depend on the final motion of a chaotic transient."""
     is_scored: bool

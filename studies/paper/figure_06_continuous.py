@@ -24,7 +24,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 
 
 def draw(options: FigureOptions, results: StudyResults) -> DrawnFigure:
-    """Draw simulated responses over harmonic-balance branches, with their folds."""
+    """Draw simulated responses over harmonic-balance branches and the folds of the branches."""
 
     def background(axes: "Axes", curve: Responses, amplitude_m: float) -> None:
         found = diagram_of(

@@ -21,7 +21,7 @@ from ..specimen.state import Complex
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
-"""Relative width below which a band gap is only a rounding error, as in units of several equal cells."""
+"""Relative width below which a band gap is only a rounding error, as occurs in units of equal cells."""
 
 
 def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:

@@ -167,7 +167,7 @@ def _free(accelerations: Table) -> Table:
 
 
 def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
-    """Return duration and moments about the middle of n collisions, shape (n, 6).
+    """Return the durations of n collisions and the moments about their middles, shape (n, 6).
 
     Depths and duration are corrected with tabulated derivatives, as in native/collision.hpp.
     """

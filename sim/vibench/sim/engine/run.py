@@ -447,7 +447,7 @@ class CubicRun(_Run):
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance over whole intervals until all are done or the run fails.
 
-        Return the states at the ends of completed intervals, shape (passed, 6), and each interval's impacts.
+        Return the states at the ends of completed intervals, shape (passed, 6), and the impacts per interval.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)

@@ -17,7 +17,7 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 POINTS = 16
-"""Number of Gauss points in phi: the duration has an error of 1e-8, the speed only a rounding error."""
+"""Number of Gauss points in phi, for a duration error of 1e-8 and only rounding errors in the speed."""
 TERMS = 8
 """Number of terms of the series for spring forces that vary slowly compared with a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions and their scalars, tabulated over the press; each solution starts from the last."""
+    """Return collisions and their scalars over the press; each solution starts from the previous one."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # At zero press, the scaled duration of a collision is 2.943 and its depth nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943

@@ -47,7 +47,7 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong audited cells for each computed motion; not an integer with several initial states."""
+    """Number of wrong audited cells per computed motion; may be a fraction with several initial states."""
     lost: tuple[float, ...]
     """Number of wrong audited cells for each filled-in motion."""
 

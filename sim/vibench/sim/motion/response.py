@@ -31,7 +31,7 @@ class Response:
     largest_p_m: float
     """Largest abs(p), p = y - z, in the window [m]."""
     line_x_m: complex
-    """Phasor of x at the drive frequency [m]: x = Re(line_x_m exp(i (omega t + phase))); U has -i A0."""
+    """Drive-frequency phasor [m]: x = Re(line_x_m exp(i (omega t + phase))); the phasor of U is -i A0."""
     line_p_m: complex
     """Phasor of p at the drive frequency [m]."""
     impacts: int

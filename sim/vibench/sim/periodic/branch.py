@@ -196,7 +196,7 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 NEAR_SIMPLER = 0.5
 """Largest distance [gaps] of a simpler motion from the branch points before and after it."""
 IS_SIMPLER = 1e-7
-"""Distance [gaps] from a simpler motion below which both motions differ only by rounding."""
+"""Distance [gaps] from a simpler motion below which the two motions differ only by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:

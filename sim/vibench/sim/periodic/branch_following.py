@@ -185,7 +185,7 @@ def follow(
 
 
 NEARLY_GRAZING = 0.01
-"""Distance from grazing [gaps] within which a failed continuation counts as an end by grazing."""
+"""Distance from grazing [gaps] within which a failed continuation counts as ending at grazing."""
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:

@@ -32,7 +32,7 @@ from ..specimen.state import Floats
 FLIGHT, STEPS = 5e-5, 3.5e-4
 """Computing cost of one second of motion: without contact, and with a force that acts at every p [s]."""
 HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
-"""Computing cost of an impact: on a Hertz or rigid stop, and on a linear gap [s]."""
+"""Computing cost of an impact on a Hertz or rigid stop, and on a linear stop [s]."""
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
 """Cost factors of contacts (Hertz, others) with a tangent vector, which needs time steps in collisions."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
@@ -435,7 +435,7 @@ def states_of(stretches: Sequence[Stretch]) -> Floats:
 
 
 LEAST_RATE_HZ = 20_000.0
-"""Lowest sample rate of a spectrum [1/s]: ten times the rate of contacts, as their pulses hardly move m0."""
+"""Lowest sample rate of a spectrum [1/s]: ten times the contact rate, as contact pulses hardly move m0."""
 HIGHEST = 0.25
 """Ratio of the spectrum's highest frequency to the sample rate; m0 attenuates aliases in this range."""
 

@@ -66,7 +66,7 @@ class LinearMotion:
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def transient_share(self, time_s: float) -> float:
-        """Return the ratio of transient to steady motion at a time [s], the larger value of x and p."""
+        """Return the larger ratio, for x or p, of transient to steady motion at a time [s]."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts

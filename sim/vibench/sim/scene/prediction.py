@@ -127,7 +127,7 @@ class TargetReport:
 
     @property
     def text(self) -> str:
-        """Return requested and reached error and time as a phrase, and the limits of several starts."""
+        """Return requested and reached error and time as a phrase, and the share that the starts may miss."""
         missed = f"{self.starts} starts may miss motions with shares up to {_percent(self.unseen_share)}"
         return f"{self._reached}; {missed}" if self.starts > 1 else self._reached
 

@@ -385,7 +385,7 @@ class _Refinement:
         return found if self._away_from(found, state, 1.0) < within else None
 
     def _newton(self, near: FollowedRun, period: int) -> _Orbit | None:
-        """Return a stable periodic motion near a run, whose period divides ``period`` (in drive periods)."""
+        """Return a stable periodic motion near a run; its period divides ``period`` (in drive periods)."""
         cost_s = NEWTON_COST * near.cost_s / near.time_s * period / self._frequency_hz
         if cost_s > NEWTON_SHARE * max(self._clock.limit_s - self._clock.time_s, GRACE_S):
             return None

@@ -204,7 +204,7 @@ def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
 
 
 def _chain_matrix(links: Triple) -> Matrix:
-    """Return the matrix for (x, y, z) of the three links base to m0, m2 to m1, and m0 to m2."""
+    """Return the matrix for (x, y, z) of three links: base to m0, m2 to m1, and m0 to m2."""
     c0, c1, c2 = links
     return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
 

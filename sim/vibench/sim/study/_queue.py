@@ -115,7 +115,7 @@ class PointScheduler:
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Take the longest ready point, and more up to a total of ``worth_s`` [s] or ``most`` points."""
+        """Take the longest ready point, and further points up to ``worth_s`` [s] or ``most`` in total."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:

@@ -98,7 +98,7 @@ def _stored_columns(file: "h5py.File", plan: GridPlan) -> list[layout.Column]:
 
 
 CHECKED = 2000
-"""Approximate number of points whose digests are checked when a file is opened, in 0.05 s."""
+"""Approximate number of points whose digests are checked when a file is opened; takes 0.05 s."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:

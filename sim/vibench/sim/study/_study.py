@@ -223,7 +223,7 @@ class Study(GridPlan):
     duration_s: PositiveFloat | Literal["auto"] = 30.0
     """Length of each run [s]; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
-    """Length of the window at the end of the run in which responses are evaluated [s]."""
+    """Length of the window, at the end of the run, in which responses are evaluated [s]."""
     budget_s: NonNegativeFloat = BUDGET_S
     """Processor time per point [s] for integrating chaos further and, with sensitive dependence on the start,
     for other starts."""

@@ -51,7 +51,7 @@ class Group:
     name: str
     """Prefix of these properties' names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], list[Any]]
-    """Function that returns the objects of a request; get calls use only the first, set calls all of them."""
+    """Function that returns the objects of a request; get calls use the first object, set calls use all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
     """Whether these properties are read-only while the task runs."""

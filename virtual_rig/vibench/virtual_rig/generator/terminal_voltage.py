@@ -175,7 +175,7 @@ class Triangle:
     """A ramp with 50 % symmetry: from 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the middle value if the phase range has no corner, else the integral over span."""
+        """Return the mean: the middle value if the phase range has no corner, else the integral / span."""
         begin = start + 0.25  # phase is counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
