@@ -1,4 +1,4 @@
-"""All claims, in the order of the page."""
+"""All claims, in the order of the page on the claims."""
 
 from . import (
     balance_claims,

@@ -16,7 +16,7 @@ def studies(options: FigureOptions) -> tuple[Study, ...]:
 
 
 def draw(options: FigureOptions, *results: StudyResults) -> report.DrawnFigure:
-    """Draw both responses of every gap."""
+    """Draw both responses for every gap."""
     curves = {gap_m: responses(each) for gap_m, each in zip(GAPS_M, results, strict=True)}
     f = curves[GAPS_M[0]].frequency_hz
     columns = {"frequency_hz": f}

@@ -41,7 +41,7 @@ class Reproduction:
     options: str
     """The default options, in words."""
     made_with: str
-    """Versions and computing time."""
+    """Number of computed points, processor time and version, as text."""
 
     @property
     def judgements(self) -> tuple[Judgement, ...]:

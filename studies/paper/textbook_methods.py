@@ -120,7 +120,7 @@ def _scales(drives: Sequence[Harmonic]) -> Reals:
 
 
 def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
-    """Return the largest change of any component, relative to the larger of its two values."""
+    """Return the largest change of any component, relative to the larger of the component's two values."""
     beside = np.maximum(np.maximum(np.abs(one), np.abs(other)), floor)
     return np.asarray(np.max(np.abs(change) / beside, axis=0))
 

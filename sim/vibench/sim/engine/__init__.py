@@ -6,5 +6,5 @@ forms and the tables for collisions and time steps. `CubicRun` integrates a moti
 recordings: base motions that are cubic polynomials on equal intervals.
 
 Signals, filters and the analogue part of the virtual rig use the engine through `native_engine`: `Engine.new`
-fills a structure of native/structures.hpp, `Engine.call` passes it to a function.
+fills a structure of native/structures.hpp; `Engine.call` passes it to a function.
 """

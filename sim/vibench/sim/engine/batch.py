@@ -276,7 +276,7 @@ def follow_batch(
 
     Returns
     -------
-    Result of each motion; None for a motion that failed; the state of this motion is unchanged.
+    Result of each motion; None for a failed motion, whose state is unchanged.
 
     Raises ValueError when batches do not support the specimen, or a motion is in contact.
     """

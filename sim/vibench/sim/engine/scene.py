@@ -35,7 +35,7 @@ from .shapes import (
 )
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
-"""Number of each contact law in the enum `Law` of native/structures.hpp."""
+"""Numeric code of each contact law, as in the enum `Law` of native/structures.hpp."""
 Phasors = NDArray[np.complex128]
 
 

@@ -216,7 +216,7 @@ class Range(FrozenModel):
 
 
 class Refinement(StrEnum):
-    """Selection of the computed points of a map over two quantities."""
+    """Which points of a map over two quantities are computed."""
 
     ADAPTIVE = "adaptive"
     """Points of a coarse lattice first, then points whose neighbours differ."""
@@ -283,7 +283,7 @@ class Map(GridPlan):
     window_periods: Annotated[int, Field(ge=10)] = 200
     """Length of the response window of a motion that does not repeat, in drive periods."""
     refinement: Refinement = Refinement.ADAPTIVE
-    """Selection of the computed points of a map over two quantities."""
+    """Which points of a map over two quantities are computed."""
     coarse: Annotated[int, Field(ge=2, le=64)] | None = None
     """Grid steps between the points computed first, 2 to 64; later halved down to 1. By default 16, or fewer
     to give each axis eight intervals. Points between equal neighbours are filled in."""

@@ -1,4 +1,4 @@
-"""Functions that differ between operating systems, for the current one."""
+"""Functions that differ between operating systems, chosen for the current system."""
 
 import errno
 import os
@@ -123,7 +123,7 @@ def rename(unfinished: Path, final: Path) -> None:
 
 
 UNKNOWN = ""
-"""Start time of a living process for which the operating system reports none."""
+"""Text for the start time of a living process if the operating system does not report it."""
 
 
 class Place(Enum):

@@ -64,7 +64,7 @@ class SceneRun:
 
 
 class FixedCourse:
-    """Run of a motion for a given time, observed at its end.
+    """A run of a motion for a given time, observed at the end.
 
     The state is checked once per drive period. A motion that does not repeat after the expected transient is
     described by the growth of perturbations and by statistics. For both, a tangent vector is propagated and
@@ -204,7 +204,7 @@ DRIFT_SHARE = 0.25
 
 
 class SettlingCourse:
-    """Run that lasts until the motion repeats or certainly never will; then the motion is observed.
+    """A run that lasts until the motion repeats or certainly never will; then the motion is observed.
 
     A repeating motion is observed over one of its periods, any other motion over a window. Because chaos may
     end, a chaotic motion is integrated further, without a tangent vector, as far as a budget allows.

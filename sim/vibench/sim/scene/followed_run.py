@@ -247,8 +247,8 @@ class FollowedRun:
     def _size(self) -> float:
         """Return the natural logarithm of the norm of the tangent vector; NaN without one.
 
-        The norm is the square root of its energy in the linear system. Only contact can increase this energy.
-        An exchange between displacement and velocity therefore does not count as growth.
+        The norm is the square root of the vector's energy in the linear system. Only contact can increase
+        this energy. An exchange between displacement and velocity therefore does not count as growth.
         """
         if len(self._run.growth) == 0:
             return math.nan

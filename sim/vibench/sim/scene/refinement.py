@@ -140,7 +140,7 @@ class _Orbit:
 
 @dataclass(eq=False)
 class _Path:
-    """Run from one start, with the periodic motion that the run may approach."""
+    """A run from one start, with the periodic motion that the run may approach."""
 
     run: FollowedRun
     recent: Floats

@@ -98,7 +98,7 @@ class Target(Strict):
 
 @dataclass(frozen=True)
 class Rest(Strict):
-    """Start of a run from rest."""
+    """Initial state of a run: rest."""
 
     kind: Literal["rest"] = "rest"
 
@@ -115,7 +115,7 @@ class Rest(Strict):
 
 @dataclass(frozen=True)
 class Given(Strict):
-    """Start of a run from a given initial state."""
+    """Initial state of a run, given by its values."""
 
     state: State
     """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""

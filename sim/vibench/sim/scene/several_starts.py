@@ -50,7 +50,7 @@ class ReachedMotion:
     """Final motion of the run from one start (initial state)."""
 
     run: FollowedRun
-    """Run from this start, at the end of its response window."""
+    """The run from this start, at the end of its response window."""
     motion: MotionKind
     period: int | None
     responses_m: Floats

@@ -35,7 +35,7 @@ REMEMBERED = 16.0
 
 
 class StatesAlone:
-    """Run without a tangent vector, which is regularly checked for repetition.
+    """A run without a tangent vector, regularly checked for repetition.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class StatesAlone:
     slice_periods
         Drive periods between two checks.
     every
-        Store every n-th state in `path`; None stores none.
+        Every n-th state is stored in `path`; None for no states.
     by_itself_s
         Time [s] before which the motion may not join a batch, because errors made in a transient persist. It
         is a whole number of drive periods, because batches begin at the end of a period.

@@ -191,7 +191,7 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
 
 
 class FileStore:
-    """Store that writes to the file of a study; used as a context manager, it closes the file.
+    """A store that writes to the file of a study; used as a context manager, it closes the file.
 
     Raises StudyError when the file contains no study or another study, or is being written by another run.
     """

@@ -87,7 +87,7 @@ class Store(Protocol):
 
 
 class MemoryStore:
-    """Store that keeps the results in memory."""
+    """A store that keeps the results in memory."""
 
     def __init__(self, plan: layout.GridPlan) -> None:
         self.arrays, self._plan = empty_arrays(plan), plan

@@ -88,7 +88,7 @@ class Acquisition(Stream):
         self.position = 0
         """Number of samples per channel that the program has read."""
         self.queried_at = -1
-        """Read position at the last query of available samples."""
+        """Value of ``position`` at the last query of available samples."""
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
         wiring = tuple(channel.wiring() for channel in task.inputs)
         self._sampler = task.rig.world.sample(wiring, self.rate_hz)

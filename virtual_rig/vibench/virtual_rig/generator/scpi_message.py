@@ -100,7 +100,7 @@ _NODE = re.compile(r"(?P<short>\*?[A-Z]+)(?P<rest>[a-z]*)(?P<suffix>#?)")
 
 
 def header_pattern(header: str) -> re.Pattern[str]:
-    """Return the pattern of a header in the notation of manuals; its group ``suffix`` is the number.
+    """Return the pattern of a header in the notation of manuals; its group ``suffix`` matches the number.
 
     Capitals are the short form, brackets enclose optional parts, and # is an optional number.
     ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on.

@@ -54,7 +54,7 @@ class VirtualRig:
         call needs `token`.
     quirks
         Peculiarities of the generator's firmware. With a load of 50 ohm set at its front panel, the voltage
-        at the amplifier is twice the commanded one.
+        at the amplifier is twice the commanded voltage.
     scpi_port
         Port of `socket_resource`; 0 selects a free one.
     disk

@@ -47,7 +47,7 @@ class Decimator:
     """Filter that computes samples of one channel from means over the world's steps."""
 
     def __init__(self, ratio: float, start_step: int, delay_steps: float) -> None:
-        """Create a filter with ``ratio`` steps per sample; it is faster for integer ratios.
+        """Create a filter with ``ratio`` steps per sample; integer ratios are faster.
 
         ``delay_steps`` is the part of the sensor's delay that is not yet included in the means.
         """
