@@ -12,7 +12,7 @@ from .reading import CONTINUOUS, MODERATE_M, PIECE_WISE, SECOND_REGION_HZ, STRON
 SEVERE_PER_S = 100.0
 """Exponent that counts as severe; section 3.1 of the paper says "more than 100"."""
 NEAR_ZERO_PER_S = 10.0
-"""Exponent that counts as near zero [1/s]: a tenth of the severe one; free motion decays at a few 1/s."""
+"""Exponent that counts as near zero [1/s]: a tenth of the severe value; free motion decays at a few 1/s."""
 _AROUND_HZ = 15.0
 _SEVERE = (at_least("exponents above 100", "%", 0.9), at_least("median exponent", "1/s", SEVERE_PER_S))
 _GROWS = (at_least("exponent, 10 over 5 µm", "", 1.0), at_least("50 over 10 µm", "", 1.0))

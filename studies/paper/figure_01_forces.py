@@ -1,4 +1,4 @@
-"""Fig. 1 c: the force of the stops, and of the continuous models fitted to it."""
+"""Fig. 1 c: the force of the stops, and the forces of the continuous models fitted to it."""
 
 import numpy as np
 

@@ -81,7 +81,7 @@ class Reading:
         return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
 
     def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
-        """Return the exponents by the case's method; where the masses do not collide, the exact exponents."""
+        """Return the exponents by the case's method; for motions without collisions, the exact ones."""
         if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
             return curve.exponent_per_s
         specimen, settle_s = self.specimen(model), self.case.window_s

@@ -76,7 +76,7 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp for a specimen, computed in about 0.05 s.
+    """Return the `CollisionFit` of native/structures.hpp for a specimen; takes about 0.05 s.
 
     Return None if the stops are too soft or the fit is not accurate enough.
     """

@@ -139,7 +139,7 @@ def _deepest(press: float) -> float:
 
 
 def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
-    """Return depths, duration and Jacobian of a collision, solved by Newton's method to rounding error."""
+    """Solve a collision by Newton's method to rounding error; return depths, duration and Jacobian."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)
         step = np.linalg.solve(slopes, found)

@@ -50,8 +50,8 @@ class BlockedMean:
     """Number of values in a block: the smallest power of two that leaves adjacent blocks uncorrelated."""
     blocks: int
     correlation_length: float
-    """Number of successive values that carry as much information as one independent value: the squared
-    standard error divided by that of independent values."""
+    """Number of successive values that carry as much information as one independent value: the ratio of the
+    squared standard errors for correlated and for independent values."""
     is_long_enough: bool
     """Whether there are at least `FEWEST_BLOCKS` blocks; otherwise the standard error is a lower bound."""
 
@@ -237,7 +237,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
 SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
 """Relative change of state per cycle: a motion repeats below the first limit, changes above the second."""
 LONGEST_CYCLE = 16
-"""Longest cycle of a periodic motion that is detected, in intervals."""
+"""Longest detected cycle of a periodic motion, in intervals."""
 SURE = 3.0
 """Distance of a mean growth rate from zero, in standard errors, above which its sign is significant."""
 CHANGED = 5.0
@@ -270,7 +270,7 @@ class Settling:
 
 
 def settling(run: TangentRun, scales: Floats) -> Settling:
-    """Return the final motion of a run and the interval in which it begins; ``scales``: `state_scales`."""
+    """Return a run's final motion and the interval in which it begins; ``scales`` as from `state_scales`."""
     if run.is_quiet:
         struck = np.flatnonzero(run.impacts)
         return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)

@@ -131,8 +131,8 @@ def kick_stability(
     results
         Complete map in which only the start varies.
     sizes
-        Standard deviations of the kicks, which are normally distributed (in Menck, Heitzig, Marwan and
-        Kurths, Nature Physics 9 (2013) 89, they are uniformly distributed in a box).
+        Standard deviations of the kicks, which are normally distributed. Menck, Heitzig, Marwan and Kurths,
+        Nature Physics 9 (2013) 89, distribute kicks uniformly in a box.
     kicks
         Number of kicks of each size, all at the same drive phase.
     seed, workers

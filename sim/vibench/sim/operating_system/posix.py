@@ -88,7 +88,7 @@ def lock_sole_writer(descriptor: int) -> None:
     """Lock a file as its only writer, while others may read. Raises OSError if another process writes.
 
     The exclusive lock is then replaced by a shared one, so that h5py can open the file for reading. Replacing
-    the lock fails if another process takes it in between.
+    the lock fails if another process locks the file in between.
     """
     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     lock_in_use(descriptor)

@@ -148,7 +148,7 @@ class OrbitSigns:
     """Number of contacts that begin in a period of the motion."""
     shape: OrbitShape
     apart: Vector = field(default_factory=lambda: np.zeros(0))
-    """Closure error over half the period, as for a simpler motion, shape (6,); empty if not defined."""
+    """Closure error over half the period (zero for a simpler motion), shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
     """Bifurcation where this branch meets a branch whose motions are mirrored or have half the period."""
     grazing_distance: float = math.inf

@@ -87,7 +87,7 @@ LONGEST_LEAP = 5.0
 """Largest distance between the points before and after a kink, relative to the tried step length."""
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
-"""Value below which a test function (a tangent component, a multiplier's distance) counts as zero."""
+"""Value below which a test function, such as a component of the tangent, counts as zero."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
 """More than MOST_CRAWLED successive steps, all below CRAWLING times the shortest step, indicate a kink."""
 NEAR_START = 0.2

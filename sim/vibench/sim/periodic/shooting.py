@@ -67,7 +67,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Period map for motions that are mirrored or have half the period; None if these are impossible."""
+        """Period map for motions that are mirrored or have half the period; None if there can be none."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:

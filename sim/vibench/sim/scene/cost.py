@@ -30,7 +30,7 @@ from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 MEMORY = 20
 """Memory of the moving average: after this many further runs, a run keeps a third of its weight."""
 SURPRISE = math.log(2.5)
-"""Limit of a run's logarithmic deviation from the mean of this kind of run; for unusual motions."""
+"""Limit of a run's logarithmic deviation from the mean of similar runs, in case of an unusual motion."""
 FEWEST = 3
 """Smallest number of runs of a kind from which the scatter of their computing times is estimated."""
 UNKNOWN_FACTOR = 10.0

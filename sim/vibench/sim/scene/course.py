@@ -198,7 +198,7 @@ class Lead:
 SLICE_S, SLICE_PERIODS = 0.25, 4
 """Shortest interval between two checks for repetition [s; drive periods]; at most one window."""
 WINDOWS = 2
-"""Number of windows in which a non-repeating motion is observed; the last one gives the responses."""
+"""Number of windows in which a non-repeating motion is observed; the last window gives the responses."""
 DRIFT_SHARE = 0.25
 """Share of the budget for integrating a slow drift; the error estimate takes three times as long."""
 

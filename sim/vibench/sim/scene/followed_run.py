@@ -61,7 +61,7 @@ def nominal_cost_s(
 
 @dataclass(frozen=True)
 class Samples:
-    """Times at which states are stored, given by the first time, the sample rate and their number."""
+    """Times at which states are stored, given by first time, sample rate and number of times."""
 
     first_s: float
     rate_hz: float

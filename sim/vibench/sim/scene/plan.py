@@ -143,7 +143,7 @@ MOST_SHARE = 1e6
 IMPACTS_PER_PERIOD = 0.4
 """Number of impacts per drive period if p without stops equals the gap; grows as the cube root of p / gap."""
 HALF_PRESSED = 150.0
-"""Ratio of p without stops to the gap at which m1 touches a stop during half of the time."""
+"""Ratio of p without stops to the gap, at which m1 touches a stop during half of the time."""
 MICROMETRES = 1e6
 
 

@@ -58,7 +58,7 @@ FIRST_S, GRACE_S = 0.1, 0.05
 PART_S, MOST_PART_S = 4e-3, 30e-3
 """Nominal computing cost, and largest processor time, between two checks of the time limit [s]."""
 BATCH_PARTS, MOST_TOGETHER = 8, 64
-"""Nominal cost of a part in a batch, relative to a single motion, and largest number of motions."""
+"""Nominal cost between two checks of a batch, relative to a single motion; largest number of motions."""
 LANES = 8
 """Number of motions that a batch integrates at the same time."""
 FIT_S = 0.03

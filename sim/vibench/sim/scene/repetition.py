@@ -18,7 +18,7 @@ from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 
 MOST_PERIODS = 32
-"""Longest period of a motion that is detected, in drive periods."""
+"""Longest detected period of a motion, in drive periods."""
 FEWEST_BETWEEN = 8
 """Smallest number of drive periods between two states that are compared to detect repetition."""
 SLOWEST_RATIO = 0.99
@@ -33,12 +33,12 @@ settling to a shorter period."""
 CERTAIN_GROWTH = 12.0
 """Growth that proves chaos: a factor of e^12 = 160 000, which shear in regular motions does not reach."""
 NEUTRAL = 0.1
-"""Largest growth per decay time of the slowest mode that counts as zero; damping alone gives -1."""
+"""Largest growth, per decay time of the slowest mode, that counts as zero; damping alone gives -1."""
 DRIFT_PARTS = 6
 """Number of consecutive parts of a motion that are compared. In a drift, the change of state steadily grows,
 or steadily shrinks, from part to part. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time [decay times] without growth or decay of a perturbation that proves a motion quasi-periodic."""
+"""Time [decay times] without growth or decay of a perturbation, after which a motion is quasi-periodic."""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ thousand times the initial difference."""
 TOUCHING = 0.999
 """Ratio of abs(p) to the gap above which m1 may be in contact."""
 LEAST_SIZE = 1e-3
-"""Smallest size [gaps] of a motion that is used in the test for separation."""
+"""Smallest size of a motion in the test for separation [gaps]."""
 LEAST_S = 1e-3
 """Smallest assumed computing cost of a run from one start [s]."""
 TOO_FEW = 4

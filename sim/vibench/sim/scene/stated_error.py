@@ -46,7 +46,7 @@ SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 SLOWEST_RATIO = 0.9
 """Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 FIRST_LOOK = 16
-"""Number of drive periods until two runs are first compared; it doubles until each further comparison."""
+"""Drive periods until two runs are first compared; each later comparison comes after twice as many."""
 PARTED = 0.05
 """Difference [gaps], or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0

@@ -161,7 +161,7 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
 
 
 ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Largest time [s], and largest number of drive periods, between two checks of a batch; limit memory."""
+"""Largest time [s] and number of drive periods between two checks of a batch, to limit memory."""
 HELD_STATES, FULL = 1 << 20, 16
 """Largest number of states stored for a batch, and number of motions that fill the SIMD registers."""
 

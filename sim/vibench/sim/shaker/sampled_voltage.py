@@ -123,7 +123,7 @@ def follow_voltage(
 class _Resampling:
     """Resampling of a voltage to time steps, and of step means to the samples after sensor and converter.
 
-    Resampled voltages refer to the start of a step, means to its centre; both shifts cancel.
+    Resampled voltages refer to the start of a step, means to the centre; the two shifts cancel.
     """
 
     def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:

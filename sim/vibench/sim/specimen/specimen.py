@@ -47,7 +47,7 @@ class Specimen(Strict):
     """Clearance between m1 and each stop at rest [m]; infinite if there is no stop at positive p."""
     contact: ContactLaw
     lower_gap_m: float | None = None
-    """Clearance at negative p [m]; infinite without a stop on this side; None if equal to ``gap_m``."""
+    """Clearance at negative p [m]; infinite without a stop on this side, None if equal to ``gap_m``."""
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("mass m", "kg", self.masses)

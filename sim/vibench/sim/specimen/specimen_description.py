@@ -178,7 +178,7 @@ class SpecimenDescription(_DescribedModel):
     @field_validator("hertz_stiffness", mode="wrap")
     @classmethod
     def _number_or_bodies(cls, value: object, handler: ValidatorFunctionWrapHandler) -> object:
-        """Report what is wrong with the two bodies of a contact instead of pydantic's "not a number"."""
+        """Report what is wrong with the two bodies of a contact, instead of pydantic's "not a number"."""
         try:
             return handler(value)
         except ValidationError as error:
@@ -276,7 +276,7 @@ class SpecimenDescription(_DescribedModel):
 
 
 class SpecimenTable(SpecimenDescription):
-    """Specimen table of a rig, study or import: the differences from ``model`` (default: the paper's)."""
+    """Specimen table of a rig, study or import: the differences from ``model``, by default the paper's."""
 
     _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
 

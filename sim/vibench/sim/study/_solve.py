@@ -25,7 +25,7 @@ from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
 from ._study import Study, scene_identity, start_name, study_solver
 
 BUNDLE_S, LANES_S = 0.05, 0.5
-"""Computing time of a bundle, and of a bundle that is solved in SIMD batches [s]; both are long compared with
+"""Computing time of a bundle, and of a bundle that is solved in SIMD batches [s]. Both are long compared with
 the milliseconds of a transfer on a cluster."""
 
 

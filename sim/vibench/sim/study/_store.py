@@ -110,7 +110,7 @@ class MemoryStore:
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
-    """Return the values of a prediction to store, except values that are not requested or not known."""
+    """Return the values to store for a prediction, except values that are not requested or not known."""
     return {
         **_cells_of(prediction, layout.NUMBERS),
         **_cells_of_ensemble(prediction.ensemble),

@@ -284,7 +284,7 @@ def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
 
 
 def _check_size(task: Task, size: int, samples: int) -> None:
-    """Refuse writes to a task without outputs, and numbers of values that do not match its channels."""
+    """Refuse writes to a task without outputs, or with a number of values that does not fit the channels."""
     if not task.outputs:
         task.require_channels()
         raise task.refusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK)

@@ -195,7 +195,7 @@ class Catalogue:
     def physical(
         self, names: str, side: Callable[[Device], tuple[str, ...]]
     ) -> tuple[tuple[str, Device], ...]:
-        """Return each channel in a list of names and ranges, as its device spells it, with the device.
+        """Return the channels in a list of names and ranges, as their devices spell them, with the devices.
 
         ``side`` returns the inputs or the outputs of a device. Unknown names: -200220, -200170 or -200096.
         """

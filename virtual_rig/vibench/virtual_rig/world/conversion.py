@@ -86,7 +86,7 @@ class Decimator:
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
-    """Return the number of steps before the start of a conversion that the first sample needs."""
+    """Return how many steps before the start of a conversion the first sample needs."""
     filter_span = GROUP_DELAY_SAMPLES * max(ratio, 1.0) + _half_width_steps(ratio)
     return ceil(filter_span + max(delay_steps, 0.0)) + 2 * _LANES
 

@@ -62,7 +62,7 @@ class RecursiveFilter:
     """A recursive digital filter (direct form II, transposed), initially at rest."""
 
     def __init__(self, numerator: ArrayLike, denominator: ArrayLike) -> None:
-        """Create a filter; the first coefficients are for the present value; that of the denominator is 1."""
+        """Create a filter; the first coefficients are for the present value, and the denominator's is 1."""
         weights = [np.asarray(each, dtype=np.float64) for each in (numerator, denominator)]
         order = max(len(each) for each in weights)
         self.numerator, self.denominator = (np.pad(each, (0, order - len(each))) for each in weights)
