@@ -29,7 +29,7 @@ FIRST_S, FIRST_SHARE = 0.1, 0.75
 callers compute a second period."""
 HOPELESS, STEADILY = 10.0, 0.5
 """Ratio of expected time to default limit above which the run ends early. Ratio of the error with all windows
-to that with half of them, above which the error is assumed to fall with the square root of the time."""
+to that with half of them, above which the error is assumed to fall only like 1 / sqrt(time)."""
 
 
 class TargetedResponse(NamedTuple):

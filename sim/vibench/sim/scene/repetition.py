@@ -38,7 +38,7 @@ DRIFT_PARTS = 6
 """Number of consecutive parts of a motion that are compared. In a drift, the change of state steadily grows,
 or steadily shrinks, from part to part. This happens by chance in 2 of 720 cases."""
 FEWEST_NEUTRAL = 8.0
-"""Time [decay times] without growth or decay of a perturbation, after which a motion is quasi-periodic."""
+"""Time [decay times] after which a motion without growth or decay of perturbations is quasi-periodic."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def poisson_mean(fewer_than: int, probability: float) -> float:
 
 
 def _root(decreasing: Callable[[float], float], value: float, high: float) -> float:
-    """Return the argument, 0 to ``high``, at which a decreasing function equals ``value``, by bisection."""
+    """Return the argument (0 to ``high``) at which a decreasing function equals ``value``, by bisection."""
     low = 0.0
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if decreasing(middle) > value else (low, middle)

@@ -31,7 +31,7 @@ below a hundredth of the tolerance of *quick*."""
 FORGETTING = 4.0
 """Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
 SHORTER = 4
-"""Number of parts of a window that are compared with all of it; leakage in a part is that much larger."""
+"""Number of parts of a window that are compared with the whole; leakage in a part is that much larger."""
 LOOKS = 8
 """Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
 SAFETY = 2.0

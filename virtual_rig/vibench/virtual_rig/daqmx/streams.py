@@ -140,7 +140,7 @@ class Acquisition(Stream):
 
 
 LEAD_S = 0.005
-"""Lead of the samples passed to the world [s]: avoids gaps, but is short for a fast reaction."""
+"""Lead of the samples passed to the world [s]: avoids gaps; short, so that new samples act soon."""
 
 
 class OutputBuffer:

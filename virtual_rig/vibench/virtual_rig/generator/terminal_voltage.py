@@ -53,7 +53,7 @@ class SteadyPhase:
         return _fraction(self.offset + exact * MICROHERTZ + within)
 
     def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return the phase at the start of each interval between edges, and the increase in it [cycles]."""
+        """Return start phase and phase increase of each interval between edges [cycles]."""
         return self._fractions(edges_s[:-1]), self.frequency_uhz * MICROHERTZ * np.diff(edges_s)
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
@@ -108,7 +108,7 @@ class SweptPhase:
         return np.asarray(self.start_hz * np.expm1(growth * time_s) / growth)
 
     def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return the phase at the start of each interval between edges, and the increase in it [cycles]."""
+        """Return start phase and phase increase of each interval between edges [cycles]."""
         cycles = self._cycles(edges_s)
         return _fraction(cycles[:-1]), np.diff(cycles)
 
@@ -175,7 +175,7 @@ class Triangle:
     """A ramp with 50 % symmetry: from 0 to 1 in a quarter of a cycle, then to -1, then to 0."""
 
     def mean(self, start: Samples, span: Samples) -> Samples:
-        """Return the mean: the middle value if the phase range has no corner, else the integral / span."""
+        """Return the mean: the middle value if the phase range has no corner, else its integral / span."""
         begin = start + 0.25  # phase is counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
