@@ -193,7 +193,7 @@ def analyse(
 def _require_partners(
     specimen: str | None, free: list[Parameter] | None, *, fit: bool, hidden: bool, keep: bool
 ) -> None:
-    """Refuse options that exclude each other, and options that are given without a required one."""
+    """Refuse options that exclude each other, and options without another option that they require."""
     if fit and specimen is not None:
         raise InvalidRequest(
             "--fit and --specimen were given; give only one of them, to select the overlaid specimen"

@@ -60,7 +60,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for each; raise AnalysisError if its process died."""
+        """Yield the results in order, waiting for each; raise AnalysisError if a process died."""
         for number in range(self.submitted):
             while number not in self._parts:
                 self._pool.poll(LOOK_S)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
-"""Numbers of those figures of the paper that show measurements; they are drawn from recordings."""
+"""Numbers of the paper's figures that show measurements; these figures are drawn from recordings."""
 
 
 def figure(

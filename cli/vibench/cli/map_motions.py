@@ -113,7 +113,7 @@ def map_motions(
 
 
 def _branches_along(request: Map, path: Path) -> BranchDiagram:
-    """Return branches to overlay; refuse another parameter, and warn of another drive or specimen."""
+    """Return branches to overlay; refuse those over another parameter, warn of another drive or specimen."""
     diagram = read_diagram(path)
     along = diagram.request.along
     if [each.axis for each in request.varying] != [along]:

@@ -27,7 +27,7 @@ def pack(
     author: Annotated[list[str] | None, option("Author; may be repeated.", "NAME")] = None,
     title: Annotated[str, option("Title of the package; by default the name of the folder.")] = "",
     description: Annotated[str, option("Description of the data in one or two sentences.")] = "",
-    organisation: Annotated[str, option("Publisher and affiliation of the authors.", "NAME")] = "",
+    organisation: Annotated[str, option("Publisher, and the authors' affiliation.", "NAME")] = "",
     organisation_url: Annotated[str, option("Publisher's home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,
 ) -> None:

@@ -89,7 +89,7 @@ def study_bar(points: int) -> AbstractContextManager[Observer]:
 
 
 def reading_bar() -> AbstractContextManager[Observer]:
-    """Show stage and progress of an analysis; the bar disappears when it ends."""
+    """Show stage and progress of an analysis; the bar disappears when the analysis ends."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     return _bar(Bars(*columns, TimeElapsedColumn(), console=errors, transient=True), "opening", None)
 

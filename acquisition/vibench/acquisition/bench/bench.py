@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Allowed text of a lock file. Errors quote this text, and any user may write to the file."""
+"""Allowed text of a lock file: errors quote it, and any user may write to the file."""
 
 
 class BenchLock:
@@ -127,7 +127,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 
 def _plain(resource: str) -> str:
-    """Return a VISA name without its optional parts and with decimal numbers."""
+    """Return a VISA name without its optional parts, and with its numbers in decimal form."""
     kind, *others = resource.upper().replace("::LOCALHOST::", "::127.0.0.1::").split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(
@@ -144,7 +144,7 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Return the virtual rig; it is loaded by name because a real bench must not need the simulation."""
+    """Return the virtual rig; its package is loaded only here, as a real bench must work without it."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
@@ -188,7 +188,7 @@ class RigPower:
             self._virtual.aim(role)
 
     def let_pass(self, duration_s: float) -> None:
-        """Let rig time pass on a virtual rig while nothing is sampled; do nothing on a real rig."""
+        """Let the time of a virtual rig pass while nothing is sampled; do nothing on a real rig."""
         if self._virtual is not None:
             self._virtual.let_pass(duration_s)
 

@@ -328,7 +328,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 
 
 def _own_name(file: str) -> str:
-    """Return ``file`` if it is a plain file name, else raise ValueError; a path could leave the folder."""
+    """Return ``file`` if it is a plain file name, else raise ValueError: a path may point elsewhere."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
         raise ValueError(f"{file[:80]!r} is not the file name of a recording")
     return file
@@ -468,7 +468,7 @@ class Journal(ClosedOnLeaving):
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
-        """In one transaction, insert the measurements requested after a point, and mark it as followed up."""
+        """In one transaction, add measurements requested after a point, and mark the point as followed up."""
         with self._transaction() as connection:
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))

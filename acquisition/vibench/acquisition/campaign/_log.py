@@ -130,7 +130,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Planned duration of all points and pauses before the running point, by the rig's clock [s]."""
+        """Duration of all points and pauses that precede the running point, by the rig's clock [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
@@ -174,7 +174,7 @@ class StatusLine(ClosedOnLeaving):
             file.write(line)
 
     def _remaining_time(self) -> timedelta:
-        """Return the planned remaining time, multiplied by this session's ratio of real to planned time."""
+        """Return the remaining time: its planned value times this session's ratio of real to planned time."""
         made_s = self._made_s + self._point_s
         pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
         return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))

@@ -59,7 +59,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed_check(rig: Rig) -> CheckResult | None:
-    """Return a rig's last check without FAIL in its current configuration; None if there is no such check."""
+    """Return the last check without FAIL of a rig's current configuration; None if there is no such check."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each

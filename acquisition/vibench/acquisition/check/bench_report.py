@@ -33,7 +33,7 @@ NOISE_SHARE = Bounds(1e-3, 2e-2)
 _MEDIAN_OF_NORMAL = 0.6745
 """Ratio of median magnitude to standard deviation of a normal variable."""
 _IN_MOMENTS = 0.2
-"""Fraction of the total rms; an rms estimated from the median below this fraction indicates bursts."""
+"""Smallest ratio of the rms estimated from the median to the total rms; bursts make the ratio smaller."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Bounds on the mean of a silent channel relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)

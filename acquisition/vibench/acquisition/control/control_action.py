@@ -25,7 +25,7 @@ class ControlAction:
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """Samples of a phase of the run, from its beginning or its last gap to its end."""
+    """Samples of a phase of the run, from the last gap in the phase, or from its beginning, to its end."""
 
     first_sample: int
     volts: Samples
@@ -55,11 +55,11 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band relative to the tolerance. Smaller errors remain: each correction disturbs the motion."""
+"""Dead band relative to the tolerance. Smaller errors are left: a correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8
-"""Fraction of the base's level error [dB] that one correction removes; below 1, as the specimen is slow."""
+"""Fraction of the base's level error [dB] that a correction removes; below 1, as specimens respond slowly."""
 _BATCHES = 8
 """Number of batches for the uncertainty of a mean, because successive chaotic periods are correlated."""
 

@@ -31,8 +31,8 @@ def feedback_controller(
     """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
     The controller yields one phase after another and is sent the samples of each, shape (channels, n) [V];
-    ``channels`` are in the order of these rows. Raises ConfigurationError, before any phase, when the rig
-    lacks a channel that feedback needs, or no package offers the controller.
+    ``channels`` lists the channels in the order of these rows. Raises ConfigurationError, before any phase,
+    when the rig lacks a channel that feedback needs, or no package offers the controller.
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     kind = measurement.excitation.kind

@@ -31,13 +31,13 @@ class FeedbackChannels:
     response_units_per_volt: float
     """Quantity of m0's sensor, in its SI unit, per volt at the input."""
     response_delay_s: float
-    """Delay of m0's sensor, for which all its phase angles are corrected [s]."""
+    """Delay of m0's sensor [s]; all phase angles from this sensor are corrected for it."""
     base_cut_hz: float
     """-3 dB frequency of the base channel's AC coupling, whose effect is corrected [Hz]; 0 for DC."""
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
-    """Number of time derivatives from m0's signal to its velocity; -1 for an acceleration (integrated)."""
+    """How often m0's signal is differentiated to give its velocity; -1 for an acceleration (integrated)."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Return drive [V], base acceleration [m/s2] and the signal of m0, each of shape (samples,).
@@ -113,7 +113,7 @@ _REMEMBERED_S = 0.1
 
 
 class BridgedRows:
-    """Filter that bridges drop-outs in a stream of samples; it holds back samples in which one may begin."""
+    """Filter that bridges drop-outs in a stream of samples; it holds back samples where one may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz

@@ -260,7 +260,7 @@ class JumpLocator:
         return None
 
     def _restart_from_rest(self, first: SettledPoint) -> Controller[int | None]:
-        """Stop the motion at the branch's first frequency; return 0 if it restarts on the branch, or None."""
+        """Stop the motion at the first frequency; return 0 if it restarts on the branch, else None."""
         yield from decay_motion(self._loop)
         found = yield from self._pass.controller.settle()
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None

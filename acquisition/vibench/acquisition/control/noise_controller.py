@@ -175,7 +175,7 @@ def _note(
 
 
 def _average(values: Samples, width: int) -> Samples:
-    """Return the mean of each value over its ``width`` neighbours; near the ends, over fewer neighbours."""
+    """Return the moving average over ``width`` values; near the ends, over fewer values."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)
     first = np.maximum(places - width // 2, 0)

@@ -103,10 +103,10 @@ class PhaseLaw:
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
     def learn(self, found: SettledState, error_rad: float) -> LearntMode:
-        """Return the mode with the half-width that best explains the phase drift of all looks, and its bend.
+        """Return the mode: the half-width that best explains the phase drift of all looks, and ``bend_hz``.
 
         If no half-width near the earlier one explains the drift, the specimen changed to another motion. The
-        half-width is then kept, and the bend set to zero.
+        half-width is then kept, and ``bend_hz`` set to zero.
         """
         grown, bend_hz = log(found.base.amplitude / self._last.base_m_per_s2), self._mode.bend_hz
         if abs(grown) > self._plan.level_tolerance:
@@ -115,7 +115,7 @@ class PhaseLaw:
         turned = 2 * pi * self._turns / frequency_hz.mean()
 
         def residual(width_hz: float) -> float:
-            """Return the mean square of the phase drift that one half-width leaves unexplained [rad2]."""
+            """Return the mean square of the phase drift that a given half-width leaves unexplained [rad2]."""
             levels, level = [], log(self._last.base_m_per_s2)
             for each in np.log(base):
                 level += (1.0 - exp(-turned * width_hz)) * (each - level)

@@ -91,7 +91,7 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Remaining change allowed in a locked motion, divided by the phase tolerance; 0.5 for other harmonics."""
+"""Allowed remaining change of a locked motion in phase tolerances; the second is for other harmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
@@ -151,7 +151,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level. Return the number of looks (measurements), and the result or None if lost."""
+    """Control phase and level. Return the number of looks (measurements), and the result; None if lost."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -288,7 +288,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Return the phase of m0 relative to the base, minus its target; its uncertainty is from batch means."""
+    """Return the phase of m0 relative to the base minus its target, with its uncertainty from batch means."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES
@@ -325,7 +325,7 @@ def _say(
     periods: int,
     mode: Mode | None = None,
 ) -> None:
-    """Note the result at one level; the measurement took ``periods`` periods of the drive."""
+    """Write a note with the result at one level; the measurement took ``periods`` periods of the drive."""
     if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
         lock = LockResult.LOST
     is_locked = lock is LockResult.LOCKED

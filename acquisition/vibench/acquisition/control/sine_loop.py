@@ -49,7 +49,7 @@ class GainEstimator:
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
         """Add the base phasors of a step, shape (periods,) [m/s2].
 
-        ``modelled`` is the base acceleration predicted by the linear model, ``target`` the one to be held.
+        ``modelled`` is the base acceleration by the linear model, ``target`` is the acceleration to be held.
         """
         if not len(base):
             return
@@ -296,7 +296,7 @@ _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Ramp up to a low level. At each frequency, bring m0 to its amplitude and record (decision 0066)."""
+    """Ramp up to a low level. At each frequency, bring m0 to ``response_m`` and record (decision 0066)."""
     passes = tuple(plan.passes())
     yield from _start_at(loop, passes[0][1][0], plan.start_share * loop.most_vpp)
     for direction, frequencies_hz in passes:

@@ -143,7 +143,7 @@ class Stroboscope:
 
     @staticmethod
     def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-        """Return the rms noise of a silent channel, shape (samples,), at the `ORDERS` of ``frequency_hz``."""
+        """Return the rms noise of a channel in silence at the `ORDERS` of ``frequency_hz``."""
         turns = frequency_hz / sample_rate_hz
         count = int((len(signal) - 1) * turns)
         if count < 1:

@@ -36,7 +36,7 @@ class AFG1022X(ScpiInstrument):
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` describes it in words."""
+    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` describes this pattern in words."""
     wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
 
@@ -56,7 +56,7 @@ class AFG1022X(ScpiInstrument):
     identity: Identity
     """Reply to ``*IDN?``, stored completely because its last field varies."""
     codes: ArbitraryCodes | None = None
-    """Waveform in the memory that the output plays; None if the output plays a sine."""
+    """Waveform that the output plays from its memory; None if the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
     """Settings that could be neither made nor read remotely: the operator must confirm them."""
     _is_known = False
@@ -74,7 +74,7 @@ class AFG1022X(ScpiInstrument):
         """Find the generator, switch its output off, bring it into a known state, and return it.
 
         Raises InstrumentLost when nothing answers, InstrumentBusy when another program uses the resource,
-        InstrumentError for another instrument. The output is then off, if the generator could be reached.
+        InstrumentError for another instrument. After an error the output is off, if it could be switched.
         """
         generator = cls(config)
         leave = generator.disconnect  # another kind of instrument must receive no more commands
@@ -168,7 +168,7 @@ class AFG1022X(ScpiInstrument):
         self._arm_burst(cycles)
 
     def trigger(self) -> None:
-        """Start an armed burst by a trigger."""
+        """Start an armed burst with a trigger."""
         with self._changing():
             self.command("*TRG")
 
@@ -323,7 +323,7 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Set the load that the generator expects; return it for confirmation if it cannot be read.
+        """Set the load that the generator expects; return it as a knob to confirm if it cannot be read.
 
         Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so the
         driver tries it. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused

@@ -31,7 +31,7 @@ from ._overload import overload_ranges
 # counts as gone, even if its connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of each call once a call had no reply [s], so that a run ends in a bounded time."""
+"""Time limit of every call after a call without a reply [s], so that a run ends in a bounded time."""
 # One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (

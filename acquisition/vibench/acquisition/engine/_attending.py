@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """State letters in ``/proc`` of a suspended or dead process (Linux)."""
 LEAST_OWN = 0.25
-"""Smallest counted fraction of the time without an input byte; the rest may be waits for a processor."""
+"""Smallest fraction of the time without an input byte that counts; the rest may be processor waits."""
 
 
 class _Program:
@@ -35,7 +35,7 @@ class _Program:
     def still_s(self) -> float:
         """Return how long the program has sent no byte [s], excluding its waits for a processor.
 
-        In state R (runnable), only its processor time counts: Linux reports a wait only after its end.
+        In state R (runnable), only its processor time counts: Linux reports a wait only when it is over.
         """
         lived_s = self._lived_s  # read this before the clock: a byte may arrive between the two
         now_s, worked_s = monotonic(), self._processor_s

@@ -202,7 +202,7 @@ class PublishedState:
         )
 
     def enter(self, state: EngineState) -> None:
-        """Change the state; a state without a run or an armed plan clears the run and the plan."""
+        """Change the state; clear run and plan if the new state has neither a run nor an armed plan."""
         keeps_plan = state is EngineState.ARMED or state in _STATES.values() or state is EngineState.RUNNING
         forgotten = {} if keeps_plan else {"armed": None, "run": None, "levels": ()}
         self._put(state=state, **forgotten)

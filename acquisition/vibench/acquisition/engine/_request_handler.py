@@ -147,11 +147,11 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that a viewer is present; requests to check, arm or start count as presence, too."""
+        """Register that a viewer is present; requests to check, arm or start count as presence, too."""
         self._last_request_s = monotonic()
 
     def heartbeat(self, still_s: float = 0.0) -> None:
-        """Note for how long the window has been blocked [s]; the server notes the viewer's presence."""
+        """Register how long the window has been blocked [s]; the server registers the viewer's presence."""
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
@@ -192,8 +192,8 @@ class RequestHandler:
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
-        Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to
-        disarm, so the number of stops is compared before arming.
+        Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to disarm,
+        so the campaign is armed only if no stop was counted.
         """
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)

@@ -198,7 +198,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Maximum number of viewers (20 MB each if they do not read). Another displaces the one silent longest."""
+"""Maximum number of viewers (20 MB each if they do not read). A further one displaces the longest silent."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 
@@ -247,7 +247,7 @@ class Server:
             self._leave(viewer)
 
     def _make_room(self) -> None:
-        """Disconnect the viewer silent for longest; an attending viewer only if there is no other."""
+        """Disconnect the viewer that has been silent longest; an attending one only if there is no other."""
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),

@@ -1,8 +1,8 @@
 """All requests to an engine, each verb declared once: request, answer, permitted states.
 
 A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the connection;
-its decorator gives the word in the message, the form of the answer, and the engine's states that permit it.
-Client and server use these declarations: a new verb needs a method here, and a method with the same
+its decorator gives the word in the message, the form of the answer, and the engine's states that permit the
+request. Client and server use these declarations: a new verb needs a method here, and a method with the same
 name and parameters in `RequestHandler`. The engine's token permits all requests.
 """
 
@@ -228,7 +228,7 @@ class EngineVerbs:
 
     @verb("mark", DONE, *sorted(DRIVING))
     def mark(self, text: Annotated[str, Field(min_length=1, max_length=200)]) -> None:
-        """Note an event at the next sample of the recording."""
+        """Write an event at the next sample of the recording."""
 
     @verb("tell_change", DONE, *sorted(DRIVING))
     def note_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:

@@ -44,7 +44,7 @@ class Dwell(FixedSine):
         return type(self).model_validate(self.model_dump() | changed)
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn]:
-        """Return this dwell with the lead-in ``way``, and this dwell's tone for the next dwell's lead-in."""
+        """Return this dwell with the lead-in ``way``; also return its tone, for the next dwell's lead-in."""
         return self.model_copy(update={"lead_in": way, "lead_s": lead_s}), self._tone
 
     @property

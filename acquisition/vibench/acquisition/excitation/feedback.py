@@ -96,4 +96,4 @@ class JumpSearch(FrozenModel):
     resolution_hz: PositiveFloat = 0.25
     """Largest allowed spacing of the two frequencies that enclose a located jump [Hz]."""
     most_searches: int = Field(default=6, ge=1, le=50)
-    """Largest number of searches in one pass, including those at steep changes that are not jumps."""
+    """Largest number of searches for jumps in one pass, including those at steep changes without a jump."""

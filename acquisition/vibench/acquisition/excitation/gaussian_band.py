@@ -12,7 +12,7 @@ CREST_FACTOR = 4.5
 exceed 4.5 standard deviations; they are clipped, with no visible effect on the spectrum.
 """
 CHUNK = 4096
-"""Number of random values per seed: few give quick access to any sample, many make drawing faster."""
+"""Number of random values per seed: few for quick access to any sample, many for fast generation."""
 TRANSITION_WIDTH = 0.5
 """Transition width of the filter divided by the band's lower edge; the band edges are the -6 dB points."""
 HAMMING_WIDTH = 3.3

@@ -49,8 +49,8 @@ class HeldNoise(PeriodicNoise, AbstractFeedback):
     abort_db: Decibels = 6.0
     """Excess of the measured power spectral density over ``spectrum`` at which the run ends [dB]."""
     response_limits: tuple[SpectrumPoint, ...] = ()
-    """Largest power spectral density of m0's velocity, at its corners [(m/s)2/Hz]. The base spectrum is
-    lowered (notched) where m0 would exceed it; if empty, there is no limit."""
+    """Largest allowed power spectral density of m0's velocity, given at corners [(m/s)2/Hz]. The base
+    spectrum is lowered (notched) where m0 would exceed it; if empty, there is no limit."""
     resolution_hz: PositiveFloat = 4.0
     """Bandwidth over which spectral densities and gains are averaged [Hz]."""
     equalisations: int = Field(default=4, ge=1, le=100)

@@ -45,8 +45,8 @@ def flat_periods(
     """Return one period for every realisation: lines of equal amplitude with random phases.
 
     Every line is divided by the droop of the hold, so that the played spectrum is flat. Each realisation uses
-    the best of ``CANDIDATES`` sets of phases, by crest factor. All have the same rms value, because a
-    nonlinear specimen needs the same level in each. Only the waveform with the highest peak reaches 1.
+    the best of ``CANDIDATES`` sets of phases, by crest factor. All have the same rms value, because the level
+    matters for a nonlinear specimen. Only the waveform with the highest peak reaches 1.
 
     Returns
     -------

@@ -27,7 +27,7 @@ class OddMultisine(PeriodicNoise):
     realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
     """Number of waveforms; all have the same spectral lines, each with different phases."""
     excited_lines: tuple[PositiveInt, ...] = ()
-    """Harmonics of ``repetition_hz`` that are excited; if empty, they are chosen at random from the seed."""
+    """Harmonics of ``repetition_hz`` that are excited; if empty, the seed determines a random choice."""
     detection_lines: tuple[PositiveInt, ...] = ()
     """Odd harmonics that are left out; if empty, these are all odd lines of the band that are not excited."""
 

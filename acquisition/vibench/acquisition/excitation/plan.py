@@ -222,7 +222,7 @@ class AbstractExcitation(FrozenModel, ABC):
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Duration of all steps, including settling but not ramps [s]; the maximum if feedback decides."""
+        """Duration of all steps, including settling but not ramps [s]; with feedback, the longest."""
 
     @property
     def stretches(self) -> int:
@@ -291,7 +291,7 @@ class AbstractFeedback(AbstractExcitation):
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
-        """Levels of the base to be held, in the order played; if empty, no level of a sine is held.
+        """Levels of the base to be held, in the order played; empty if feedback holds no level of a sine.
 
         Here: the field ``base_level``, if the excitation has it.
         """

@@ -1,4 +1,4 @@
-"""A stepped sine that records each step once measurements show that the motion has settled."""
+"""A stepped sine that records each step after measurements have shown that the motion has settled."""
 
 from typing import ClassVar, Literal
 
@@ -22,7 +22,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     most_steps: ClassVar[int] = 600
-    """Largest number of steps: a recording's event table must hold four per step, plus those of searches."""
+    """Largest number of steps: a recording's event table must hold four events per step, and searches."""
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None

@@ -16,7 +16,7 @@ from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 class Hold(StrEnum):
     """Quantity of the base motion whose amplitude stays about constant along a sweep, without feedback.
 
-    A shaker that drives a mass above its suspension resonance converts voltage to acceleration. The motion is
+    Above the suspension resonance, a shaker's acceleration is proportional to its voltage. The motion is
     only as constant as this assumption is accurate; the recording contains the real motion of the base.
     """
 
@@ -47,7 +47,7 @@ MOST_SWEEP_STEPS = 1_000_000
 
 
 class MovingSine(AbstractExcitation):
-    """A sine sweep, up or down, in steps by the computer.
+    """A sine sweep, up or down, whose frequency the computer changes in steps.
 
     Each step plays the ideal sweep's mean frequency over that step. The phase at the end of every step
     therefore equals the phase of the ideal sweep. The recorded drive shows what the generator really played.

@@ -13,7 +13,7 @@ from .plan import AbstractExcitation, Family, FrequencyHz, band_around
 from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
-"""Largest number of steps in one recording; the recording's table of segments also lists ramps and check."""
+"""Largest number of steps in one recording, whose table of segments must also list ramps and check."""
 
 
 class FrequencyGrid(FrozenModel):

@@ -11,7 +11,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def member(kind: type[Choice], given: Choice | str) -> Choice:
-    """Return the given member, or the member with the given value; raises ConfigurationError if none has it.
+    """Return the given member, or the member with the given value; raises ConfigurationError if none exists.
 
     >>> from enum import StrEnum
     >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])

@@ -291,7 +291,7 @@ class AnalogOutput(Protocol):
         """
 
     def arm(self) -> None:
-        """Prepare to start with the digitizer, once the first samples are written. Both share sample 0."""
+        """Prepare to start with the digitizer, after the first samples were written; both share sample 0."""
 
     def stop(self) -> None:
         """Go to zero volts at once. May be called at any time; the next `write` begins a new stream."""

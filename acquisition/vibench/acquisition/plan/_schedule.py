@@ -57,7 +57,7 @@ class OnChange(StrEnum):
     NOTE = "note"
     """Note the change as an event in the recording and continue."""
     STOP = "stop"
-    """Ramp down and end the run; the live twin is started for this if needed."""
+    """Ramp down and end the run. The live twin is started if necessary."""
 
 
 class InRunLimits(FrozenModel):
@@ -271,7 +271,7 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
-    """Return the phase of one ramp up or down (``state``) of the signal ``play``, of planned length."""
+    """Return the phase of one ramp up or down (``state``) of the signal ``play``, with the planned length."""
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 

@@ -78,7 +78,7 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values | None) -> tuple[float, ...]:
-    """Return an axis's values: a range in ascending order, a list in the given order; none if it is None."""
+    """Return an axis's values: a range in ascending order, a list in the given order; no values for None."""
     return given.values if isinstance(given, Range) else given or ()
 
 

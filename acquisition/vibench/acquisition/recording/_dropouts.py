@@ -41,7 +41,7 @@ _QUANTA = 4.0
 _LEAST_OF_FLANK = 0.25
 """Smallest fraction of a flank that must be free of other drop-outs."""
 DROPOUT_DELAY_S = LONGEST_S + 2.0 * _FLANK_S
-"""Time that must follow a sample before it is known whether it belongs to a drop-out [s]."""
+"""Time after a sample that is needed to decide whether the sample belongs to a drop-out [s]."""
 _OUTSTANDING = 8.0
 """Smallest distance of a drop-out from a smooth fit, relative to the rms residual in the flanks."""
 _JUMP = 4.0
@@ -179,7 +179,7 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
 
 
 def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
-    """Return the ringing time of the converter's filter [samples]; `_SILENT` quiet samples end it."""
+    """Return the ringing time of the converter's filter [samples]; `_SILENT` quiet samples mark its end."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])

@@ -35,7 +35,7 @@ class Hold(StrEnum):
 
 
 class JumpSide(StrEnum):
-    """Side of a jump: the branch of the response before it or after it."""
+    """Side of a jump: the branch of the response before or after the jump."""
 
     BEFORE = "before"
     AFTER = "after"

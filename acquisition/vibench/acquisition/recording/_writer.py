@@ -70,8 +70,8 @@ class CountScale:
             raise RecordingError(
                 f"The volts of {self._roles[row]!r} differ by up to {worst[row]:.2f} counts from whole steps"
                 f" of {self._step_v[row, 0]:g} V. The block was not recorded, because its counts would give"
-                " other volts; correct volts_per_count and volts_at_zero_count, or give None"
-                " to keep the volts to 2^-30 of the range."
+                " other volts; correct volts_per_count and volts_at_zero_count, or set volts_per_count"
+                " to None to store the volts in steps of 2^-30 of the range."
             )
 
 

@@ -145,7 +145,7 @@ class KnobSheet(FrozenModel):
 
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Function that has settings confirmed and returns the sheet; raises CheckFailed if a setting is wrong."""
+"""Function that asks whether settings are right and returns the sheet; raises CheckFailed if one is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -270,7 +270,7 @@ class Calibration:
     def advice(self) -> str:
         """Advice on what to do about an invalid calibration."""
         if self.is_to_come:
-            return "the date is in the future: enter the date on the certificate in the configuration"
+            return "the date is in the future: enter the certificate's date in the configuration"
         return "have it calibrated, and enter the date in the configuration"
 
     def __str__(self) -> str:
@@ -281,7 +281,7 @@ class Calibration:
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
     """Return the calibrations of a rig: of every sensor with a calibration date, and of every input.
 
-    Ages are as of ``today``.
+    Ages are those on the date ``today``.
     """
     channels = channels_of(rig)
     sensors = dict.fromkeys(

@@ -71,7 +71,7 @@ class GeneratorDriver(Protocol):
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open and return a generator with its output off and its smallest amplitude set.
 
-        Raises InstrumentError when no instrument or another one responds; then nothing stays open.
+        Raises InstrumentError when no instrument responds, or a different one; nothing then stays open.
         """
 
 

@@ -55,16 +55,16 @@ class Ending:
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
-        """Note that the run was completed as planned; ``known`` is a text with the bounds of the results."""
+        """Set the cause of the end: completed as planned; ``known`` is a text with bounds of the results."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
         self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
-        """Note that the run was stopped on request."""
+        """Set the cause of the end: stopped on request."""
         self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
 
     def is_failed(self, error: Exception, reason: str) -> None:
-        """Note a failure; an earlier cause of the end remains the cause."""
+        """Set the cause of the end to a failure, unless an earlier cause is set."""
         if self._cause is None:
             self.reason, self._cause = reason, _cause_of(error)
         else:
@@ -83,7 +83,7 @@ class Ending:
             leaving.callback(self._note_failure, guard.silence)
 
     def _note_failure(self, step: Callable[[], object]) -> None:
-        """Carry out a step; note an error, and raise it again."""
+        """Carry out a step; store an error as the cause of the end, and raise it again."""
         try:
             step()
         except AcquisitionError as failure:

@@ -115,8 +115,8 @@ class _MonitoredQuantity:
 class LimitMonitor:
     """Monitor of the limits, which raises an error when the run must end.
 
-    The monitor is part of the loop that reads samples. It is independent of windows and other processes.
-    Blocks must be consecutive; after a gap, the monitor restarts.
+    The monitor is part of the loop that reads samples. It depends neither on the graphical window nor on
+    other processes. Blocks must be consecutive; after a gap, the monitor restarts.
     """
 
     def __init__(

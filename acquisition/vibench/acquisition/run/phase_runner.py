@@ -62,7 +62,7 @@ class GlideWatch:
     ) -> None:
         """Add the recorded ``blocks`` of one step of the sweep.
 
-        If the step's frequency is not constant, ``course`` returns the planned cycles since its start.
+        If the frequency changes within the step, ``course`` returns the planned cycles since the step began.
         """
         if not blocks:
             return
@@ -252,7 +252,7 @@ class PhaseRunner:
         return _Pace.AFTER_THE_COMMAND
 
     def _with_lost_cycles(self, phase: Phase, late_s: float) -> Phase:
-        """Return the phase with its frequency corrected for the cycles lost before it.
+        """Return the phase with its frequency corrected for cycles that were lost before this phase.
 
         While a command is late, the previous tone continues. The cycles lost are the difference between the
         two frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
@@ -402,7 +402,7 @@ class PhaseRunner:
         raise StopRequested(request)
 
     def _go_on(self, block: Block) -> None:
-        """Raise an exception if the run must end early: a limit, a stall, or a request."""
+        """Raise an exception if the run must end early because of a limit, a stall, or a request."""
         self.limit_monitor.require_safe(block)
         if (request := self.switch.request) is not None:
             raise RunStalled(request.reason) if request.cause is Cause.FAULT else StopRequested(request)

@@ -362,7 +362,7 @@ class Run(ClosedOnLeaving):
             pass
 
     def _log_bounds(self, loop: AcquisitionLoop) -> None:
-        """Log the error bounds of each finished result; the reason for the run's end repeats the last one."""
+        """Log the bounds of each finished result; the reason for the run's end repeats the last bounds."""
         while self._until is not None and self._until.ended:
             note = self._until.ended.pop(0)
             loop.log(note.kind, note.text)

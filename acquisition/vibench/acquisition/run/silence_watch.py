@@ -159,7 +159,7 @@ def _require_base(figures: CheckFigures) -> None:
 SILENT_V = 5e-3
 """Half of the largest peak-to-peak voltage that counts as silence (noise, hum, smallest setting) [V]."""
 HUM_FACTOR = 2.0
-"""Multiple of the hum before the run up to which a signal counts as silence, if above `SILENT_V`."""
+"""A signal up to this multiple of the hum before the run counts as silence, even above `SILENT_V`."""
 LISTEN_S = 0.02
 """Step of the search for silence: one period of the mains [s]."""
 LONGEST_S = 12.0
@@ -277,12 +277,12 @@ class DriveGuard(ClosedOnLeaving):
         self._watchdog = Watchdog(self._look, "drive guard")
 
     def begin(self, generator: str = "") -> None:
-        """Note the start of the drive of a ``generator``."""
+        """Register the start of the drive of a ``generator``."""
         DRIVES_ON.begin(self, generator)
         self._still_s, self._has_begun = 0.0, True
 
     def advance(self) -> None:
-        """Note that a block of samples was read."""
+        """Register that a block of samples was read."""
         self._blocks += 1
         DRIVES_ON.note_advance()
 

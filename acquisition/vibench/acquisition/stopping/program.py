@@ -175,7 +175,7 @@ class Program(BaseModel):
     """Purpose of the program: a campaign's name, or ``"window"``."""
     started_utc: str
     process_start: str = ""
-    """Start time of the process, from the system. Process numbers are reused; number and start are unique."""
+    """Start time of the process, from the system; unique with the process number, which may be reused."""
     computer: str = ""
     """Name of the computer; several computers may share the home folder that contains the state folder."""
     rigs: tuple[str, ...] = ()
@@ -248,7 +248,7 @@ def unconfirmed_programs() -> tuple[Program, ...]:
 
 
 def note_open_bench(rig: str) -> None:
-    """Note that this process has silenced the generator ``rig``; forget ended programs that drove it."""
+    """Register that this process has silenced the generator ``rig``; forget ended programs that drove it."""
     _RIGS.add(rig)
     with suppress(AcquisitionError, OSError):  # without a state folder, no earlier program is known
         for each in unconfirmed_programs():

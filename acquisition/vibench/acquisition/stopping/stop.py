@@ -164,16 +164,16 @@ class DrivesOn:
         return bool(self._drives)
 
     def begin(self, drive: object, generator: str = "") -> None:
-        """Note that a drive may be on, and forget an earlier unconfirmed drive of the same generator."""
+        """Register that a drive may be on, and forget an earlier unconfirmed drive of the same generator."""
         self._drives[generator] = drive
 
     def confirm_silence(self, drive: object) -> None:
-        """Note that the output of a drive was read back as off. May be called at any time."""
+        """Register that the output of a drive was read back as off. May be called at any time."""
         generators = {each: generator for generator, each in tuple(self._drives.items())}
         self._drives.pop(generators.get(drive), None)
 
     def note_advance(self) -> None:
-        """Note that the run of a drive is still reading blocks."""
+        """Register that the run of a drive is still reading blocks."""
         self._has_advanced = True
 
     def take_advance(self) -> bool:

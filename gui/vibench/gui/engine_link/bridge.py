@@ -41,7 +41,7 @@ from ..background.background import in_next_pass
 from ..widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Frequency band of the plots if this window does not know the plan because another window armed it."""
+"""Frequency band of the plots if this window does not know the plan because another window armed the plan."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
@@ -215,7 +215,7 @@ class Bridge(QObject):
         self.status: EngineStatus | None = None
         """Newest status of the engine; None without an engine."""
         self.view: LiveView | None = None
-        """Newest samples of the run; None before the first run, and once another plan has been armed."""
+        """Newest samples of the run; None before the first run, and after another plan was armed."""
         self._view_run = 0
         self.rig: Rig | None = None
         self.campaign: Campaign | None = None

@@ -89,7 +89,7 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    """Return the limits as text; a selectable unit follows each number, any other unit only the last one."""
+    """Return the limits as text; a selectable unit follows each number, any other unit the last number."""
     each = f" {unit}" if unit in CHOICES else ""
     texts = ", ".join(_limit_texts(field, each))
     return texts if each or not texts else f"{texts} {unit}".strip()

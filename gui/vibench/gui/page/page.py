@@ -75,7 +75,7 @@ class DisplayedResult:
         return self.inputs is not None and self.inputs != self.wanted()
 
     def show(self, inputs: object) -> None:
-        """Note that the widgets now show the result of these inputs; None if they show nothing."""
+        """Store the inputs of the result that the widgets now show; None if they show nothing."""
         self.inputs = inputs
         self.mark()
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Reading:
     """Crosshair at the pointer, with a text that states the pointer's values and the nearest curve.
 
-    If a mark is set, the text also states the differences from it, or dB on a logarithmic vertical axis.
+    If a mark is set, the text also states the differences from it; on a logarithmic vertical axis, in dB.
     """
 
     def __init__(self, plot: "Plot") -> None:

@@ -172,7 +172,7 @@ def set_tone(widget: QWidget, tone: str) -> None:
 
 
 def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
-    """Ask for the path of a new file; if the path has no suffix, add that of the selected filter."""
+    """Ask for the path of a new file; if it has no suffix, add the suffix of the selected filter."""
     options = QFileDialog.Option.DontConfirmOverwrite
     given, kind = QFileDialog.getSaveFileName(parent, title, str(wish), filters, options=options)
     if not given:

@@ -13,7 +13,7 @@ Colour = str
 
 
 class Tone(StrEnum):
-    """Importance of a state or message; it selects the colour."""
+    """Importance of a state or message, which determines the colour."""
 
     CALM = "calm"
     GOOD = "good"

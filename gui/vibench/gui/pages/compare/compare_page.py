@@ -65,7 +65,7 @@ class AnalysisPanel(QGroupBox):
         self.show_progress(0, 0)
 
     def show_progress(self, done: int, total: int) -> None:
-        """Show how many recordings have been analysed; hide the bar once all have been."""
+        """Show how many recordings have been analysed; hide the bar when all are analysed."""
         self._bar.show_done(done, total)
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < total)

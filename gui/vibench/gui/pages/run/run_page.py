@@ -382,7 +382,7 @@ class RunPage(Page):
 
     @property
     def _wanted_view(self) -> LiveView | None:
-        """The newest run; the displayed one while the plots are frozen or hidden."""
+        """The newest run or, while the plots are frozen or hidden, the run that they show."""
         view = self.context.bridge.view
         is_frozen = view is not None and self.watch_card.freeze.isChecked()
         return self._view if is_frozen or not self.isVisible() else view

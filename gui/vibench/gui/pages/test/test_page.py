@@ -281,7 +281,7 @@ _SHOWN = {
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     """Return a summary in words: excitation, loads with their limits, duration and file size.
 
-    ``refusal`` says why feedback control cannot stabilise the motion; it is empty if it can.
+    ``refusal`` is the reason why feedback control cannot stabilise the motion, or empty.
     """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
