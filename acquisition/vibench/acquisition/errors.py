@@ -76,7 +76,7 @@ class LimitExceeded(AcquisitionError):
     """A plan, or the running measurement, exceeds a limit of shaker, amplifier or specimen.
 
     The text names the quantity, its value, the limit, and the source of the limit. If a running measurement
-    was stopped, ``trip`` contains the limit and the measured value; it is None for a refused plan.
+    was stopped, ``trip`` contains the limit and the measured value; ``trip`` is None for a refused plan.
     """
 
     def __init__(self, text: str, trip: LimitTrip | None = None) -> None:

@@ -75,7 +75,7 @@ class Answers:
         return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
-        """Return the operator's confirmation of all settings made by hand; raise CheckFailed if missing."""
+        """Return the operator's confirmation of all settings made by hand; raise CheckFailed without it."""
         if self.given.get(_KNOBS) != "as in the file":
             raise CheckFailed(
                 "settings made by hand are not confirmed; compare them with the configuration, then give "

@@ -1,4 +1,4 @@
-"""Ctrl-C as a request to stop once the current work is stored; a second Ctrl-C ends the program at once."""
+"""Ctrl-C as a request to stop after storing the current work; a second Ctrl-C ends the program at once."""
 
 import signal
 from collections.abc import Callable, Iterator

@@ -152,7 +152,7 @@ def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
 class RigPower:
     """Context that keeps a virtual rig switched on, or a real rig's instruments locked.
 
-    Rig time and fault script continue while a bench is closed and opened again.
+    The rig's time and its fault script continue while a bench is closed and opened again.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -212,7 +212,7 @@ class RigPower:
 
 
 class _AimedDigitizer:
-    """Digitizer that renames channel ``m0_velocity`` to the role of the mass on which the beam is aimed."""
+    """Digitizer that renames channel ``m0_velocity`` to the role of the mass at which the beam is aimed."""
 
     def __init__(self, digitizer: Digitizer, role: Role) -> None:
         self._digitizer = digitizer

@@ -106,13 +106,13 @@ class CampaignLog(ClosedOnLeaving):
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval between status lines while a point runs [s]; the lines add up to half a megabyte per night."""
+"""Interval between status lines while a point is measured [s]; they take half a megabyte per night."""
 LEFT_ALONE_S = 1.0
-"""Longest wait, when closing, until the last lines are written [s]."""
+"""Longest wait at closing for the last lines to be written [s]."""
 
 
 class StatusLine(ClosedOnLeaving):
-    """Writer of a status line at every event, and every few seconds while a point runs.
+    """Writer of a status line at every event, and every few seconds while a point is measured.
 
     Another thread writes the lines, so that an unresponsive network folder cannot delay a stop of the drive.
     """
@@ -253,7 +253,7 @@ class Messenger(Protocol):
 
 @dataclass(frozen=True)
 class CommandMessenger:
-    """Messenger that runs a command without a shell; the command reads the notice as JSON from its input."""
+    """Messenger that runs a command without a shell; the command reads the notice as JSON from stdin."""
 
     arguments: tuple[str, ...]
 

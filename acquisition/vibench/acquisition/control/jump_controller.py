@@ -56,9 +56,9 @@ def ratio(one: SettledPoint, other: SettledPoint) -> float:
 def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Return whether a point is on the same branch as an earlier point at the same frequency.
 
-    Both must have the same period, or none. The responses of branches differ by at least ``factor``, so the
-    limit is half of this factor in decibels. Repeated measurements of a chaotic motion scatter more than
-    those of a periodic one: their limit is the whole factor.
+    Both must have the same period, or both be aperiodic. The responses of branches differ by at least
+    ``factor``, so the limit is half of this factor in decibels. Repeated measurements of a chaotic motion
+    scatter more than those of a periodic one: their limit is the whole factor.
     """
     if point.period != expected.period:
         return False

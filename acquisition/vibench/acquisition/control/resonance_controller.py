@@ -175,7 +175,7 @@ def _lock(
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
     """Return the factor of the first change of the setting towards a new level.
 
-    A specimen reduces the motion of a light table, but only once the specimen's own motion has grown. Until
+    A specimen reduces the motion of a light table, but only after the specimen's own motion has grown. Until
     then the base follows the whole change of the setting, so the first change must be smaller.
     """
     bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)

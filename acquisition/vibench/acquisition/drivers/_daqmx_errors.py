@@ -114,7 +114,7 @@ _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_
 
 @contextmanager
 def daqmx_call(doing: str) -> Iterator[None]:
-    """Turn any failure of the DAQmx client into an error with advice; its text begins with ``doing``."""
+    """Turn any failure of the DAQmx client into an error with advice, whose text begins with ``doing``."""
     try:
         yield
     except AcquisitionError:

@@ -103,7 +103,7 @@ class GeneratorModel:
         The mean is removed, because DC would displace the shaker. The rest is scaled so that its largest
         magnitude gets the first or last code.
 
-        Raises LimitExceeded when the waveform has too few or too many points, is not finite, leaves -1 to 1,
+        Raises LimitExceeded when the waveform has too few or too many points, is not finite, exceeds -1 to 1,
         or is constant.
         """
         values = np.asarray(waveform, dtype=np.float64)

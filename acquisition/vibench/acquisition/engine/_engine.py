@@ -254,11 +254,11 @@ def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
 
 Job = Callable[[], object]
 ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
-"""Causes of a stop after which the process ends too, once the campaign has ended."""
+"""Causes of a stop that also end the process, after the end of the campaign."""
 
 
 class JobQueue:
-    """Queue of jobs for an engine; any thread may add jobs, and the thread that calls `run` does them."""
+    """Queue of jobs for an engine; any thread may add jobs, and the thread that calls `run` executes them."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine

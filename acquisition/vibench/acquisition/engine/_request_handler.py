@@ -96,7 +96,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 STALL_S = 0.2
 """If checks for viewers are further apart than this [s], this process counts as stalled."""
 LATE_FACTOR = 4.0
-"""Extra time allowed without requests, divided by this process's own delay, as viewers share its computer."""
+"""Extra time without requests, as a multiple of this process's own delay, which viewers may share."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without a parent if the viewer's last request is newer than this [s]."""
 FORGETTING = 0.995
@@ -301,7 +301,7 @@ class RequestHandler:
 
     @property
     def outlives_its_parent(self) -> bool:
-        """Whether work remains once the parent program has ended.
+        """Whether work remains after the parent program has ended.
 
         The work is an unattended campaign; afterwards the engine continues while a viewer attends it.
         """

@@ -49,7 +49,7 @@ class _Waiting:
 
 
 class Admission:
-    """Admission of connections: it passes on those that show the token."""
+    """Admission of connections: passes on the connections that show the token."""
 
     def __init__(
         self, listening: socket.socket, token: str, admitted: Admitted, make_room: Callable[[], None]

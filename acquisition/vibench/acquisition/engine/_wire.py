@@ -69,7 +69,7 @@ class IncomingMessage:
             self._read_head()
 
     def message(self) -> Message:
-        """Return the message, once all its bytes are received."""
+        """Return the message, after all its bytes were received."""
         came = memoryview(self._came)
         return Message(bytes(came[HEAD.size : self._text_end]), bytes(came[self._text_end :]))
 

@@ -45,7 +45,7 @@ _LACKING: dict[str, str] = {}
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:
-    """Yield the plan classes that installed packages add; note in `_LACKING` those that fail to load."""
+    """Yield the plan classes that installed packages add; list in `_LACKING` the kinds that fail to load."""
     taken = {word for plan in get_args(_Ours) for word in _words(plan)}
     for name in plug_in_names(PlugInKind.EXCITATION):
         try:

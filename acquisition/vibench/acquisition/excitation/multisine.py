@@ -27,7 +27,7 @@ def hold_droop(lines: NDArray[np.integer], points: int) -> Samples:
 def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
     """Return complex peak amplitudes of the held waveform at harmonics 0 to ``spans`` * N/2 - 1.
 
-    The spectrum of the sampled ``values`` repeats in frequency and is multiplied by that of the hold:
+    The spectrum of the sampled ``values`` repeats in frequency and is multiplied by the spectrum of the hold:
     c_m = X_(m mod N) / N * sinc(m/N) * exp(-i pi m/N); the one-sided amplitudes are 2 c_m; the mean is c_0.
     """
     points = len(values)

@@ -69,7 +69,7 @@ class PeriodicNoise(BandNoise):
 
     @property
     def lines(self) -> Lines:
-        """The excited harmonics of ``repetition_hz``: all in the band, or those chosen by the plan."""
+        """The excited harmonics of ``repetition_hz``: all in the band, or a choice made by the plan."""
         return self.candidates
 
     @property

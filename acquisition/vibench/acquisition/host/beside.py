@@ -13,7 +13,7 @@ from ..stopping.stop import MEMORY_RESERVE
 class Beside:
     """Thread that runs jobs in order; it is started before any signal is played.
 
-    A later start could hang: if memory runs out while a thread starts, CPython waits for it forever.
+    A later start could hang: if memory runs out while a thread starts, CPython waits forever for the thread.
     """
 
     def __init__(self, name: str) -> None:

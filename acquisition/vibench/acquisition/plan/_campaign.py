@@ -195,7 +195,7 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
 
 
 def _as_list(content: Mapping[Any, Any], key: str) -> list[Any]:
-    """Return the value of ``key`` as a list; another type becomes an entry that validation refuses."""
+    """Return the value of ``key`` as a list; a value that is not a list becomes an invalid entry."""
     given = content.get(key, [])
     return list(given) if isinstance(given, list | tuple) else [given]
 

@@ -37,7 +37,7 @@ class Batch:
     writes: tuple[tuple[int, Buffer], ...] = ()
     """File offset and data of each write."""
     counters: Mapping[int, int] = field(default_factory=dict)
-    """Value to write to each counter once the writes are on the disk, by file offset."""
+    """Value of each counter, by file offset; written after the data of the batch are on the disk."""
     reservations: tuple[tuple[int, int], ...] = ()
     """Offset and size of each range to reserve before writing [bytes]."""
     samples: int = 0
@@ -186,7 +186,7 @@ class Committer:
 
 
 class TableWriter:
-    """Encoder of the rows of one table as writes to their reserved offsets in the file."""
+    """Encoder that turns the rows of one table into writes to their reserved offsets in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places

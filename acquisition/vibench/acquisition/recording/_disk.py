@@ -68,7 +68,7 @@ class DiskTrouble:
         self._delay_s = 0.0
 
     def fill(self, refusals: float = inf) -> Heal:
-        """Refuse operations like a full disk, ``refusals`` times or until the returned function is called."""
+        """Simulate a full disk for ``refusals`` operations, or until the returned function is called."""
         with self._changed:
             self._refusals, self._has_refused = refusals, False
         return self._make_room

@@ -124,7 +124,7 @@ class SegmentNote(AbstractNote):
 
 
 class DwellNote(AbstractNote):
-    """Number of level checks in a dwell, and number of those outside tolerance."""
+    """Number of level checks in a dwell, and number of levels outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.DWELL]
@@ -133,7 +133,7 @@ class DwellNote(AbstractNote):
 
 
 class SweepNote(AbstractNote):
-    """Number of steps in a sweep, and number of those with a level outside tolerance."""
+    """Number of steps in a sweep, and number of steps with a level outside tolerance."""
 
     kind: Literal["achieved"] = "achieved"
     segment: Literal[SegmentLabel.SWEEP]

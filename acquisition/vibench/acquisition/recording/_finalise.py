@@ -182,7 +182,7 @@ def location(part: Path, error: Exception) -> str:
 
 
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` once ``NAME.h5`` would survive a power cut; a .part left over is harmless."""
+    """Delete ``NAME.h5.part`` when ``NAME.h5`` would survive a power cut; a .part left over is harmless."""
     try:
         sync_folder(part.parent)
         part.unlink()

@@ -151,7 +151,7 @@ class RecordingWriter:
         key: SealKey | None = None,
     ) -> None:
         self.path = path
-        """Path ``NAME.h5`` of the recording, which exists once the recording is finished."""
+        """Path ``NAME.h5`` of the recording, which exists when the recording is finished."""
         self._header = header
         self._places = places
         self._disk = disk

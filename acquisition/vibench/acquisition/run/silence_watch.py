@@ -245,7 +245,7 @@ STANDSTILL_BLOCKS = 50
 STOPPED_BLOCKS = 15
 """Number of missed blocks that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest interval between checks that is fully counted [s]; in a longer one, the process was suspended."""
+"""Longest interval between checks that is fully counted [s]; if it is longer, the process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):

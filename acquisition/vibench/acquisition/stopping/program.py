@@ -88,7 +88,7 @@ class KeptStops:
         self.confirm()
 
     def confirm(self) -> None:
-        """Rename obeyed stop files once no drive is on; until then, update their times as a sign of life.
+        """Rename obeyed stop files when no drive is on; until then, update their times as a sign of life.
 
         If somebody has removed such a file, write it again.
         """
@@ -128,7 +128,7 @@ INTERVAL_S = 0.05
 """Interval between two calls of a watchdog [s]."""
 LEFT_ALONE_S = 1.0
 FRESH_S = 60.0
-"""Age up to which a confirmation of silence is kept once its program has ended [s]."""
+"""Age up to which a confirmation of silence is kept after its program has ended [s]."""
 
 
 class Watchdog:
@@ -387,7 +387,7 @@ _REACHED = _StopTargets()
 
 @contextmanager
 def announce_program(press: Press, program: Program) -> Iterator[None]:
-    """Announce ``program`` inside the context; ``press`` is called for each stop that others request.
+    """Announce ``program`` inside the context; ``press`` is called for each stop that other programs request.
 
     Raises AcquisitionError when the state folder cannot be written, because a program that is not announced
     cannot be stopped from outside.

@@ -46,7 +46,7 @@ def complaints_of(error: ValidationError) -> dict[Loc, str]:
 
 
 class ModelForm(QWidget):
-    """Form of a plan; its content has the types of a plan file, and the plan's model validates it."""
+    """Form of a plan; its content has the types of a plan file and is validated by the plan's model."""
 
     changed = Signal()
 

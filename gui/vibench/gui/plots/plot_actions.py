@@ -19,7 +19,7 @@ FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
 def add_actions(plot: "Plot") -> None:
-    """Add all actions to a plot; its other keys are passed on to the page."""
+    """Add all actions to a plot; other keys are passed on to the page."""
     clipboard = QGuiApplication.clipboard()
     for text, key, act in (
         ("Show everything", "A", plot.show_everything),

@@ -34,7 +34,7 @@ SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
 """Smallest supported window size, and a common size [pixels]; pictures of each size have their own folder."""
 PATIENCE_S = 3600.0
-"""Longest wait for the window to become ready [s]; it is long, because the computer may be busy."""
+"""Longest wait for the window to become ready [s]; long, because the computer may be busy."""
 STILL_MS = 1200
 """Waiting time after which the frame rate in the status line is steady [ms]."""
 _SMALLEST_FILE = 0

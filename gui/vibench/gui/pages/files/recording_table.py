@@ -228,7 +228,7 @@ ALL = "All recordings"
 
 
 class CampaignChoice(Choice):
-    """List to show all recordings or those of one campaign; hidden in a folder without campaigns."""
+    """List to choose all recordings or one campaign's recordings; hidden in a folder without campaigns."""
 
     chosen = Signal(object)
     """Files of the selected campaign, as a set; None for all recordings."""
