@@ -2,9 +2,9 @@
 
 A file ``PID.START.stop-LEVEL`` in the folder of engines stops the process with number PID and start time
 START. The program renames the file to ``.taken-LEVEL`` when it obeys, and updates the file's time while it
-ramps down. When the generator's output reads back as off, it renames the file to ``.silent-LEVEL``. A missing
-file confirms nothing: somebody may have emptied the folder. This module imports only a small part of the
-standard library, so that `vibench stop` starts without delay.
+ramps down. When the generator's output reads back as off, the program renames the file to ``.silent-LEVEL``.
+A missing file confirms nothing: somebody may have emptied the folder. This module imports only a small part
+of the standard library, so that `vibench stop` starts without delay.
 """
 
 import os

@@ -38,7 +38,7 @@ def specimen_request(
     measured: Path | None,
     **others: object,
 ) -> Choice:
-    """Return a request with a specimen, by default that of the recording or the paper's.
+    """Return a request with a specimen, by default the recording's or the paper's specimen.
 
     Print warnings of implausible amplitudes and gaps, and of differences from the recording's specimen.
     Raises InvalidRequest for other invalid options.

@@ -89,7 +89,7 @@ def next_attempt(folder: Path, name: str) -> Path:
 def complete_attempt(
     folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
-    """Return the complete recording of a point; if there is none, its last damaged recording or None.
+    """Return the complete recording of a point; if there is none, the last damaged one, or None.
 
     Raises RecordingError when a recording is complete but was measured with another plan.
     """

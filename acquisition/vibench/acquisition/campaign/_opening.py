@@ -70,7 +70,7 @@ def find_recordings(
 
     After a stop request, the samples of further recordings are left unchecked until the next resume. Damaged
     recordings are returned too, and so are recordings whose seal is in no journal of the folder (the campaign
-    may have been renamed). Raises RecordingError when a complete recording was made by another plan.
+    may have been renamed). Raises RecordingError when a complete recording was made with another plan.
     """
     found: dict[str, KeptRecording] = {}
     for point in points:
@@ -192,7 +192,7 @@ def open_journal(
     """Return the campaign's journal: a new one, or the existing one updated from the folder.
 
     Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
-    or the journal belongs to another plan. Raises CheckFailed when the bench differs from the one at the
+    or the journal belongs to another plan. Raises CheckFailed when the bench differs from the bench at the
     start of the campaign and ``changed`` refuses that.
     """
     path = journal_path(folder, campaign.name)

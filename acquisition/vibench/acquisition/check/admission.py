@@ -187,7 +187,7 @@ def require_fresh(
     clock: Clock = utc_now,
     switch: StopSwitch | None = None,
 ) -> CheckResult | None:
-    """Admit a bench to measurements by its last or a new check; return this check for the recordings.
+    """Admit a bench to measurements by its last check or a new one; return this check for the recordings.
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
     rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is for the

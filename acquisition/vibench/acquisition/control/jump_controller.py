@@ -39,8 +39,8 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return whether a point between the ends of a jump belongs before or after the jump.
 
-    It belongs before if its response and that of ``before`` are the closest pair of the three responses. A
-    jump to a third branch counts as after.
+    It belongs before the jump if its response and the response of ``before`` are the closest pair of the
+    three. A jump to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER

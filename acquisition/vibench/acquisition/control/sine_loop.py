@@ -39,7 +39,7 @@ class GainEstimator:
     """Recent gain from generator setting to base motion, relative to the linear model of the rig.
 
     In a chaotic motion the fundamental of a few periods is mostly random, so recent steps (the track) are
-    averaged. If the gain changes steadily, as near a resonance, a line through these steps is extrapolated.
+    averaged. If the gain changes steadily (near a resonance), a line through these steps is extrapolated.
     """
 
     def __init__(self, memory_s: float) -> None:

@@ -110,8 +110,8 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
     Programs in other containers of this computer are included, since they read the same state folder. So are
-    programs that ended without confirming silence. Raises EngineError when there is none. ``pid`` selects one
-    program; None selects all programs of this computer.
+    programs that ended without confirming silence. Raises EngineError when there is no such program. ``pid``
+    selects one program; None selects all programs of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained, *unconfirmed_programs())

@@ -15,7 +15,7 @@ from .stepped_sine import FrequencySteps
 class HeldResponse(FrequencySteps, AbstractFeedback):
     """A stepped sine whose setting is corrected until m0 has a given amplitude, at every frequency.
 
-    A level of the base may allow several responses, but each response needs only one level of the base.
+    A level of the base may allow several responses, but each response belongs to only one level of the base.
     Curves at constant response are therefore single-valued. A set of them yields the curves at constant
     level, including unstable parts (Karaagacli and Ozguven, Vibration 3 (2020) 19). Feedback can hold motions
     that are stable at constant voltage, and unstable ones that diverge more slowly than feedback acts.

@@ -15,7 +15,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
     """A sweep whose amplitude setting is corrected after every step from the measured base motion.
 
     A sweep does not wait for the level to settle. If the gain from the setting to the base motion changes
-    within a few steps, the level is wrong during these steps, and the recording notes it.
+    within a few steps, the level is wrong during these steps, and the recording states this.
     """
 
     kind: Literal["held_sweep"] = "held_sweep"

@@ -246,7 +246,7 @@ def configure(
 ) -> Rig:
     """Ask all questions, write the configuration, read it back, and return it.
 
-    By default, ``questions`` are those with a place in the template. CONFIRM in comments of ``template``
+    By default, the questions with a place in the template are asked. CONFIRM in comments of ``template``
     marks unchecked values. ``note``, such as name and time, becomes a comment behind each answer. ``refuse``
     receives the error of one answer or of all answers together; if it returns, the questions are repeated.
 

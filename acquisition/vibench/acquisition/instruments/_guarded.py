@@ -69,8 +69,8 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 def missing_package(name: str) -> str | None:
     """Return a sentence that names the package to install for a name such as ``"branch_continuation"``.
 
-    Returns None if no extension of vibench provides ``name``, a word of a plan or hardware configuration, or
-    the extension is installed.
+    ``name`` is a word in a plan or hardware configuration. Returns None if no extension of vibench provides
+    it, or the extension is installed.
     """
     folder = FOUND_IN.get(name)
     installed = (row.module for rows in _installed_plug_ins(tuple(sys.path)).values() for row in rows)
@@ -136,8 +136,8 @@ def _installed_plug_ins(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[Ent
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     """Return a driver, guarded unless it is part of vibench; raises ConfigurationError like `plug_in`.
 
-    ``kind`` is the group of entry points, ``name`` the name in the hardware configuration and ``promise`` the
-    protocol of the entry point's object.
+    ``kind`` is the group of entry points, ``name`` is the name in the hardware configuration, and ``promise``
+    is the protocol of the entry point's object.
     """
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)

@@ -51,9 +51,9 @@ BYTES_PER_SAMPLE = 4
 class Campaign(FrozenModel):
     """Measurements to be made one after another, and sweeps after them.
 
-    In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` values for all
-    excitations of one kind. Values given in a measurement or sweep override these defaults. The loaded
-    campaign has all values filled in. A file contains only values, nothing that could be executed.
+    In a file, ``[defaults]`` contains values for all measurements, and ``[defaults.<kind>]`` contains values
+    for all excitations of one kind. Values given in a measurement or sweep override these defaults. The
+    loaded campaign has all values filled in. A file contains only values, nothing that could be executed.
     """
 
     name: Name

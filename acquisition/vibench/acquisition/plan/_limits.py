@@ -420,7 +420,7 @@ def check_phasors(
     """Return the possible phasors of a quantity in a check, relative to the voltage's phase; shape (n,).
 
     Each phasor assumes a different shift of the specimen's resonances, up to 3 %. If p may come near a stop,
-    phasors for m1 bound to m2 are added. ``terminal_v`` is the peak voltage at the generator's terminal [V];
+    phasors with m1 fixed to m2 are added. ``terminal_v`` is the peak voltage at the generator's terminal [V];
     the ``quantity`` of base or specimen is in SI units, such as m/s2 for an acceleration.
     """
     model = RigModel(rig)

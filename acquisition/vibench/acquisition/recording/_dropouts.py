@@ -209,7 +209,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 
 
 def bridge(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
-    """Return the ``velocity``, shape (samples,), with drop-outs bridged by linear prediction, as a copy.
+    """Return a copy of ``velocity``, shape (samples,), with drop-outs bridged by linear prediction.
 
     The bridge minimises the prediction error of a linear predictor fitted to the samples around the drop-out
     (Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330).

@@ -1,7 +1,7 @@
 """Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
-HDF5's filters run on one core, under a global lock. Here, threads produce the same bytes with zlib, which
-releases Python's lock: shuffle (first bytes of all samples, then second bytes, ...), followed by deflate.
+HDF5's filters run on one core, under a global lock. Here, threads shuffle (first bytes of all samples, then
+second bytes, ...) and deflate with zlib, which releases Python's lock. The bytes are the same.
 """
 
 import hashlib

@@ -165,7 +165,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     """Return the rows of a table, limited to the valid samples.
 
     Rows are written before the counters, so after a crash they may refer to missing samples. A segment that
-    is still open, or whose end is cut off here, is marked incomplete.
+    is still open, or ends after the valid samples, is marked incomplete.
     """
     if table is layout.SEGMENTS:
         return _clip_segments(columns, n_valid)

@@ -218,8 +218,8 @@ class RecordingWriter:
     def finish(self, state: RecordingState, reason: str = "") -> Path:
         """End the recording and turn it into ``NAME.h5``; a second call changes nothing.
 
-        Raises RecordingError when the disk has failed. Samples committed before are kept in ``NAME.h5`` or
-        ``NAME.h5.part``; the message says which.
+        Raises RecordingError when the disk has failed. Samples committed before that are kept in ``NAME.h5``
+        or ``NAME.h5.part``; the message says which.
         """
         if state not in ENDINGS:
             raise RecordingError(

@@ -35,8 +35,8 @@ def sensor_name(config: ChannelConfig) -> str:
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Return the properties of the sensor at an input.
 
-    Raises ConfigurationError when no package provides the sensor, or if it measures a quantity other than the
-    channel's. Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
+    Raises ConfigurationError when no package provides the sensor, or the sensor measures a quantity other
+    than the channel's. Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
     """
     name = sensor_name(config)
     facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)

@@ -36,8 +36,8 @@ _ASK_S = 0.05
 class UntilWatch(ClosedOnLeaving):
     """Repeated analysis of a growing recording, until the error bounds are small enough.
 
-    A stretch is a part of the recording with one result. The analysis process starts before any drive. The
-    run queues requests, reads results and never waits. If the process fails, the longest time is recorded.
+    A stretch is a part of the recording with one result. The process starts before any drive. The run queues
+    requests, reads results and never waits. If the process fails, the recording takes its longest time.
     """
 
     def __init__(self, measurement: Measurement, until: Until, path: Path) -> None:

@@ -18,7 +18,7 @@ from .app_context import AppContext
 class Simulator(QObject):
     """Process that computes the newest request of a page; it ends when the page is deleted.
 
-    ``grown`` receives the results so far, ``ended`` is called after the last one, and ``said`` receives
+    ``grown`` receives the results so far, ``ended`` is called after the last result, and ``said`` receives
     messages about starting, cancelling and failures.
     """
 
