@@ -251,7 +251,7 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
 
 
 def _print_duration(points: Sequence[ScenePrediction], study: Study) -> None:
-    """State the time for which points with a fixed duration are known to be chaotic."""
+    """Print for how long chaotic points were simulated, if the duration is fixed."""
     is_fixed = study.target is None and study.duration_s != AUTO
     if is_fixed and any(each.motion is MotionKind.CHAOTIC for each in points):
         console.print(f"Chaotic over {study.duration_s:g} s; --duration auto tests whether the chaos lasts.")

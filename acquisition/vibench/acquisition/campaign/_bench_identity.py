@@ -36,7 +36,7 @@ class BenchIdentity(FrozenModel):
         return cls(rig=bench.rig, instruments=instruments, knobs=knobs)
 
     def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
-        """Return one clause of text for each difference between this bench and another, ``now``."""
+        """Return one clause of text for each difference between this bench and a later one, ``now``."""
         return differences(self.model_dump(mode="json"), now.model_dump(mode="json"))
 
 

@@ -232,7 +232,7 @@ def _prepare(connection: sqlite3.Connection) -> sqlite3.Connection:
 
 
 def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
-    """In one transaction, read new or changed files and remove entries of missing files; return all."""
+    """In one transaction, read new or changed files and drop entries of missing files; return all entries."""
     known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
     noted = cache(noted_seals)
     for path in recordings_below(folder):

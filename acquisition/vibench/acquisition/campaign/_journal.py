@@ -163,7 +163,7 @@ class FinishedPoint:
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
-"""Function called after every point with the open recording; returns measurements to make next, or none."""
+"""Function called with the open recording after every point; returns measurements to make next, or none."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:

@@ -282,7 +282,7 @@ class CommandMessenger:
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with ``document`` as input; return a clause on any failure, or an empty text."""
+        """Run the command with ``document`` as input; return a clause about a failure, or an empty text."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,

@@ -78,7 +78,7 @@ class ScpiInstrument:
             )
 
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
-        """Send a command, then any 16-bit codes as a big-endian block; return the entries of the error queue.
+        """Send a command, then 16-bit codes, if any, as a big-endian block; return the error queue's entries.
 
         The queue may contain entries from earlier commands.
         """

@@ -26,7 +26,7 @@ LOOK_S = 0.02
 
 
 class AdoptedEngine(ClosedOnLeaving):
-    """Engine whose parent program has ended, now attended here; it ends with its campaign or on request."""
+    """Engine taken over from a parent program that has ended; it ends with its campaign or on request."""
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement

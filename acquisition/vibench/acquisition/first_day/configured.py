@@ -298,7 +298,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value as the default answer: only the number, if the value states a source."""
+    """Return the template's value as the default answer; of a value with a source, only the number."""
     written = value_in(text, key)
     held = tomllib.loads(f"held = {written}")["held"] if written else None
     return str(held["value"]) if isinstance(held, dict) and "value" in held else written.strip('"')

@@ -1,4 +1,4 @@
-"""Check before a command that its packages are installed and memory suffices; errors advise a remedy."""
+"""Check before a command that its packages are installed and memory suffices; errors state a remedy."""
 
 import sys
 from collections.abc import Callable, Mapping

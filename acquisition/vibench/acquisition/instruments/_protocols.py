@@ -139,7 +139,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class GeneratorDescription:
-    """Capabilities of a generator model, known before it is opened; plans are checked against them."""
+    """Capabilities of a generator model, known before opening a generator; plans are checked against them."""
 
     name: str
     """Name of the model in messages: ``"AFG1022"``."""

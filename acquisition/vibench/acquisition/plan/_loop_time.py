@@ -1,4 +1,4 @@
-"""Delay of a bench's feedback, which limits the unstable motions that it can hold (decision 0065)."""
+"""Delay of a bench's feedback, which limits the unstable motions that feedback can hold (decision 0065)."""
 
 from ..rig import Rig
 

@@ -41,7 +41,7 @@ class Batch:
     reservations: tuple[tuple[int, int], ...] = ()
     """Offset and size of each range to reserve before writing [bytes]."""
     samples: int = 0
-    """Samples per channel in this batch; the queue limits the sum over its batches."""
+    """Number of samples per channel in this batch; the queue limits the sum over all its batches."""
 
 
 class Committer:

@@ -124,7 +124,7 @@ class ConfigurationFacts(_AbstractFacts):
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
-    """Return the file's validated attributes; ``found`` are those that a growing file keeps in datasets."""
+    """Return the file's validated attributes; ``found`` has those that a growing file keeps in datasets."""
     return _read("the file", FileFacts, {**attributes, **found})
 
 

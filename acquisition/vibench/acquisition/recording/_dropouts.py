@@ -22,11 +22,11 @@ Places = NDArray[np.int64]
 LONGEST_S = 4e-3
 """Longest drop-out that can be bridged [s]."""
 LOWEST_RATE_HZ = 20_000.0
-"""Lowest sample rate [Hz]; at lower rates, an impact may take as few samples as a drop-out."""
+"""Lowest sample rate of the search [Hz]; at lower rates, an impact may take as few samples as a drop-out."""
 _FAR = 60.0
 """Smallest fourth difference at the edge of a drop-out, relative to the median fourth difference."""
 _DETECTED = 6.0
-"""Smallest fourth difference in the ringing of the converter's filter, relative to the median."""
+"""Smallest fourth difference in the ringing of the converter's filter, relative to the median one."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
 """Largest spacing between sharp corners of one group (run) [s]."""

@@ -201,7 +201,7 @@ class ResonanceNote(AbstractNote):
     tries: int
     lock: LockResult
     periods: int = 0
-    """Number of drive periods of search or phase-locked loop; 0 if the recording does not state them."""
+    """Number of drive periods in the search or the phase-locked loop; 0 if it is not recorded."""
     mode_hz: SixFigures | None = None
     """Natural frequency; absent if the flanks do not determine it."""
     mode_u_hz: SixFigures | None = None

@@ -203,7 +203,7 @@ class FileIdentity(Protocol):
 
 
 def first_copies(recordings: Sequence[FileIdentity]) -> list[int]:
-    """Return, for each recording, the index of the first one with the same samples or recording_id."""
+    """Return, for each recording, the index of the first recording with the same samples or recording_id."""
     seen: dict[str, int] = {}
     firsts = []
     for place, each in enumerate(recordings):

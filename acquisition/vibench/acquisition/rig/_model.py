@@ -109,7 +109,7 @@ class RigModel:
     def under_sines(
         self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
     ) -> ComplexArray:
-        """Return complex amplitudes of ``quantity`` for peaks ``terminal_v`` [V]; the inputs broadcast."""
+        """Return complex amplitudes of ``quantity`` for peak voltages ``terminal_v`` [V], by broadcasting."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).response(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:

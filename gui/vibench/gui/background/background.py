@@ -59,7 +59,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Executor of only the newest request; a request starts if no other follows within a short time."""
+    """Executor that runs only the newest request, which starts if no other follows within a short time."""
 
     def __init__(
         self,

@@ -100,7 +100,7 @@ _DIGITS = 6
 MOST_WHOLE = 1 << 53
 """Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0
-"""Factor of change above which the user must confirm a new value, because its unit is often wrong."""
+"""Factor of change above which the user must confirm a new value, as a wrong unit is a common mistake."""
 STEP = 0.05
 """Relative change of the value per press of an arrow key; such steps never reach zero."""
 
@@ -119,7 +119,7 @@ class QuantityEdit(QAbstractSpinBox):
         self._shown_unit = ""
         self._value: float | int | None = None
         self.complaint = ""
-        """Reason why the typed text is not an allowed quantity; empty if it is one."""
+        """Reason why the typed text is not an allowed quantity; empty if it is allowed."""
         self._value_to_confirm: float | int | None = None
         """Value that is accepted when the user presses Return again; None if there is no such value."""
         self._is_confirmed = False

@@ -176,7 +176,7 @@ _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """List of curves with check boxes; the colour of a curve shows its source, the dash its kind."""
+    """List of curves with check boxes; colour shows the source of a curve, dashes show its kind."""
 
     changed = Signal()
 
@@ -206,7 +206,7 @@ class CurveList(QListWidget):
             hint_in_list(self, "No curves yet: add recordings, or overlay a simulation.")
 
     def line_style(self, curve: Curve) -> LineStyle:
-        """Return the line style of a curve: colour by its source, dash by its kind."""
+        """Return the line style of a curve: its source gives the colour, its kind gives the dash pattern."""
         sources = list(dict.fromkeys(each.source for each in self.curves))
         first, second = _DASHES[curve.origin]
         dash = second if curve.response is CurveKind.RESPONSE_II else first

@@ -287,7 +287,7 @@ class RecordingModel(QAbstractTableModel):
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """Replace the list of recordings and keep thumbnails of files in both lists; ignore an equal list."""
+        """Replace the list of recordings if it differs; keep the thumbnails of files in both lists."""
         if entries == self.entries:
             return
         self.beginResetModel()

@@ -87,7 +87,7 @@ class LevelMeters(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size that fits the number of channels, but at least four channels."""
+        """Return the size that fits the number of channels, but at least the size for four channels."""
         height = self.fontMetrics().height()
         return QSize(12 * height, round(_ROW * height * max(4, len(self._rows))))
 
@@ -179,7 +179,7 @@ class WatchCard(QGroupBox):
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
-        """Show the state of the run; ``averages`` is the number planned in a noise test, else 0."""
+        """Show the state of the run; ``averages`` is the planned number of averages for noise, else 0."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)

@@ -132,7 +132,7 @@ class NamedTest:
 
 
 def shipped_tests() -> tuple[NamedTest, ...]:
-    """Return the tests of the campaigns that come with vibench; skip those that cannot be loaded."""
+    """Return the tests of the campaigns that come with vibench; skip campaigns that cannot be loaded."""
     campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
     return tuple(
         NamedTest(f"{campaign.name} / {each.name}", each)
