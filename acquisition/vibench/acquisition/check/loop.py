@@ -30,7 +30,7 @@ class SineFit:
 
 @dataclass(frozen=True)
 class ClockRatio:
-    """Relative deviation of the ratio of two clocks from 1."""
+    """Relative deviation of the ratio of two clock frequencies from 1."""
 
     ppm: float
     uncertainty_ppm: float

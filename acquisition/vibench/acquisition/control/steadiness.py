@@ -200,7 +200,7 @@ _FEWEST_TURNS = 2
 _SURE = 2.0
 """Number of standard uncertainties by which a value must differ from its limit."""
 _CERTAIN = 5.0
-"""Number of standard errors above which noise does not explain a mean."""
+"""Number of standard errors above which a mean is not explained by noise."""
 _BLOCKS = 12
 """Number of blocks compared by a test of stationarity."""
 _SIGNIFICANCE = 0.01 / 8

@@ -104,7 +104,7 @@ class AFG1022X(ScpiInstrument):
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output stays on or off as it was."""
+        """Set up a sine. The output stays on if it was on, and off if it was off."""
         self.model.check_frequency(Shape.SINE, frequency_hz)
         self.model.check_amplitude(self._config, amplitude_vpp)
         with self._changing():

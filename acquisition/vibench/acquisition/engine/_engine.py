@@ -273,7 +273,7 @@ class JobQueue:
         self._jobs.put(None)
 
     def run(self) -> None:
-        """Do jobs until `leave` is called; always close the bench at the end."""
+        """Carry out jobs until `leave` is called; always close the bench at the end."""
         try:
             while (job := self._jobs.get()) is not None:
                 self._do(job)

@@ -33,7 +33,7 @@ from ._status import (
 )
 
 HELD_S = 10.0
-"""Duration of the newest samples, which are kept for viewers [s]."""
+"""Duration of the samples that are kept for viewers, counted back from the newest [s]."""
 
 
 @dataclass(frozen=True, eq=False)

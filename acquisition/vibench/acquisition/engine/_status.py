@@ -175,7 +175,7 @@ class EngineMessage(FrozenModel):
     done: str = ""
     next_step: str = ""
     code: str = ""
-    """Class name of the error, by which it can be looked up."""
+    """Class name of the error, with which users can look up the error."""
 
 
 class TwinStatus(FrozenModel):

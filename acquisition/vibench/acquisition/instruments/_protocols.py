@@ -173,7 +173,7 @@ class FunctionGenerator(Protocol):
         """Smallest and largest amplitude that this bench allows, peak to peak [V]."""
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output stays on or off as it was."""
+        """Set up a sine. The output stays on if it was on, and off if it was off."""
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Load one period of values and select it; -1 and 1 are the two ends of ``amplitude_vpp``."""

@@ -219,7 +219,7 @@ class NoiseNote(AbstractNote):
 
     kind: Literal["spectrum"] = "spectrum"
     realisation: int
-    """Number of the realisation; -1 while equalising."""
+    """Number of the realisation; -1 during equalisation."""
     base_rms: SixFigures
     """Rms acceleration of the base in the band [m/s2]."""
     asked_rms: SixFigures

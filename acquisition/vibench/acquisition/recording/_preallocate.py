@@ -196,7 +196,7 @@ def _claim(part: Path, places: Places) -> None:
 Answer = TypeVar("Answer")
 
 ATTEMPTS = 10
-"""Largest number of attempts while other programs change the file."""
+"""Largest number of attempts to change a file that other programs change at the same time."""
 
 _one_at_a_time = threading.Lock()
 

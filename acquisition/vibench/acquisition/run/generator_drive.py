@@ -116,7 +116,7 @@ class GeneratorDrive:
         return self._is_on and self._level > 0.0
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Store the duration of the check's sine; the output is off."""
+        """Store the duration of the check's sine, while the output is off."""
         checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
         self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
