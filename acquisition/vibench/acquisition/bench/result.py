@@ -35,7 +35,7 @@ class Finding(FrozenModel):
     expected: str
     verdict: Verdict
     number: float | None = None
-    """Measured value as a number in ``unit``; None if the value is a text only."""
+    """Measured value as a number in ``unit``; None if the value is only a text."""
     uncertainty: float | None = None
     """Standard uncertainty of the number, in ``unit``."""
     unit: str = ""

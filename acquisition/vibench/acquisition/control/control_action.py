@@ -25,7 +25,7 @@ class ControlAction:
 
 @dataclass(frozen=True, eq=False)
 class PhaseSamples:
-    """Samples of a phase of the run, from the last gap in the phase, or from its beginning, to its end."""
+    """Samples of a phase of the run; if the phase has gaps, only the samples after the last gap."""
 
     first_sample: int
     volts: Samples
@@ -55,7 +55,7 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band relative to the tolerance. Smaller errors are left: a correction disturbs the motion."""
+"""Dead band relative to the tolerance. Smaller errors stay uncorrected: a correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8

@@ -37,7 +37,7 @@ class FeedbackChannels:
     response_cut_hz: float
     sample_rate_hz: float
     response_derivatives: int = 0
-    """How often m0's signal is differentiated to give its velocity; -1 for an acceleration (integrated)."""
+    """Number of differentiations from m0's signal to its velocity; -1 for an acceleration (integrated)."""
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Return drive [V], base acceleration [m/s2] and the signal of m0, each of shape (samples,).

@@ -300,7 +300,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Return the range of frequencies with levels out of tolerance, extended; None if in tolerance."""
+    """Extend the range of frequencies with levels out of tolerance; return None for a level in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

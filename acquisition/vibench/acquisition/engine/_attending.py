@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """State letters in ``/proc`` of a suspended or dead process (Linux)."""
 LEAST_OWN = 0.25
-"""Smallest fraction of the time without an input byte that counts; the rest may be processor waits."""
+"""At least this fraction of the time without an input byte counts; the rest may be processor waits."""
 
 
 class _Program:

@@ -193,7 +193,7 @@ class RequestHandler:
         """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
 
         Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to disarm,
-        so the campaign is armed only if no stop was counted.
+        so the campaign is armed only if no stop was counted meanwhile.
         """
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)

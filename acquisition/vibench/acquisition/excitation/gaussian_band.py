@@ -30,7 +30,7 @@ class GaussianBand:
     seed: int
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
-        """Return ``count`` samples from number ``first``, within -1 to 1 and independent of earlier calls."""
+        """Return ``count`` samples starting at ``first``, within -1 to 1 and independent of earlier calls."""
         from scipy.signal import oaconvolve  # noqa: PLC0415 - takes 0.5 s; `vibench stop` must not wait
 
         taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)

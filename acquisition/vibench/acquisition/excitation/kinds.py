@@ -143,7 +143,7 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return a table entry (row) per kind: from ``of_kind`` if it is there, else the row of its family.
+    """Return a table entry (row) per kind: the row in ``of_kind`` if present, else the row of its family.
 
     ``of_packages`` is the group of entry points through which installed packages supply rows for the kinds
     that they add. See decision 0062. Raises KeyError when a row is given for an unknown kind.

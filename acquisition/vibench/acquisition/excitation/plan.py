@@ -222,7 +222,7 @@ class AbstractExcitation(FrozenModel, ABC):
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Duration of all steps, including settling but not ramps [s]; with feedback, the longest."""
+        """Duration of all steps, including settling but not ramps [s]; with feedback, the maximum."""
 
     @property
     def stretches(self) -> int:

@@ -22,7 +22,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     most_steps: ClassVar[int] = 600
-    """Largest number of steps: a recording's event table must hold four events per step, and searches."""
+    """Largest number of steps: an event table must hold four events per step, plus those of searches."""
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None

@@ -26,7 +26,7 @@ LOWEST_RATE_HZ = 20_000.0
 _FAR = 60.0
 """Smallest fourth difference at the edge of a drop-out, relative to the median fourth difference."""
 _DETECTED = 6.0
-"""Smallest fourth difference in the ringing of the converter's filter, relative to the median one."""
+"""Smallest fourth difference in the ringing of the converter's filter, relative to the overall median."""
 _SILENT = 6
 _QUIET_S = 2.5e-4
 """Largest spacing between sharp corners of one group (run) [s]."""

@@ -39,7 +39,7 @@ class EventKind(StrEnum):
 
 
 REJECTED = "average rejected"
-"""Text of a mark that excludes the noise realisation that was last to begin before the mark."""
+"""Text of a mark that excludes the noise realisation that began last before the mark."""
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ class UntilWatch(ClosedOnLeaving):
             self._beside.wait(_ASK_S)
 
     def phases(self, measurement: Measurement) -> Iterator[Phase]:
-        """Yield the phases of the measurement; recording phases end early if error bounds are small."""
+        """Yield the phases of the measurement; recording phases end early if bounds are small enough."""
         for phase in phases(measurement):
             is_result = phase.segment is not None and phase.segment.label in self._labels
             if not isinstance(phase.play, Waveform):

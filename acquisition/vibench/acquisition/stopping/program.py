@@ -175,7 +175,7 @@ class Program(BaseModel):
     """Purpose of the program: a campaign's name, or ``"window"``."""
     started_utc: str
     process_start: str = ""
-    """Start time of the process, from the system; unique with the process number, which may be reused."""
+    """Start time of the process, from the system; unique together with the number, which may be reused."""
     computer: str = ""
     """Name of the computer; several computers may share the home folder that contains the state folder."""
     rigs: tuple[str, ...] = ()

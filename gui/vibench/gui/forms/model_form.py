@@ -299,7 +299,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether a field may be left empty, and an empty field does not mean its default."""
+    """Return whether a field may be left empty, with a meaning other than its default."""
     return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
