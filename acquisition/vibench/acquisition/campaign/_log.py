@@ -245,7 +245,7 @@ COMMAND_LONGEST_S = 30.0
 
 
 class Messenger(Protocol):
-    """A means of sending notices to a person."""
+    """A way to send notices to a person."""
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:
         """Send a notice; return a clause that states whether it was sent. Never raise an exception."""

@@ -28,6 +28,6 @@ def member(kind: type[Choice], given: Choice | str) -> Choice:
 
 @dataclass(frozen=True)
 class ChosenFrom:
-    """Mark for the ``Annotated`` type of a text field whose value is usually chosen from a list."""
+    """Marker in the ``Annotated`` type of a text field whose value is usually chosen from a list."""
 
     texts: Callable[[], Iterable[str]]

@@ -155,7 +155,7 @@ class PlugInGuard:
     """Wrapper of an instrument or driver that passes on only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
-        """Wrap ``held``; errors name it as ``name``: ``"'plain_scpi' of vibench.generators"``."""
+        """Wrap ``held``, which errors call ``name``: ``"'plain_scpi' of vibench.generators"``."""
         self._held = held
         self._promise = promise
         self._name = name

@@ -238,7 +238,7 @@ class OpenSegment:
 
 
 class Journal:
-    """Tables of events, segments, overloads and gaps; each method returns the writes to queue."""
+    """Tables of events, segments, overloads and gaps; each method returns the writes to be queued."""
 
     def __init__(self, places: Mapping[str, TablePlaces], roles: tuple[str, ...]) -> None:
         self._events = TableWriter(places[layout.EVENTS.name])

@@ -86,7 +86,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
 
 
 IN_FLIGHT_PER_WORKER = 4
-"""Queued chunks per worker, enough to keep workers and disk busy."""
+"""Number of queued chunks per worker, enough to keep workers and disk busy."""
 
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:

@@ -323,7 +323,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
-        """Return the seal check of every saved result, by name; ``key`` as in `check_seal`."""
+        """Return the seal check of every saved result, by name; for ``key``, see `check_seal`."""
         used = seal_key() if key is None else key
         return {name: check_result(group, used) for name, group in result_groups(self._open.file).items()}
 

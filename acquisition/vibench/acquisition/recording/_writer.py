@@ -36,7 +36,7 @@ COUNT_TOLERANCE = 0.01
 
 
 class CountScale:
-    """Converter of blocks of volts to counts."""
+    """Conversion of blocks of volts to counts."""
 
     def __init__(self, channels: Sequence[ChannelHeader]) -> None:
         self._roles = [channel.role for channel in channels]

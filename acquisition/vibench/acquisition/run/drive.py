@@ -25,11 +25,11 @@ class Drive(Protocol):
 
     @property
     def pause_s(self) -> float:
-        """Silence between the announcement of phases and their start [s]."""
+        """Duration of the silence between the announcement of phases and their start [s]."""
 
     @property
     def coefficients(self) -> tuple[Any, ...]:
-        """Measurements of a real-time controller since the start of the phase; empty for other drives."""
+        """Measurements by a real-time controller since the start of the phase; empty for other drives."""
 
     @property
     def is_commanded(self) -> bool:
@@ -57,7 +57,7 @@ class Drive(Protocol):
         """Whether the signal continues if no further command is sent."""
 
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
-        """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield as in `perform`.
+        """Cancel announced phases and ramp down within ``ramp_s`` [s]; yield times like `perform`.
 
         ``clock_s`` returns the time [s]; if reading is slow, more time passes than was yielded.
         """

@@ -146,7 +146,7 @@ class LimitMonitor:
             raise self._overload_error(block, block.overloads[0])
 
     def note_change(self, text: str, sample: int) -> None:
-        """Note a change of the specimen; if the plan requires it, the next block raises LimitExceeded."""
+        """Register a change of the specimen; if the plan says stop, the next block raises LimitExceeded."""
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
             trip = self._trip(self._response, "change of the specimen", 1.0, 0.0, "1", sample)
             self._change = LimitExceeded(

@@ -137,7 +137,7 @@ LATE_FOR_S = 2.0
 LEARNT = 0.05
 """Smallest fraction of a measured delay by which later commands are advanced; larger for the first steps."""
 LONGEST_LEAD = 0.25
-"""Largest lead of a command sent early, as a fraction of the step."""
+"""Largest time by which a command is sent early, as a fraction of the step."""
 TOLD_CYCLES = 0.1
 """Deviation of the drive at the end of a sweep above which an event is logged [cycles]."""
 MOST_MADE_UP = 3.0

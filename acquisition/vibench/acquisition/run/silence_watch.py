@@ -220,7 +220,7 @@ class SilenceWatch:
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
 
     def note_signal(self) -> None:
-        """Note whether more than hum remains after the output has been switched off."""
+        """Store whether more than hum remains after the output has been switched off."""
         self.is_heard |= not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
 
     def require_silence(self) -> None:

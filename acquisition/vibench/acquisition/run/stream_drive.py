@@ -36,7 +36,7 @@ class _Stretch:
 
 
 class OutputSynthesizer:
-    """Converter of a run's phases to samples from -1 to 1, on demand and in order.
+    """Object that converts a run's phases to samples from -1 to 1, on demand and in order.
 
     The level is an envelope: a half cosine over a ramp, otherwise constant. A tone continues without a phase
     step when its frequency changes. Phases of the run end at the samples nearest to the sums of all
@@ -184,7 +184,7 @@ class StreamDrive:
         yield from self._split_duration(phase.duration_s, full_vpp * phase.end_level)
 
     def ramp_down(self, ramp_s: float, _clock_s: Callable[[], float]) -> Iterator[float]:
-        """Play the samples already written, then fade by the device's clock; yield as in `perform`."""
+        """Play the samples already written, then fade by the device's clock; yield times like `perform`."""
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)

@@ -72,7 +72,7 @@ class LegendLine(QLabel):
         self.follow_font()
 
     def follow_font(self) -> None:
-        """Use a slightly smaller font than the window."""
+        """Use a slightly smaller font than the rest of the window."""
         font = QFont(self._of.font())
         font.setPointSizeF(0.85 * font.pointSizeF())
         self.setFont(font)

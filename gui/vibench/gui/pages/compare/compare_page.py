@@ -115,7 +115,7 @@ class ComparePage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens files of `vibench branches`."""
+        """Function that opens files written by `vibench branches`."""
         return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
@@ -224,7 +224,7 @@ class ComparePage(Page):
         self.add_branches(tuple(Path(each) for each in chosen))
 
     def add_branches(self, paths: tuple[Path, ...]) -> None:
-        """Read files of `vibench branches` in the background, then overlay their curves."""
+        """Read files written by `vibench branches` in the background, then overlay their curves."""
         for path in paths:
             self.context.background.ask(branch_curves, self.add_prediction, self.context.fail, path)
 
