@@ -61,7 +61,7 @@ class Answers:
         return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
 
     def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
-        """Return the answer to a question about the configuration; if empty, the template's value is kept."""
+        """Return the answer to a question about the configuration; no answer keeps the template's value."""
         answer = self.given.get(question.key, "")
         if choices:
             console.print(f"found: {', '.join(choices)}")

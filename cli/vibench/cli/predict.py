@@ -269,7 +269,7 @@ def _share_text(point: ScenePrediction) -> str:
 
 
 def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
-    """Return a table of the coexisting motions at points that have several; None if no point has."""
+    """Return a table of the coexisting motions at points with several motions; None without such points."""
     several = [
         (point, motion)
         for point in points

@@ -62,7 +62,7 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Allowed text of a lock file: errors quote it, and any user may write to the file."""
+"""Text of a lock file that errors may quote; other text is not quoted, as any user may write to the file."""
 
 
 class BenchLock:

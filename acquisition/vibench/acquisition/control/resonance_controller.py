@@ -288,7 +288,7 @@ def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
 
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
-    """Return the phase of m0 relative to the base minus its target, with its uncertainty from batch means."""
+    """Return the phase of m0 relative to the base, minus its target, and its uncertainty from batch means."""
     count = periods.count // 2
     newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES

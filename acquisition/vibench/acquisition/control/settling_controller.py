@@ -192,7 +192,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Return whether the base level is well known, and either in tolerance or limited by ``most_vpp``."""
+        """Return whether the base level is well known, and is in tolerance or limited by ``most_vpp``."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target

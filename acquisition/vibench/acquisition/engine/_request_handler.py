@@ -94,7 +94,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 
 
 STALL_S = 0.2
-"""If checks for viewers are further apart than this [s], this process counts as stalled."""
+"""This process counts as stalled if the time between two checks for viewers exceeds this value [s]."""
 LATE_FACTOR = 4.0
 """Extra time without requests, as a multiple of this process's own delay, which viewers may share."""
 TAKEN_OVER_S = 2.0

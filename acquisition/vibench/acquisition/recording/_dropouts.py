@@ -47,7 +47,7 @@ _OUTSTANDING = 8.0
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest change in the flanks."""
 _STEEP = 0.2
-"""Smallest change at the edge, relative to the largest distance from the fit; clipped peaks change less."""
+"""Smallest change at an edge, relative to the largest distance from the fit; clipped peaks change less."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; a larger number indicates real motion."""
 _ORDER = 48

@@ -196,7 +196,7 @@ class ChannelHeader:
         return self.physical_per_volt * self.volts_at_zero_count + self.physical_offset
 
     def attributes(self) -> dict[str, Attribute]:
-        """Return the attributes of the channel's dataset: first CF's, then the fields of this header."""
+        """Return the attributes of the channel's dataset: those of CF, then the fields of this header."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         del own["role"], own["unit"]
         own["long_name"] = self.long_name or self.role.replace("_", " ")

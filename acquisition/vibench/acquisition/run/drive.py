@@ -50,7 +50,7 @@ class Drive(Protocol):
         """Announce the phases that follow all previous ones; they start after `pause_s`."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Play a phase; yield the times for which to read until the next command [s]."""
+        """Play a phase; before each command, yield how long to read until that command [s]."""
 
     @property
     def can_hold(self) -> bool:

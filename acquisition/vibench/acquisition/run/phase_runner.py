@@ -135,7 +135,7 @@ LATE_STEPS = 4
 LATE_FOR_S = 2.0
 """Duration of consecutive late steps above which the run fails [s]."""
 LEARNT = 0.05
-"""Smallest fraction of a measured delay by which later commands are advanced; larger for the first steps."""
+"""Later commands are sent earlier by at least this fraction of a measured delay; by more in first steps."""
 LONGEST_LEAD = 0.25
 """Largest time by which a command is sent early, as a fraction of the step."""
 TOLD_CYCLES = 0.1

@@ -94,7 +94,7 @@ def _scale(number: str, prefix: str) -> float:
 
 _LONGEST_SHOWN = 40
 _SMALL = 1e-2
-"""Absolute SI value at and above which a quantity is shown without a unit prefix."""
+"""Smallest absolute SI value that is shown without a unit prefix."""
 _DIGITS = 6
 """Number of displayed digits of a long number; the stored value keeps all digits."""
 MOST_WHOLE = 1 << 53

@@ -171,7 +171,7 @@ _DASHES = {
 }
 """Dash patterns by origin of a curve: first for transmissibility or Response I, then for Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Kinds of curves visible at first; not Response II, which equals Response I without contact."""
+"""Kinds of curves visible at first; Response II is hidden, as it equals Response I without contact."""
 _SWATCH = (28, 12)
 
 
