@@ -96,7 +96,7 @@ def _lengths(text: str) -> tuple[int, ...]:
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
-    """Return the request's fields for the base motion; without these options the base is at rest."""
+    """Return the request's fields for the base motion; if no option sets it, the base is at rest."""
     if recording is not None:
         if amplitude is not None or frequency is not None:
             raise InvalidRequest(

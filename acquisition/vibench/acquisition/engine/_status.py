@@ -68,7 +68,7 @@ HUNG_FACTOR = 4.0
 
 
 def hung_patience_s(granted_s: float) -> float:
-    """Return how long a drive may continue with a blocked window [s]; see `patience_s` for ``granted_s``."""
+    """Return how long a drive may continue with a blocked window [s]; ``granted_s`` is from `patience_s`."""
     return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
 
 

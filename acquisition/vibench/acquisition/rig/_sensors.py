@@ -129,7 +129,7 @@ class SensorConfig(FrozenModel):
     resonance_hz: PositiveFloat | None = None
     """Mounted resonance frequency [Hz]; absent if far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
-    """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects the phase."""
+    """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects phases for it."""
     iepe: Literal["yes", "no"] = "no"
     """Whether the input supplies the sensor with a constant current."""
     calibrated: date
