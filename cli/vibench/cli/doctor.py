@@ -79,10 +79,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Yield each library with its version or, if missing, with the extra that installs the library.
-
-    Packages with plug-ins and their libraries are included.
-    """
+    """Yield each library and plug-in package with its version or, if missing, the extra that installs it."""
     rows = (row for kind in PlugInKind for row in entry_points(group=kind.value))
     packages = {row.dist.name: row.dist.requires or () for row in rows if row.dist is not None}
     asking: dict[str, list[str]] = {}
