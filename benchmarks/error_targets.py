@@ -56,12 +56,12 @@ SHORT, SMALL = 0.1, 1e-3
 """With sensitive dependence, no mean reaches errors up to SMALL; they get the share SHORT of the time."""
 KINDS = ("periodic", "named window", "start lost")
 HEADING, LAST = "## Requested errors", "## Other solvers"
-INTRODUCTION = """Random predictions with a requested error fall into three groups:
+INTRODUCTION = """Groups of random predictions:
 
 - *periodic*: the motion repeats.
 - *named window*: the motion does not repeat. The responses depend on the window that the result states.
 - *start lost*: the motion depends sensitively on the initial conditions (the *start*). The result is the mean
-  response over several starts in a named window, with its uncertainty."""
+  response over several starts in a named window."""
 ON_THE_PAGE = ("1 %", "0.01 %", "all")
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
