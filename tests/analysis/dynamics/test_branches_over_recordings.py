@@ -1,6 +1,7 @@
 """Branches overlaid on recordings: recorded level, report figure and the option `--like`."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,6 +150,9 @@ def test_a_report_states_that_another_specimen_was_simulated(narrow_file):
     )
     assert sentence.startswith("The simulated specimen is not the one described in narrow: gaps [4.5e-05, ")
     assert not any("not the one" in each for each in limits(analyse_files(*asked)))
+    uneven = replace(gong2025(), dampings=(0.4, 0.1, 0.2))
+    found = limits(analyse_files(*asked, specimen=uneven))
+    assert any("assumes damping of c0, c1, c2 = 0.4, 0.1, 0.2 N s/m and a gap" in each for each in found)
 
 
 def test_branches_of_another_parameter_are_not_drawn_into_a_map(diagram, tmp_path):

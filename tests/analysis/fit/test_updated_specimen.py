@@ -157,8 +157,16 @@ def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_o
     assert found.low <= 45e-6 <= found.high
 
 
-@pytest.mark.thorough
-def test_dwells_below_and_above_the_onset_of_collisions_bound_the_gap(dwell_file):
+def test_a_fit_to_recordings_of_different_specimens_states_the_assumed_one(dwell_file, monkeypatch):
+    paths = [dwell_file("weak")]
+    monkeypatch.setitem(synthetic.BENCH, "specimen", {**synthetic.BENCH["specimen"], "gap_m": 40e-6})
+    found = update_model(analyse_files([*paths, dwell_file("strong")], "dwells", Simulation.LEFT_OUT))
+    assert found.not_determined[0] == (
+        "The recordings describe different specimens; the fit takes them as one, described as in weak."
+    )
+
+
+def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
     results = analyse_files([dwell_file("weak"), dwell_file("strong")], "dwells", Simulation.LEFT_OUT)
     dwells = [each.analysis for each in results.dwells]
     (bracket,) = brackets(dwells, gong2025())

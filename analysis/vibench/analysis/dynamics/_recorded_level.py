@@ -18,7 +18,7 @@ class RecordedLevel:
     """Frequency [Hz] and base amplitude [m]."""
     measured: Sequence[Curve]
     """Curves of Response I of m0."""
-    specimen: Specimen | None
+    specimen: Specimen | None = None
     """Specimen stored in the recording; None if the recording describes none."""
 
     def difference(self, simulated: Specimen) -> str:

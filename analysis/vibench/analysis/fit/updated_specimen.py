@@ -297,6 +297,11 @@ def update_model(
     described = described_specimen(results.facts[0].bench)
     nominal = described.specimen()
     reasons: list[str] = []
+    if len({described_specimen(each.bench).specimen() for each in results.facts}) > 1:
+        reasons.append(
+            "The recordings describe different specimens; the fit takes them as one, described as in "
+            f"{results.facts[0].name}."
+        )
     free = (*LINEAR, *(Parameter(each) for each in also_free))
     linear = _linear(results, nominal, free, reasons)
     table = _table(results.noise[0], linear, reasons) if linear is not None and linear.fits else None

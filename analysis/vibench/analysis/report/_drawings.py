@@ -139,15 +139,17 @@ def limits(results: CampaignResults) -> Iterator[str]:
     yield from differences
     runs = [each.overlay.run for each in results.results if each.overlay is not None]
     if runs:
-        specimen = runs[0].specimen
-        damping = specimen.dampings[0] / specimen.stiffnesses[0]
-        gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
+        for specimen in dict.fromkeys(each.specimen for each in runs):
+            ratios = np.divide(specimen.dampings, specimen.stiffnesses)
+            damping = f"c = {ratios[0]:.3g} s · k"
+            if not np.allclose(ratios, ratios[0], rtol=1e-3, atol=0.0):
+                damping = f"c0, c1, c2 = {', '.join(f'{each:.3g}' for each in specimen.dampings)} N s/m"
+            gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
+            yield (
+                f"The simulation assumes damping of {damping} and a gap of {gaps} µm. The paper does not "
+                "state the damping; with other values, collision regions differ."
+            )
         lows_hz = [each.base_band_hz[0] for each in runs if each.base_band_hz is not None]
-        yield (
-            f"The simulation assumes damping of c = {damping:.3g} s · k and a gap of "
-            f"{gaps} µm. The paper does not state the damping; with other values, "
-            "collision regions differ."
-        )
         if lows_hz:
             yield (
                 f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "

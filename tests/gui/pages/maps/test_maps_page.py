@@ -10,6 +10,7 @@ from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
 from vibench.analysis.prediction.progress import MapRequest
 from vibench.gui.pages.maps.maps_page import MapsPage
 from vibench.gui.widgets.notice import SIMULATE
+from vibench.sim import gong2025
 
 SMALL = {
     "start_hz": 100.0,
@@ -93,6 +94,16 @@ def test_a_recorded_level_is_drawn_on_the_map_as_a_line(page):
     across, up = page.map.levels[0].getOriginalDataset()
     assert across.tolist() == [100.0, 140.0]
     assert up.tolist() == [6e-6, 7e-6]
+
+
+def test_a_recording_of_another_specimen_than_the_map_gives_a_warning(page):
+    said = []
+    page.context.noticed.connect(said.append)
+    page.form.show_value(MapRequest(**SMALL))
+    page._show_level(RecordedLevel("same", ((100.0, 6e-6), (140.0, 7e-6)), (), gong2025()))
+    assert said == []
+    page._show_level(RecordedLevel("narrow", ((100.0, 6e-6), (140.0, 7e-6)), (), gong2025(gap_m=3e-5)))
+    assert "not the one described in narrow: gaps [4.5e-05, 4.5e-05] m" in said[0].what
 
 
 def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
