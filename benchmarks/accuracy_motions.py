@@ -229,8 +229,8 @@ class MotionBenchmark:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
-                    "`quick` is sufficient: no level reduces the scatter of Response I between initial "
-                    f"conditions ({self.levels[0].response_i_scatter:.1%} at `quick`)."
+                    "`quick` is sufficient: no stricter level reduces the scatter of Response I between "
+                    f"initial conditions ({self.levels[0].response_i_scatter:.1%} at `quick`)."
                 )
 
     @property
@@ -244,7 +244,7 @@ class MotionBenchmark:
 
     def _periodic_advice(self) -> str:
         quick, _, reference = self.levels
-        price = f"`reference` takes {reference.cost / quick.cost:.1f} times the time of `quick`"
+        price = f"`reference` takes {reference.cost / quick.cost:.1f} times as long as `quick`"
         match [level.accuracy for level, _ in self.without_gain]:
             case []:
                 return f"Each level reduces the state error; {price}."

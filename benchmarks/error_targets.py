@@ -213,7 +213,7 @@ def costs_of(rows):
         for kind in KINDS
     )
     shares = (f"{np.median(own):.1f} for *{kind}*" for kind, own in ratios if own)
-    yield f"The median time ratio (default run over 1 %) is {whole}, {', '.join(shares)}."
+    yield f"The median ratio of times (default run over run for 1 %) is {whole}, {', '.join(shares)}."
     costs = [
         {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == KINDS[0]}
         for row in rows
@@ -250,11 +250,11 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"The time limit of each prediction is {time_s:g} s on a busy machine",
-        f"({SHORT * time_s:g} s with *start lost*, if the requested error is {100.0 * SMALL:g} % or less).",
-        "*Covered* responses differ from the true value by at most the stated error plus the true",
-        "value's error. True values come from level `reference`; with *start lost*, from the mean over other",
-        "starts at `quick`.",
+        f"The time limit of each prediction is {time_s:g} s on a busy machine. It is {SHORT * time_s:g} s for",
+        f"motions with *start lost* if the requested error is at most {100.0 * SMALL:g} %. *Covered*",
+        "responses differ from the true value by at most the stated error plus the true value's error. True",
+        "values come from level `reference`; with *start lost*, they are means over other starts at level",
+        "`quick`.",
         "",
         (
             "| motion | requested error | predictions | covered | requested error reached "

@@ -292,7 +292,7 @@ def write_section(page, curves):
         "",
         "The first row has vibench's simulated seconds per second (error in brackets). Other cells have:",
         "",
-        "1. the solver's time over vibench's time, for the same error (`never`: no tolerance reaches it);",
+        "1. the solver's time over vibench's time, for the same error (`never`: this error is not reached);",
         "2. this ratio of times at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
         "3. in brackets, the solver's error at this tolerance.",
         "",

@@ -27,7 +27,7 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
 def test_an_accuracy_level_without_improvement_is_reported_as_such(state_errors, said, without):
     found = benchmark(*state_errors)
     assert found.advice.startswith(said)
-    assert found.advice.endswith("`reference` takes 2.0 times the time of `quick`.")
+    assert found.advice.endswith("`reference` takes 2.0 times as long as `quick`.")
     assert [level.accuracy.value for level, _ in found.without_gain] == without
 
 
