@@ -1,6 +1,16 @@
 """Results from public recordings, imported with the shipped mappings, match the published values.
 
-The files are not shipped. docs/exchange.md ("Public recordings") shows how to fetch them.
+The files are not shipped. docs/exchange.md ("Public recordings") describes them. To fetch and compare them:
+
+    get() { git clone -q https://github.com/$1 ${1#*/}; git -C ${1#*/} show $2:$3 > public/${3##*/}; }
+    mkdir public
+    get leekunhwee/Vibration-Signal-Processing d9edffe5 ./ImpactTesting/Point1_Channel1_CH1.txt
+    get biaslab/nsi-silverbox 728f07e4 ./data/Silverbox/SNLS80mV.mat
+    get OWI-Lab/sdypy_io_tdms ab81c619 ./tests/static/good/good_tdms_1.tdms
+    get ladisk/pyuff 44a12caa ./data/MPSTD#Set001_2024_10_08_10_27_07.uff
+    VIBENCH_PUBLIC_DATA=public pytest tests/analysis/exchange/test_public_data.py
+    vibench import public/Point1_Channel1_CH1.txt --mapping examples/mappings/tool_hammer.toml --out tool.h5
+    vibench analyse tool.h5 --no-simulate --segment 0.25 --window boxcar
 """
 
 import os
@@ -34,7 +44,7 @@ def imported_path(tmp_path_factory):
     def path(name):
         file = Path(os.environ.get("VIBENCH_PUBLIC_DATA", "")) / FILES[name]
         if "VIBENCH_PUBLIC_DATA" not in os.environ or not file.exists():
-            pytest.skip(f"VIBENCH_PUBLIC_DATA names no folder with {file.name}: docs/exchange.md")
+            pytest.skip(f"VIBENCH_PUBLIC_DATA names no folder with {file.name}: see the docstring")
         meaning = load_toml(MAPPINGS / f"{name}.toml", ImportMapping)
         return import_recording(file, meaning, tmp_path_factory.mktemp(name) / "made.h5")
 
