@@ -10,7 +10,6 @@ from itertools import groupby
 from pathlib import Path
 
 from accuracy_motions import (
-    LEAST_GAIN,
     AccuracyBenchmark,
     LevelFigures,
     LotteryFigures,
@@ -184,21 +183,6 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         worst = benchmark.worst_error(accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
-    # Name the motions on which a level does not reduce the error.
-    names: dict[str, list[str]] = {}
-    for each in benchmark.motions:
-        for level, before in each.without_gain:
-            pair = f"{level.accuracy.value} is no more accurate than {before.accuracy.value}"
-            names.setdefault(pair, []).append(each.motion.name)
-    if names:
-        lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
-        yield from (
-            "",
-            "In these motions, a stricter level reduces the state error by less than a factor of",
-            f"{LEAST_GAIN:g}:",
-            "",
-            *lines,
-        )
 
 
 def main() -> None:
