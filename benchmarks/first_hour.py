@@ -116,7 +116,7 @@ def shell(shown: str, words: list[str], folder: Path, environment: dict[str, str
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     print((done.stdout + done.stderr).replace(str(folder), "~"), end="")
     failed = f", exit code {done.returncode}" if done.returncode else ""
-    took = f"{time.monotonic() - began_s:.0f} s, {processors_s() - used_s:.0f} s of processors"
+    took = f"{time.monotonic() - began_s:.0f} s, {processors_s() - used_s:.0f} s CPU"
     print(f"[{took}{failed}]\n", flush=True)
 
 
