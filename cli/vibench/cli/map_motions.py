@@ -95,7 +95,7 @@ def map_motions(
         return
     room_for_folder(out)
     levels = [recorded_response(path) for path in like or ()]
-    print_warnings(filter(None, (each.difference(request.scene((0, 0, 0)).specimen) for each in levels)))
+    print_warnings(each.difference(request.scene((0, 0, 0)).specimen) for each in levels)
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
@@ -113,20 +113,18 @@ def map_motions(
 
 
 def _branches_along(request: Map, path: Path) -> BranchDiagram:
-    """Return branches to overlay; refuse those over another parameter, warn of another drive or specimen."""
-    diagram = read_diagram(path)
-    along = diagram.request.along
+    """Return branches to overlay; refuse another parameter, and warn of another drive or specimen."""
+    diagram, scene = read_diagram(path), request.scene((0, 0, 0))
+    theirs, along = diagram.request, diagram.request.along
     if [each.axis for each in request.varying] != [along]:
         raise InvalidRequest(
             f"--branches {path} contains branches over {along}; give a map with a range of {along} only"
         )
-    scene, theirs = request.scene((0, 0, 0)), diagram.request
-    ours = scene.drive.frequency_hz, scene.drive.amplitude_m
-    own_m_or_hz = ours[0] if along is Parameter.FREQUENCY else ours[1]
-    if theirs.resonance_band_hz is not None or theirs.path.drive(own_m_or_hz) != ours:
+    drive = scene.drive.frequency_hz, scene.drive.amplitude_m
+    varied = drive[0] if along is Parameter.FREQUENCY else drive[1]
+    if theirs.resonance_band_hz is not None or theirs.path.drive(varied) != drive:
         print_warnings([f"the drive of the map is not that of the branches ({theirs.title})"])
-    difference = specimen_difference(scene.specimen, theirs.chosen_specimen, path.name)
-    print_warnings([difference] if difference else [])
+    print_warnings([specimen_difference(scene.specimen, theirs.chosen_specimen, path.name)])
     return diagram
 
 

@@ -83,8 +83,8 @@ def print_table(rows: "Table") -> None:
 
 
 def print_warnings(sentences: Iterable[str]) -> None:
-    """Print warnings on standard error, because standard output is for results."""
-    for sentence in sentences:
+    """Print warnings that are not empty on standard error, because standard output is for results."""
+    for sentence in filter(None, sentences):
         errors.print(f"warning: {sentence}")
 
 

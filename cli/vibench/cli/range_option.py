@@ -8,18 +8,14 @@ from vibench.sim import Parameter, number_of
 from vibench.sim.study import frequency_range
 
 _EXAMPLES = {
-    Parameter.FREQUENCY: {
-        1: "one above 0 Hz",
-        2: "START:STOP such as 50:600",
-        3: "START:STOP:STEP such as 50:600:1",
-    },
-    Parameter.AMPLITUDE: {
-        1: "one above 0 m",
-        2: "START:STOP such as 1e-6:50e-6",
-        3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
-    },
+    Parameter.FREQUENCY: ("one above 0 Hz", "START:STOP such as 50:600", "START:STOP:STEP such as 50:600:1"),
+    Parameter.AMPLITUDE: (
+        "one above 0 m",
+        "START:STOP such as 1e-6:50e-6",
+        "START:STOP:STEP such as 1e-6:50e-6:1e-6",
+    ),
 }
-"""Allowed forms of the text, in words; keyed by parameter and number of parts."""
+"""Allowed forms of the text with one, two and three parts, in words; keyed by parameter."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: st
     try:
         return Range(*_rising(text, parts))
     except ValueError as error:
-        allowed = " or ".join(_EXAMPLES[parameter][part] for part in parts)
+        allowed = " or ".join(_EXAMPLES[parameter][part - 1] for part in parts)
         raise InvalidRequest(
             f"--{option or parameter.value} was given as {text!r}: {error}; give {allowed}"
         ) from error

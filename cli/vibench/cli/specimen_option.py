@@ -41,14 +41,8 @@ def specimen_request(
     """Return a request with a specimen, by default the recording's or the paper's specimen.
 
     Print warnings of implausible amplitudes and gaps, and of differences from the recording's specimen.
+    ``amplitude`` is the checked text of the option; ``measured`` is the recording whose drive is simulated.
     Raises InvalidRequest for other invalid options.
-
-    Parameters
-    ----------
-    amplitude
-        Text of the option, already checked.
-    measured
-        Recording whose drive the request simulates.
     """
     # Not at the top: `vibench predict` imports this module, and needs no recordings.
     from vibench.analysis import recorded_specimen
@@ -61,6 +55,5 @@ def specimen_request(
     print_warnings(plausibility_warnings(ends_m, request.chosen_specimen.gaps_m))
     if measured is not None:
         known = None if recorded is None else recorded.specimen()
-        difference = specimen_difference(request.chosen_specimen, known, measured.name)
-        print_warnings([difference] if difference else [])
+        print_warnings([specimen_difference(request.chosen_specimen, known, measured.name)])
     return request

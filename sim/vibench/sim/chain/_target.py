@@ -110,20 +110,15 @@ def chain_response_to(
         largest_m=np.max([each.largest_m for each in used], axis=0),
         impacts=np.sum([each.impacts for each in used], axis=0),
     )
-    report = _report(errors, accuracy, error, time_s, time.monotonic() - began_s, len(used))
+    report = _report(errors, accuracy, (error, time_s), time.monotonic() - began_s, len(used))
     return TargetedResponse(response, errors, sum(each.duration_s for each in seen), report)
 
 
 def _report(
-    errors: Floats,
-    accuracy: Accuracy,
-    wanted: float | None,
-    wanted_s: float | None,
-    taken_s: float,
-    windows: int,
+    errors: Floats, accuracy: Accuracy, asked: tuple[float | None, float | None], taken_s: float, windows: int
 ) -> TargetReport:
     """Report the largest error and the time for the requested one, which falls with the root of the time."""
-    worst = float(errors.max())
+    worst, (wanted, _) = float(errors.max()), asked
     error = worst if math.isfinite(worst) else None
     is_met = error is not None and (wanted is None or worst <= wanted)
     needed, is_reachable = None, wanted is None or wanted > accuracy.promise
@@ -132,7 +127,7 @@ def _report(
         off = uncertainty_of_time(windows)
         needed = about_s, (1.0 - off) * about_s, (1.0 + off) * about_s
         is_reachable = needed[1] <= OUT_OF_REACH_S
-    return TargetReport(wanted, wanted_s, error, taken_s, 1, windows, is_met, needed, is_reachable)
+    return TargetReport(*asked, error, taken_s, 1, windows, is_met, needed, is_reachable)
 
 
 def _errors(windows: Sequence[ChainResponse]) -> Floats:

@@ -288,10 +288,9 @@ class MapsPage(Page):
         self._compare_specimens()
 
     def _compare_specimens(self) -> None:
-        """Warn if the specimen of the map differs from the specimen of a recording drawn on the map."""
-        if self.form.value is not None:
-            for level in self._levels:
-                difference = level.difference(self.form.value.chosen_specimen)
+        """Warn if the specimen of the map is not the one of a recording drawn on it."""
+        if (request := self.form.value) is not None:
+            for difference in (each.difference(request.chosen_specimen) for each in self._levels):
                 if difference:
                     self.context.warn(difference)
 
