@@ -58,8 +58,8 @@ class BranchRequest(SpecimenChoice):
     stop: PositiveFloat = 600.0
     """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     error: TargetError | None = None
-    """Error of each motion relative to the fundamental of p, such as 0.01 or "1 %"; 1e-4 by default. Shooting
-    always reaches 1e-8; harmonic balance uses as many harmonics as needed."""
+    """Error of each motion relative to the fundamental of p, such as 0.01 or "1 %"; 1e-4 by default. Harmonic
+    balance uses as many harmonics as needed; the error of shooting is fixed, usually below 1e-6."""
     time_s: TargetTime | None = None
     """Time limit of the search, such as 20 or "20 s"; the result contains the branches found by then. Without
     it, also with an error, the search takes as long as it needs."""
