@@ -66,7 +66,7 @@ amplitude_vpp = 0.5
 start_hz = 220
 stop_hz = 310
 duration_s = 2
-step_s = 0.05
+step_s = 0.2
 settle_s = 0.5
 """
 
@@ -106,6 +106,14 @@ def amplitude_to_engine() -> Walk:
     return walk("cli/predict.py:predict", "engine/library.py:Engine.run", *PREDICT)
 
 
+def samples_to_file(folder: Path) -> Walk:
+    """Return the path of the first block of a campaign to the writer of its recording, in ``folder/out``."""
+    campaign = folder / "walk.toml"
+    campaign.write_text(CAMPAIGN)
+    words = ("measure", str(campaign), "--out", str(folder / "out"))
+    return walk(":run_campaign", "recording/_writer.py:RecordingWriter.append", *words)
+
+
 def files_of_a_start() -> set[str]:
     """Return the files that every command loads, which are those that ``--version`` loads."""
     return set(walk("", "", "--version").loaded)
@@ -125,15 +133,10 @@ def main() -> None:
         print(f"  files loaded: {len(found.loaded)}, {len(own)} of them by the command itself")
     if {"measure", "analyse"} & {*asked}:
         with tempfile.TemporaryDirectory() as folder:
-            campaign, out = Path(folder) / "walk.toml", Path(folder) / "out"
-            campaign.write_text(CAMPAIGN)
-            words = ("measure", str(campaign), "--out", str(out))
-            print_path(
-                "samples to file",
-                walk(":run_campaign", "recording/_writer.py:RecordingWriter.append", *words),
-            )
+            print_path("samples to file", samples_to_file(Path(folder)))
             if "analyse" in asked:
-                analysed = ("analyse", str(out / "sweep.h5"), "--out", str(Path(folder) / "report"))
+                recording, report = (str(Path(folder) / each) for each in ("out/sweep.h5", "report"))
+                analysed = ("analyse", recording, "--out", report)
                 print_path(
                     "recording through analyse",
                     walk(":analyse", "measurement_analysis.py:analyse", *analysed),
