@@ -65,7 +65,7 @@ FIT_S = 0.03
 """Nominal computing cost of the collision fit for batches [s]."""
 FIRST_CYCLES = 1e4
 """Largest number of cycles of the fastest mode before the first check of the time limit."""
-CLOSE = 3e-3
+CLOSE = 1e-2
 """Relative change of the state from one period to the next below which Newton's iteration is tried."""
 KNOWN = 0.03
 """Relative distance from a known periodic motion, below which a run may be approaching that motion."""
