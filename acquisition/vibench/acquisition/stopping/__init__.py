@@ -1,4 +1,4 @@
-"""How a run is ended: causes, the level of each stop, and the switch between threads.
+"""How a run is ended: causes, levels of stops, and the flag that passes a stop between threads.
 
 `StopSwitch` is set without a lock and read after every block. The first Ctrl-C requests a ramp, the second a
 harder stop. A program that drives a bench announces itself in the state folder. Other programs find it there

@@ -1,4 +1,4 @@
-"""Frequency responses (response over drive) from noise and multisines, with bounds for every line.
+"""Frequency responses (response over drive) from noise and multisines, with bounds at every line.
 
 The estimators are h1, h2, hv and drive-referenced, from averaged spectra. For periodic noise, the best linear
 approximation separates noise from nonlinear distortion (Pintelon & Schoukens, System Identification, 2nd ed.,

@@ -1,4 +1,4 @@
-"""Data for pictures of a recording in bounded memory: live during the run, or of any part afterwards.
+"""Data for plots of a recording, in bounded memory: during the run, or of any part afterwards.
 
 Live pictures cover the newest seconds: time histories, spectra, transmission, Responses I and II, phase
 portrait, levels and impact count. Each picture is computed when it is drawn. A finished recording is drawn

@@ -1,4 +1,4 @@
-"""Periodic motions, stable or not: harmonic balance, shooting, their branches, Floquet multipliers.
+"""Stable and unstable periodic motions: harmonic balance, shooting, branches, Floquet multipliers.
 
 `first_order_states` finds all branches of the paper's analytical solution (Gong et al. 2025, eqs. 4 and 5).
 `balance_branch_within` follows harmonic-balance solutions; `periodic_branch` follows exact motions with

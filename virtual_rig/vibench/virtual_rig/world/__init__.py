@@ -1,4 +1,4 @@
-"""The analogue world between the generator's terminal and the converter's inputs, on a time grid.
+"""The analogue world between generator terminal and converter inputs, simulated on a time grid.
 
 One loop of the native engine (`vibench.sim.shaker`) simulates amplifier, shaker and specimen. Sensors,
 cables, input stages, anti-alias filter and seeded noise are included. Quantities are means over a step, in SI
