@@ -20,10 +20,10 @@ HEAD = f"| {' | '.join(_HEADINGS)} |"
 _TITLE = "Claims of the paper, checked by simulation"
 _METHOD = """\
 Each claim of Gong et al. (2025) with a number or direction is checked by simulating their specimen.
-The paper states few tolerances, so the required bounds are our choice, some made after seeing first
-results. They allow for chaos, in which responses differ by some per cent between runs.
+The paper states few tolerances, so we chose the required bounds, some of them after seeing first results.
+The bounds allow for chaos, in which responses differ by some per cent between runs.
 "Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
-If the duration of chaos is random, a claim is checked from several starts (initial states a millionth of the
+If the duration of chaos is random, a claim is checked with several starts (initial states a millionth of the
 gap apart), and parentheses show the range of the results. If a claim fails, options are tried in order until
 the claim holds. A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest
 Lyapunov exponent. Similarity is the share of frequencies at which two models agree (eq. 7).

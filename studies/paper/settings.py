@@ -73,7 +73,7 @@ def score_table(scores: Sequence[DampingScore]) -> report.ReportTable:
         ),
         f"In SI units, the paper's c = 0.01 k gives damping ratios of {first}, {second} and {third}; above 1 "
         f"a mode does not oscillate. In mm, g and ms, c / k is 1e-05 s. The table counts the claims that "
-        f"are quick to compute; the largest number holds at {best}. "
+        f"are quick to compute; this count is highest at {best}. "
         f"Claims that fail at every damping: {', '.join(always) or 'none'}.",
     )
 
