@@ -98,7 +98,7 @@ def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_numbe
 
 def test_the_page_of_scores_names_the_best_damping_and_the_failed_claims(found):
     page = reproduction_document(found, (("A figure", "images/it.png"),))
-    assert "the largest number holds at 3e-05 s. Claims that fail at every damping: third." in page
+    assert "this count is highest at 3e-05 s. Claims that fail at every damping: third." in page
     assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second |" in page
     assert "nowhere" not in page
     assert page.endswith("![A figure](images/it.png)\n")
