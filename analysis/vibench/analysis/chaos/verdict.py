@@ -115,7 +115,7 @@ def begin_of_last_motion(points: Points) -> int:
     changes = np.flatnonzero(repeats[1:] != repeats[:-1])
     if changes.size != 1:
         return 0
-    # The motion changes at an unknown place inside the block that does not repeat.
+    # The motion changes somewhere inside the block that does not repeat; the exact place is unknown.
     last = int(changes[0]) + 1
     return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
 

@@ -305,7 +305,7 @@ def needed_s(expected: tuple[ExpectedResult, ...], until: Until) -> float | None
         for each in found:
             if each.scatter is None:
                 return None
-            # The uncertainty of a maximum does not fall with time; it is in `lasting`, and `scatter` is 0.
+            # For a maximum, `scatter` is 0; `lasting` is its uncertainty, which does not fall with time.
             share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
             fixed = float(np.inf) if share > 1.0 else 0.0
             needs.append(each.time_s * share**2 if each.scatter else fixed)

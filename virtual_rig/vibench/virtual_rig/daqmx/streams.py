@@ -94,7 +94,7 @@ class Acquisition(Stream):
         self._sampler = task.rig.world.sample(wiring, self.rate_hz)
         self._unread = SampleQueue(channels)
         self.buffer_size = max(1, task.buffer_size)
-        loses_samples = task.rig.pace.loses_samples  # otherwise a full buffer grows
+        loses_samples = task.rig.pace.loses_samples  # if not, the buffer grows as needed
         self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
         self._is_open = True
 
