@@ -114,7 +114,9 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
-        yield _free_state(specimen, drive)
+        # The steady motion without stops at time zero, driven by U = A0 sin(w t).
+        phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
+        yield np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
     rng = np.random.default_rng([search.seed, int(drive.frequency_hz * 1e3), int(drive.amplitude_m * 1e9)])
     for _ in range(search.starts):
         yield random_state(specimen, drive, rng)
@@ -135,12 +137,6 @@ def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) 
     p = rng.uniform(-min(lower, 3.0 * near), min(upper, 3.0 * near)) * WITHIN
     rates = rng.uniform(-reach, reach, 3) * speed
     return np.array([x, z + p, z, *rates])
-
-
-def _free_state(specimen: Specimen, drive: Harmonic) -> Vector:
-    """Return the state at time zero of the steady motion without stops, driven by U = A0 sin(w t)."""
-    phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
-    return np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
 
 
 def _orbit_from(

@@ -45,19 +45,14 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
         raise ValueError("Frequencies must be finite and positive, in Hz.")
     across = np.tile(np.eye(2, dtype=np.complex128), (len(omega), 1, 1))
     for cell in unit.cells:
-        across = _transfer(cell, omega) @ across
+        outer, pushed, _, _ = reduce_to_m0(cell, omega)
+        one = np.ones_like(outer)
+        across = np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
     # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger root has no cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
-
-
-def _transfer(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
-    """Return the transfer matrix of a cell for displacement and force, shape (n, 2, 2)."""
-    outer, pushed, _, _ = reduce_to_m0(cell, omega)
-    one = np.ones_like(outer)
-    return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
 
 
 class CellResponse(NamedTuple):

@@ -157,15 +157,6 @@ def _coupling(specimen: Specimen) -> Vector:
     return np.asarray(onto_p / onto_p[1])
 
 
-def _free(accelerations: Table) -> Table:
-    """Return the coefficients, in powers of time, of the indentation without contact force, shape (n, 7)."""
-    powers = np.arange(2, DERIVATIVES + 2)
-    bent = accelerations / [math.factorial(k) for k in powers]
-    speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
-    depth = MIDDLE * speed - (bent * (-MIDDLE) ** powers).sum(axis=1)
-    return np.column_stack([depth, speed, bent])
-
-
 def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
     """Return the durations of n collisions and the moments about their middles, shape (n, 6).
 
@@ -177,7 +168,12 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
     onto_depths, onto_length = shapes[place, : POINTS + 1], shapes[place, ONTO_DURATION]
     onto_length = np.column_stack([onto_length, durations[place, END_ONTO_DURATION]])
     depths, length = shapes[place, DEPTHS], durations[place, DURATION]
-    times, free, orders = np.append(HEIGHTS, 1.0), _free(accelerations), np.arange(TERMS)
+    # The indentation without contact force, in powers of time.
+    powers = np.arange(2, DERIVATIVES + 2)
+    bent = accelerations / [math.factorial(k) for k in powers]
+    speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
+    depth = MIDDLE * speed - (bent * (-MIDDLE) ** powers).sum(axis=1)
+    times, free, orders = np.append(HEIGHTS, 1.0), np.column_stack([depth, speed, bent]), np.arange(TERMS)
     through = coupling * units[:, None] ** (orders - 1.0) * (orders > 0)
     shares = SHARES.transpose(1, 0, 2).reshape(POINTS, -1)
     for _ in range(CORRECTIONS):

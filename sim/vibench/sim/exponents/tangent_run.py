@@ -23,7 +23,7 @@ from ..specimen.drive import Harmonic
 from ..specimen.modes import modal_form
 from ..specimen.outcome import Outcome
 from ..specimen.specimen import Specimen, energy_metric
-from ..specimen.state import Floats, Table
+from ..specimen.state import Floats
 from ..specimen.stops import require_positive
 
 # Standard error of the mean of a correlated series, from sufficiently long blocks.
@@ -189,7 +189,12 @@ def run_with_tangent(
     count = interval.count_in(duration_s)
     run = NativeRun(specimen, drive, start_motion(initial_state), accuracy.tolerance)
     metric = energy_metric(specimen)
-    run.carry(starting_changes(metric, changes))
+    # Initial tangents, orthonormal in the metric and fixed for all runs.
+    size = len(metric)
+    general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
+    root = np.linalg.cholesky(metric)
+    rows, lengths = np.linalg.qr((general / np.sqrt(np.diag(metric)) @ root).T)
+    run.carry(np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T)
     record = RunRecord(most_impacts(max_impact_rate_hz, duration_s))
     parts = _parts(specimen, interval.length_s) if changes > 1 else 1
     readings = GrowthReadings(changes, count, interval.length_s, parts, metric)
@@ -218,15 +223,6 @@ def _parts(specimen: Specimen, interval_s: float) -> int:
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
-
-
-def starting_changes(metric: Table, changes: int) -> Table:
-    """Return initial tangents, orthonormal in the metric and fixed for all runs, shape (changes, 6)."""
-    size = len(metric)
-    general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
-    root = np.linalg.cholesky(metric)
-    rows, lengths = np.linalg.qr((general / np.sqrt(np.diag(metric)) @ root).T)
-    return np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T
 
 
 # Time at which a run settles into its final kind of motion, and chaos before that time. SI units.

@@ -73,7 +73,8 @@ class MapPoints(Points):
         """Point numbers of the first lattice, for all initial states of each cell."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
-        return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
+        rows, _, columns = self.grid.shape
+        return points_of(np.flatnonzero(lattice((rows, columns), self.plan.first_step)), self.grid)
 
     def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
         """Return the points to compute next, for all initial states; all points of a non-adaptive map."""
@@ -151,12 +152,6 @@ def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
     cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
     flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
     return np.asarray(np.unique(flat, axis=0, return_inverse=True)[1].reshape(rows, columns), dtype=np.int64)
-
-
-def cells_shape(grid: Grid) -> tuple[int, int]:
-    """Return the numbers of rows and columns of a map over two quantities."""
-    rows, _, columns = grid.shape
-    return rows, columns
 
 
 def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:

@@ -129,7 +129,10 @@ class _Sketch:
         corners, weights = _corners(self.codes.shape, cells, step)
         wanted = np.zeros_like(self.is_computed)
         wanted.reshape(-1)[cells] = self._differ(corners)
-        self._fill(cells, corners, weights)
+        nearest = corners[np.arange(len(cells)), np.argmax(weights, axis=1)]
+        self.donors.reshape(-1)[cells] = self.donors.reshape(-1)[nearest]
+        self.codes.reshape(-1)[cells] = self.codes.reshape(-1)[nearest]
+        self.sizes.reshape(-1)[cells] = (self.sizes.reshape(-1)[corners] * weights).sum(axis=1)
         while True:
             missing = wanted & ~self.seen.is_known
             if missing.any():
@@ -154,12 +157,6 @@ class _Sketch:
         is_alone = weights.sum(axis=1) == 0.0
         corners[is_alone, 0], weights[is_alone, 0] = donors[is_alone], 1.0
         return Filling(cells, donors, corners, weights / weights.sum(axis=1, keepdims=True))
-
-    def _fill(self, cells: Indices, corners: Indices, weights: Floats) -> None:
-        nearest = corners[np.arange(len(cells)), np.argmax(weights, axis=1)]
-        self.donors.reshape(-1)[cells] = self.donors.reshape(-1)[nearest]
-        self.codes.reshape(-1)[cells] = self.codes.reshape(-1)[nearest]
-        self.sizes.reshape(-1)[cells] = (self.sizes.reshape(-1)[corners] * weights).sum(axis=1)
 
     def _differ(self, corners: Indices) -> Mask:
         """Return whether the four corners of each cell have different motions, shape (n,)."""

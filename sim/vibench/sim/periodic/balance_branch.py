@@ -143,7 +143,12 @@ def balance_of_solution(
     seen = condense(problem.structure, omega, harmonics)
     force = force_harmonics(problem.spring, phasors, harmonics, omega).force
     drive = np.where(harmonics == 1, -1j * amplitude_m, 0.0)
-    left_out = _truncation_error(problem, phasors, omega)
+    highest = int(problem.harmonics[-1])
+    lines = force_tail(problem.spring, phasors, problem.harmonics, omega)
+    beyond = np.arange(highest + 1, min(TAIL * highest, len(lines) - 1) + 1)
+    moved = condense(problem.structure, omega, beyond).compliance * lines[beyond]
+    fundamental = abs(phasors[int(np.searchsorted(problem.harmonics, 1))])
+    left_out = float(np.sum(np.abs(moved)) / fundamental) if fundamental > 0.0 else math.inf
     return Balance(
         frequency_hz=frequency_hz,
         amplitude_m=amplitude_m,
@@ -153,15 +158,6 @@ def balance_of_solution(
         left_out=left_out,
         outcome=BalanceEnd.CONVERGED if left_out <= tolerance else BalanceEnd.TOO_FEW_HARMONICS,
     )
-
-
-def _truncation_error(problem: BalanceProblem, phasors: Complex, omega: float) -> float:
-    highest = int(problem.harmonics[-1])
-    lines = force_tail(problem.spring, phasors, problem.harmonics, omega)
-    beyond = np.arange(highest + 1, min(TAIL * highest, len(lines) - 1) + 1)
-    moved = condense(problem.structure, omega, beyond).compliance * lines[beyond]
-    fundamental = abs(phasors[int(np.searchsorted(problem.harmonics, 1))])
-    return float(np.sum(np.abs(moved)) / fundamental) if fundamental > 0.0 else math.inf
 
 
 @dataclass(frozen=True, eq=False)

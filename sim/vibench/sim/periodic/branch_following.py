@@ -198,11 +198,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
         whole = onward or back
         assert whole is not None
         return replace(whole, begin=ArcEnd.REACHED_BOUND)
-    return _join_branches(back, onward)
-
-
-def _join_branches(back: Branch, onward: Branch) -> Branch:
-    """Join two branches that start at the same point, with the order of the first one reversed."""
+    # Reverse one branch and join the other to it; both start at the same point.
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE

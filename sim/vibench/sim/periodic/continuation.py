@@ -206,7 +206,9 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
             if turn <= steps.most_turn_rad:
                 made = float(np.linalg.norm(point - here.point))
                 ahead = ArcPoint(point, tangent, here.arc + made)
-                return ahead, min(steps.longest, step * _stretch(iterations, turn, steps))
+                effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
+                bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
+                return ahead, min(steps.longest, step * min(2.0, max(0.5, min(effort, bend))))
         step *= 0.5
     return None, step
 
@@ -247,13 +249,6 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
                     return ArcPoint(point, tangent, here.arc + made)
         length *= LEAP_GROWTH
     return None
-
-
-def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
-    """Return the ratio of the next step length to this one, from iteration count and tangent rotation."""
-    effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
-    bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
-    return min(2.0, max(0.5, min(effort, bend)))
 
 
 def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:

@@ -125,7 +125,11 @@ class _Departures:
         lengths = (widths / (2.0 * math.pi * self._motion.frequency_hz))[:, None, None]
         bracket = late @ early - early @ late
         exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
-        steps = _exponentials(exponents)
+        # Exponentials of matrices with eigenvalues below one, by the [3/3] Pade approximant.
+        squared = exponents @ exponents
+        even = np.eye(exponents.shape[-1]) + squared / 10.0
+        odd = exponents / 2.0 + squared @ exponents / 120.0
+        steps = np.linalg.solve(even - odd, even + odd).astype(np.float64)
         while len(steps) > 1:
             # Multiply the matrices in pairs, so that numpy works on whole arrays.
             pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
@@ -162,11 +166,3 @@ def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[f
             if low * high < 0.0:
                 found.append(float(scipy.optimize.brentq(distance, grid[k], grid[k + 1], xtol=1e-14)))
     return sorted(turn for turn in found if turn <= span_rad)
-
-
-def _exponentials(small: Floats) -> Floats:
-    """Return the exponentials of matrices with eigenvalues below one, by the [3/3] Pade approximant."""
-    squared = small @ small
-    even = np.eye(small.shape[-1]) + squared / 10.0
-    odd = small / 2.0 + squared @ small / 120.0
-    return np.linalg.solve(even - odd, even + odd).astype(np.float64)

@@ -81,18 +81,14 @@ class OrbitFamily(ExactFamily):
             return np.full(6, math.nan), np.full((6, 7), math.nan)
         drive, state = self.drive_at(point), self.state_at(point)
         gone, by_state, ratio = self.closure(state, drive)
-        along = ratio * self._slope(state, drive, float(point[-1]) * self.scale) * self.scale
-        return gone, np.column_stack([by_state, along])
-
-    def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
-        """Return d(final state) / d(parameter) of the map, divided by the state's scales [1/Hz or 1/m]."""
-        by_frequency, by_amplitude = self.path.slopes(value)
+        by_frequency, by_amplitude = self.path.slopes(float(point[-1]) * self.scale)
         slope = np.zeros(6)
         if by_frequency != 0.0:
             slope += by_frequency / drive.frequency_hz * self.mapping.frequency_slope(state, drive)
         if by_amplitude != 0.0:
             slope += by_amplitude / drive.amplitude_m * self.mapping.amplitude_slope(state, drive)
-        return slope
+        along = ratio * slope * self.scale
+        return gone, np.column_stack([by_state, along])
 
     def report(self, point: Vector) -> OrbitReport:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""

@@ -41,7 +41,15 @@ class _Sweep(Strict):
     amplitude_m: float
 
     def __post_init__(self) -> None:
-        _require_sweep(self.start_hz, self.stop_hz, self.duration_s, self.amplitude_m)
+        _require_frequency("Sweep start", self.start_hz)
+        _require_frequency("Sweep stop", self.stop_hz)
+        require_positive("Sweep duration", self.duration_s, "s")
+        _require_amplitude(self.amplitude_m)
+        if self.start_hz == self.stop_hz:
+            raise ValueError(
+                f"A sweep from {self.start_hz} to {self.stop_hz} Hz is not allowed: for one frequency "
+                "use Harmonic."
+            )
 
     @property
     def highest_hz(self) -> float:
@@ -133,17 +141,6 @@ def _require_amplitude(amplitude_m: float) -> None:
         raise ValueError(
             f"Drive amplitude {amplitude_m} m is not allowed: "
             f"it must be zero, or lie between {SMALLEST_AMPLITUDE_M:g} and {LARGEST_AMPLITUDE_M:g} m."
-        )
-
-
-def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude_m: float) -> None:
-    _require_frequency("Sweep start", start_hz)
-    _require_frequency("Sweep stop", stop_hz)
-    require_positive("Sweep duration", duration_s, "s")
-    _require_amplitude(amplitude_m)
-    if start_hz == stop_hz:
-        raise ValueError(
-            f"A sweep from {start_hz} to {stop_hz} Hz is not allowed: for one frequency use Harmonic."
         )
 
 

@@ -8,14 +8,14 @@ import os
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeAlias, TypeVar
 
 from ..scene.cost import learn_cost
-from ..scene.prediction import Method, ScenePrediction
+from ..scene.prediction import Method
 from ..scene.scene import Scene
 from ..scene.solve import InBatches, SolvedScene, Solver as SceneSolver, solve_scene, solve_scenes
 from ._errors import InvalidStudy
@@ -87,19 +87,15 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[SolvedScene
         if isinstance(solver, InBatches):
             found = solve_scenes(group, solver.question)
         else:
-            found = [_solve_and_time(group[0], solver)]
+            start_s = time.thread_time()
+            prediction = solver(group[0])
+            found = [SolvedScene(prediction, time.thread_time() - start_s)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
             # Times of closed forms are not recorded: planning them takes about as long as evaluating them.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
             yield SolvedScene(each.prediction, each.taken_s if is_prepared else math.nan)
-
-
-def _solve_and_time(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> SolvedScene:
-    start_s = time.thread_time()
-    prediction = solver(scene)
-    return SolvedScene(prediction, time.thread_time() - start_s)
 
 
 Item = TypeVar("Item")

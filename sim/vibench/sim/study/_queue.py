@@ -344,7 +344,10 @@ class _Session:
 
     def feed(self) -> None:
         """Send bundles to the executor until each of its workers has `QUEUED_PER_SLOT` bundles."""
-        self._look()
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= LOOK_S:
+            self._looked_s = now_s
+            self._work_left_s = self._costs.remaining_s(self._scheduler.is_missing)
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
             worth_s = min(self._points.bundle_s, self._work_left_s / (slots * SHARE))
@@ -387,13 +390,6 @@ class _Session:
         if self._taken_s == 0.0:
             return None
         return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
-
-    def _look(self) -> None:
-        """Update the remaining work, at most every `LOOK_S`, because there may be millions of points."""
-        now_s = time.monotonic()
-        if now_s - self._looked_s >= LOOK_S:
-            self._looked_s = now_s
-            self._work_left_s = self._costs.remaining_s(self._scheduler.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
         """Yield the results in a reply; put points without a result back into the queue."""

@@ -74,21 +74,17 @@ def expand_ranges(given: object) -> object:
             except OverflowError as error:
                 raise ValueError("a number of the range has over 300 digits; give a smaller one") from error
         case list() | tuple():
-            return _flatten(given)
+            values: list[object] = []
+            for each in given:
+                some = expand_ranges(each)
+                values.extend(some if isinstance(some, tuple) else (some,))
+                if len(values) > LONGEST:
+                    raise ValueError(f"ranges have more than {LONGEST} values in total; give larger steps")
+            if all(isinstance(value, (int, float)) for value in values):
+                return sorted(set(values))  # type: ignore[type-var]
+            return values
         case _:
             return given
-
-
-def _flatten(given: list[object] | tuple[object, ...]) -> object:
-    values: list[object] = []
-    for each in given:
-        some = expand_ranges(each)
-        values.extend(some if isinstance(some, tuple) else (some,))
-        if len(values) > LONGEST:
-            raise ValueError(f"ranges have more than {LONGEST} values in total; give larger steps")
-    if all(isinstance(value, (int, float)) for value in values):
-        return sorted(set(values))  # type: ignore[type-var]
-    return values
 
 
 MOST_POINTS = 10_000_000
