@@ -259,7 +259,11 @@ def _resume_journal(
 ) -> Journal:
     with ExitStack() as undo:
         journal = undo.enter_context(Journal.open(path))
-        _require_same_plan(journal, campaign)
+        if _points_to_make(journal.campaign) != _points_to_make(campaign):
+            raise RecordingError(
+                f"the plan of {campaign.name!r} has changed since {journal.path} was written. Nothing was "
+                "recorded; give the changed campaign another name, or choose another folder"
+            )
         begun_on = journal.bench
         match changed:
             case ChangedBench.REFUSE:
@@ -269,14 +273,6 @@ def _resume_journal(
         reconcile(journal, folder, stop)
         undo.pop_all()
     return journal
-
-
-def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
-    if _points_to_make(journal.campaign) != _points_to_make(campaign):
-        raise RecordingError(
-            f"the plan of {campaign.name!r} has changed since {journal.path} was written. Nothing was "
-            "recorded; give the changed campaign another name, or choose another folder"
-        )
 
 
 def _points_to_make(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:

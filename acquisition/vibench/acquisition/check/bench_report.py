@@ -68,7 +68,13 @@ def bench_report(
     findings += [*_calibrations(bench), _disk_finding(bench, folder)]
     if amplitude_vpp is None:
         amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
-    drive = drive_for(bench, _small_sine(amplitude_vpp))
+    sine = Dwell(
+        amplitude_vpp=amplitude_vpp,
+        frequency_hz=CHECK_FREQUENCY_HZ,
+        settle_s=_SETTLE_S,
+        duration_s=_READ_S,
+    )
+    drive = drive_for(bench, Measurement(name="check", excitation=sine))
     reader = _BlockReader(bench, StopSwitch() if switch is None else switch)
     bench.generator.stop()
     quiet = reader.in_silence()
@@ -154,16 +160,6 @@ class _BlockReader:
             blocks.append(block.volts)
             left -= block.volts.shape[1]
         return blocks
-
-
-def _small_sine(amplitude_vpp: float) -> Measurement:
-    sine = Dwell(
-        amplitude_vpp=amplitude_vpp,
-        frequency_hz=CHECK_FREQUENCY_HZ,
-        settle_s=_SETTLE_S,
-        duration_s=_READ_S,
-    )
-    return Measurement(name="check", excitation=sine)
 
 
 def _calibrations(bench: Bench) -> list[Finding]:

@@ -331,7 +331,13 @@ class DaqmxDigitizer:
 
     def _reserve(self) -> None:
         self._resources.callback(self.session.close)
-        self._identity = self._identify()
+        identity = daqmx_identity(self.session, self._config.device)
+        if _plain(identity.model) != _plain(self._config.product):
+            raise ConfigurationError(
+                f"{self._config.device} on {self.session.place} is a {identity.model}, but daq.product is "
+                f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
+            )
+        self._identity = identity
         self._task = task = self._resources.enter_context(Task(grpc_options=self.session.options))
         pairs = zip(self._config.channels, self._channels, strict=True)
         self.volts_per_count = tuple(add_input(task, config, channel) for config, channel in pairs)
@@ -356,15 +362,6 @@ class DaqmxDigitizer:
             self._steps_v = np.array(self.volts_per_count)[:, np.newaxis]
         # Every array here is made for the channels of this task, so the client's check is not needed.
         self._reader.verify_array_shape = False
-
-    def _identify(self) -> Identity:
-        identity = daqmx_identity(self.session, self._config.device)
-        if _plain(identity.model) != _plain(self._config.product):
-            raise ConfigurationError(
-                f"{self._config.device} on {self.session.place} is a {identity.model}, but daq.product is "
-                f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
-            )
-        return identity
 
     def _open_task(self) -> Task:
         if self._task is None:

@@ -23,7 +23,17 @@ FORGOTTEN_S = 60.0
 
 def main() -> None:
     """Serve requests until a request, a signal or the end of the parent process ends the engine."""
-    options = _options()
+    parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
+    parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
+    parser.add_argument("--what", default="engine", help="purpose of this engine, shown to other viewers")
+    parser.add_argument("--host", default=LOOPBACK, help="address to listen on; a token is always required")
+    parser.add_argument(
+        "--forgotten-s",
+        type=float,
+        default=FORGOTTEN_S,
+        help="time [s] without a request until an unattended engine ends, if it has no campaign to run",
+    )
+    options = parser.parse_args()
     engine = Engine(options.attendance)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
@@ -37,20 +47,6 @@ def main() -> None:
             arguments = (handler, options.forgotten_s)
             Thread(target=_end_when_unused, args=arguments, name="engine forgotten", daemon=True).start()
         jobs.run()
-
-
-def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
-    parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
-    parser.add_argument("--what", default="engine", help="purpose of this engine, shown to other viewers")
-    parser.add_argument("--host", default=LOOPBACK, help="address to listen on; a token is always required")
-    parser.add_argument(
-        "--forgotten-s",
-        type=float,
-        default=FORGOTTEN_S,
-        help="time [s] without a request until an unattended engine ends, if it has no campaign to run",
-    )
-    return parser.parse_args()
 
 
 def _handle_signals(handler: RequestHandler) -> None:

@@ -20,7 +20,6 @@ from ..plan import Campaign, RunState, measuring_s
 from ._status import (
     ArmedPlan,
     BenchFacts,
-    ChannelFacts,
     ChannelLevel,
     EngineMessage,
     EngineState,
@@ -238,13 +237,26 @@ class PublishedState:
         """Update the status after a block of samples."""
         run = progress.run
         if progress.path != self._file:  # each attempt at a point is a new recording
-            self._begin(progress, bench)
+            self._file = progress.path
+            self._overloads = 0
+            self.sample_buffer.begin(len(bench.channels), bench.sample_rate_hz)
+            self._put(bench=bench)  # a scan gives the vibrometer's channel another role
+            self._row(progress.name, "running", "", str(progress.path))
         self.sample_buffer.add(run.block)
         self._overloads += len(run.block.overloads)
+        peaks = np.max(np.abs(run.block.volts), axis=1)
+        rms = np.sqrt(np.mean(run.block.volts**2, axis=1))
         self._put(
             state=_STATES.get(run.state, EngineState.RUNNING),
             run=self._run_status(progress),
-            levels=levels_of(run.block, bench.channels),
+            levels=tuple(
+                ChannelLevel(
+                    role=channel.role,
+                    peak_share=peak / channel.full_scale_v,
+                    rms_share=value / channel.full_scale_v,
+                )
+                for channel, peak, value in zip(bench.channels, peaks.tolist(), rms.tolist(), strict=True)
+            ),
             overloads=self._overloads,
         )
         self._look_at_disk()
@@ -275,13 +287,6 @@ class PublishedState:
         for row in self._status.rows:
             if row.state == "running":
                 self._row(row.name, "failed", reason, row.file)
-
-    def _begin(self, progress: CampaignProgress, bench: BenchFacts) -> None:
-        self._file = progress.path
-        self._overloads = 0
-        self.sample_buffer.begin(len(bench.channels), bench.sample_rate_hz)
-        self._put(bench=bench)  # a scan gives the vibrometer's channel another role
-        self._row(progress.name, "running", "", str(progress.path))
 
     def _row(self, name: str, state: str, reason: str, file: str) -> None:
         status = RowStatus(name=name, state=state, reason=reason, file=file)
@@ -333,17 +338,3 @@ def _free_bytes(folder: Path) -> int:
 def _queue_rows(campaign: Campaign) -> tuple[RowStatus, ...]:
     names = campaign.recording_names()
     return tuple(RowStatus(name=name, state="queued", reason="", file="") for name in names)
-
-
-def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:
-    """Return peak and rms of each channel during a block, relative to its full scale."""
-    peaks = np.max(np.abs(block.volts), axis=1)
-    rms = np.sqrt(np.mean(block.volts**2, axis=1))
-    return tuple(
-        ChannelLevel(
-            role=channel.role,
-            peak_share=peak / channel.full_scale_v,
-            rms_share=value / channel.full_scale_v,
-        )
-        for channel, peak, value in zip(channels, peaks.tolist(), rms.tolist(), strict=True)
-    )

@@ -28,7 +28,7 @@ from ..host.schema import schema_line
 from ..host.shipped import shipped_folder
 from ..host.toml_file import complaints, from_toml
 from ..instruments import PlugInKind, missing_package, plug_in_names, usb_ids
-from ..rig import Channel, GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
+from ..rig import GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
 from ..stopping.stop import StopSwitch
 
 
@@ -420,19 +420,15 @@ def _heading(bench: Bench, config: Path, operator: str) -> Iterator[str]:
 def _wires(rig: Rig, confirmed: Confirmed, again: str) -> Iterator[str]:
     yield "\n## Wires (both ends checked)\n"
     for channel in channels_of(rig):
-        pair = _pair(rig, channel)
+        config = next(each for each in rig.daq.channels if each.role is channel.role)
+        divider = f" over a divider of {config.attenuation:g}:1" if config.attenuation != 1 else ""
+        current = f", IEPE {1e3 * config.iepe_current_a:g} mA" if config.iepe_current_a else ""
+        source = _FROM.get(channel.role, f"{channel.sensor} ({channel.role.value.replace('_', ' ')})")
+        pair = f"{source}{divider} to {channel.physical} ({channel.coupling}{current})"
         answer = confirmed(pair)
         if not answer:
             raise CheckFailed(f"not confirmed: {pair}. Nothing was played; connect both ends and {again}")
         yield f"- {pair}: {answer}"
-
-
-def _pair(rig: Rig, channel: Channel) -> str:
-    config = next(each for each in rig.daq.channels if each.role is channel.role)
-    divider = f" over a divider of {config.attenuation:g}:1" if config.attenuation != 1 else ""
-    current = f", IEPE {1e3 * config.iepe_current_a:g} mA" if config.iepe_current_a else ""
-    source = _FROM.get(channel.role, f"{channel.sensor} ({channel.role.value.replace('_', ' ')})")
-    return f"{source}{divider} to {channel.physical} ({channel.coupling}{current})"
 
 
 def _chapter(title: str, report: BenchReport) -> Iterator[str]:

@@ -168,27 +168,23 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     is still open, or ends after the valid samples, is marked incomplete.
     """
     if table is layout.SEGMENTS:
-        return _clip_segments(columns, n_valid)
+        first = np.minimum(columns["first_sample"], n_valid)
+        last = columns["last_sample"]
+        # A power cut may leave a complete segment without its end; an empty one at sample 0 ends at -1.
+        is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
+        is_cut = is_open | (last >= n_valid)
+        return {
+            **columns,
+            "first_sample": first,
+            "last_sample": np.where(is_cut, n_valid - 1, last),
+            "is_complete": np.where(is_cut, 0, columns["is_complete"]).astype(np.int32),
+        }
     if table in {layout.OVERLOADS, layout.GAPS}:
         keep = columns["first_sample"] < n_valid
         kept = {name: values[keep] for name, values in columns.items()}
         kept["last_sample"] = np.minimum(kept["last_sample"], n_valid - 1)
         return kept
     return columns
-
-
-def _clip_segments(columns: Columns, n_valid: int) -> Columns:
-    first = np.minimum(columns["first_sample"], n_valid)
-    last = columns["last_sample"]
-    # A power cut may leave a complete segment without its end. Only an empty segment at sample 0 ends at -1.
-    is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
-    is_cut = is_open | (last >= n_valid)
-    return {
-        **columns,
-        "first_sample": first,
-        "last_sample": np.where(is_cut, n_valid - 1, last),
-        "is_complete": np.where(is_cut, 0, columns["is_complete"]).astype(np.int32),
-    }
 
 
 def rows(columns: Columns, table: Table) -> Iterator[tuple[Any, ...]]:

@@ -174,7 +174,12 @@ class GeneratorDrive:
             self.cut()
         if self._setting_vpp > self._quiet_vpp() and (was_off or self._level > 0.0):
             with suppress(AcquisitionError):
-                self._lower()
+                quiet_vpp = self._quiet_vpp()
+                try:
+                    self._generator.set_amplitude(quiet_vpp)
+                except AcquisitionError:  # the generator's settings are unknown after a failed change
+                    self._generator.load_sine(CHECK_FREQUENCY_HZ, quiet_vpp)
+                self._level, self._setting_vpp = 0.0, quiet_vpp
             self.cut()
 
     def _sound(self, play: Play | None) -> None:
@@ -257,15 +262,6 @@ class GeneratorDrive:
         # Set this before the command: if the command fails half-way, the output must be regarded as on.
         self._is_on = True
         self._generator.start()
-
-    def _lower(self) -> None:
-        """Set the amplitude for level 0 while the output is off."""
-        quiet_vpp = self._quiet_vpp()
-        try:
-            self._generator.set_amplitude(quiet_vpp)
-        except AcquisitionError:  # the generator's settings are unknown after a failed change
-            self._generator.load_sine(CHECK_FREQUENCY_HZ, quiet_vpp)
-        self._level, self._setting_vpp = 0.0, quiet_vpp
 
     def _set_level(self, level: float) -> None:
         self._level = level

@@ -237,7 +237,12 @@ class LimitMonitor:
 
     def _in_the_specimen(self, moved: Samples, base: BaseMotion, block: Block) -> _MonitoredQuantity:
         limit = self._rig.specimen.amplitude_limit_m
-        stretched = self._specimen.follow(moved, base, _blind(block, self._response))
+        is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
+        for overload in block.overloads:
+            if overload.channel == self._response.value:
+                first = max(overload.first_sample - block.first_sample, 0)
+                is_blind[first : max(overload.last_sample - block.first_sample + 1, 0)] = True
+        stretched = self._specimen.follow(moved, base, is_blind)
         allowed = limit.value * self._limits.specimen_amplitude
         return _MonitoredQuantity(
             self._response, "the specimen's amplitude", stretched, allowed, "m", limit.source
@@ -277,13 +282,3 @@ class LimitMonitor:
             "ramped down and its recording kept; widen the range or lower amplitude_vpp",
             trip,
         )
-
-
-def _blind(block: Block, role: Role) -> NDArray[np.bool_]:
-    """Return, for each sample of a block, whether the sensor exceeds its range."""
-    is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
-    for overload in block.overloads:
-        if overload.channel == role.value:
-            first = max(overload.first_sample - block.first_sample, 0)
-            is_blind[first : max(overload.last_sample - block.first_sample + 1, 0)] = True
-    return is_blind

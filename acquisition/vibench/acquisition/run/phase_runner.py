@@ -207,7 +207,11 @@ class PhaseRunner:
         if pace is _Pace.OF_THE_PLAN:
             commanded = self._with_lost_cycles(phase, self._require_pace(phase))
         else:
-            self._note_lost_cycles()
+            more, self._lost_cycles = self.glide.more_cycles, 0.0
+            self.glide.begin()
+            if abs(more) > TOLD_CYCLES:
+                text = f"at its end, the recorded drive was {more:+.2g} cycles off the planned phase"
+                self.loop.log(EventKind.LATE, text)
             yield from self._read(0.0)
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
@@ -268,14 +272,6 @@ class PhaseRunner:
         self._lost_cycles -= more_hz * left_s
         self._planned_hz, self._glided_hz = planned_hz, planned_hz + more_hz
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
-
-    def _note_lost_cycles(self) -> None:
-        """Log a deviation of the recorded drive from its plan at the end of a sweep."""
-        more, self._lost_cycles = self.glide.more_cycles, 0.0
-        self.glide.begin()
-        if abs(more) > TOLD_CYCLES:
-            text = f"at its end, the recorded drive was {more:+.2g} cycles off the planned phase"
-            self.loop.log(EventKind.LATE, text)
 
     def _require_pace(self, phase: Phase) -> float:
         """Return the delay of this command [s], and send later commands earlier accordingly.

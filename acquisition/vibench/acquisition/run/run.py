@@ -100,11 +100,13 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
     rig = bench.rig
     steps = bench.digitizer.volts_per_count
     sample_rate_hz = bench.digitizer.sample_rate_hz
+    origins = {identity.origin for identity in bench.identities.values()}
+    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in origins
     return RecordingHeader(
         channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
         sample_rate_hz=sample_rate_hz,
         expected_samples=round(planned_s * sample_rate_hz),
-        origin=_origin(bench),
+        origin=Origin.SIMULATED if simulated else Origin.REAL,
         plan_json=measurement.model_dump_json(),
         bench_json=rig.model_dump_json(),
         requested_sample_rate_hz=rig.daq.sample_rate_hz,
@@ -112,13 +114,6 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
         confirmations=_confirmations(bench.confirmations),
         bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
     )
-
-
-def _origin(bench: Bench) -> Origin:
-    """Return the origin of the samples, which is "simulated" if the rig or any instrument is simulated."""
-    origins = {identity.origin for identity in bench.identities.values()}
-    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in origins
-    return Origin.SIMULATED if simulated else Origin.REAL
 
 
 def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:

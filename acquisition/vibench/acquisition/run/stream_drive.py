@@ -92,17 +92,14 @@ class OutputSynthesizer:
         while self._sample >= self._stretch.end:
             phase = next(self._coming, None)
             if phase is not None:
-                self._begin(phase)
+                self._due_s += phase.duration_s
+                end = round(self._due_s * self._rate_hz)
+                self._stretch = _Stretch(phase.play, self._sample, end, self.level, phase.end_level)
             elif self.level > 0.0:
                 self._fade(RELEASE_S)
             else:
                 self._stretch = _Stretch(None, self._sample, self._sample + wanted, 0.0, 0.0)
                 self._due_s = self._stretch.end / self._rate_hz
-
-    def _begin(self, phase: Phase) -> None:
-        self._due_s += phase.duration_s
-        end = round(self._due_s * self._rate_hz)
-        self._stretch = _Stretch(phase.play, self._sample, end, self.level, phase.end_level)
 
     def _fade(self, duration_s: float) -> None:
         end = self._sample + max(1, round(duration_s * self._rate_hz))
