@@ -91,7 +91,17 @@ NO_WINDOW = 1
 
 def main(arguments: list[str] | None = None) -> int:
     """Open the window, wait until the user closes it, and return the exit code."""
-    options = _options(arguments)
+    parser = argparse.ArgumentParser(prog="vibench gui", description="The window of vibench.")
+    parser.add_argument(
+        "--bench", type=Path, metavar="BENCH.toml", help="hardware configuration to begin with"
+    )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.ini", help="settings file; by default the user's own"
+    )
+    parser.add_argument(
+        "--screenshots", type=Path, metavar="DIR", help="save a picture of every page in DIR, and exit"
+    )
+    options = parser.parse_args(arguments)
     # Make pyqtgraph use PySide6 too. One thread for linear algebra suffices, because matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -128,20 +138,6 @@ def _sign_of_life() -> "QLabel":
     label.show()
     application.processEvents()
     return label
-
-
-def _options(arguments: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="vibench gui", description="The window of vibench.")
-    parser.add_argument(
-        "--bench", type=Path, metavar="BENCH.toml", help="hardware configuration to begin with"
-    )
-    parser.add_argument(
-        "--settings", type=Path, metavar="FILE.ini", help="settings file; by default the user's own"
-    )
-    parser.add_argument(
-        "--screenshots", type=Path, metavar="DIR", help="save a picture of every page in DIR, and exit"
-    )
-    return parser.parse_args(arguments)
 
 
 if __name__ == "__main__":

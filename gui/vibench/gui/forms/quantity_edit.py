@@ -75,7 +75,9 @@ def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> 
     if given == "g" and unit in CHOICES and "g" in CHOICES[unit]:
         return float(number) * STANDARD_GRAVITY
     if unit and given.endswith(unit) and given.removesuffix(unit) in POWERS:
-        return _scale(number, given.removesuffix(unit))
+        # Text arithmetic makes 45 µm exactly 45e-6.
+        mantissa, _, exponent = number.lower().partition("e")
+        return float(f"{mantissa}e{int(exponent or 0) + POWERS[given.removesuffix(unit)]}")
     raise ConfigurationError(
         f"{_short(given)} is not a unit of this field; give {shown or 'a plain number'}"
         + (f", for example {example}" if example else "")
@@ -84,12 +86,6 @@ def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> 
 
 def _short(text: str) -> str:
     return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
-
-
-def _scale(number: str, prefix: str) -> float:
-    """Multiply a number's text by a power of ten; text arithmetic makes 45 µm exactly 45e-6."""
-    mantissa, _, exponent = number.lower().partition("e")
-    return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
 
 
 _LONGEST_SHOWN = 40

@@ -24,16 +24,13 @@ def make_readable(table: QTableView, name: str) -> None:
     header = table.horizontalHeader()
     header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    chosen = _copy_action(table, "Copy", lambda: chosen_text(table))
+    chosen = _copy_action(
+        table, "Copy", lambda: _lines(table.selectionModel().selectedIndexes()) or whole_text(table.model())
+    )
     chosen.setShortcut(QKeySequence.StandardKey.Copy)
     chosen.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
     _copy_action(table, "Copy the whole table", lambda: whole_text(table.model()))
     table.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-
-
-def chosen_text(table: QTableView) -> str:
-    """Return the selected cells, one line per row; without a selection, the whole table."""
-    return _lines(table.selectionModel().selectedIndexes()) or whole_text(table.model())
 
 
 def whole_text(model: QAbstractItemModel) -> str:

@@ -30,16 +30,12 @@ def application(arguments: list[str]) -> QApplication:
     assert isinstance(existing, QApplication)
     existing.setApplicationName("vibench")
     existing.setStyle(QStyleFactory.create("Fusion"))
-    existing.setFont(_font())
-    return existing
-
-
-def _font() -> QFont:
-    """Return DejaVu Sans, which has all required characters and is installed with matplotlib."""
+    # DejaVu Sans has all required characters and is installed with matplotlib.
     folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
     for name in FONT_FILES:
         QFontDatabase.addApplicationFont(str(folder / name))
-    return QFont("DejaVu Sans", FONT_POINTS)
+    existing.setFont(QFont("DejaVu Sans", FONT_POINTS))
+    return existing
 
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:

@@ -152,7 +152,12 @@ class Window(QMainWindow):
         for name, page in self.pages.items():
             page.setAccessibleName(f"{name} page")
             self._stack.addWidget(page)
-        self._lay_out()
+        body = row(self.navigation, (self._stack, 1))
+        body.setSpacing(0)
+        middle = QWidget()
+        layout = fill_box(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
+        layout.setSpacing(0)
+        self.setCentralWidget(middle)
         self.user_actions = UserActions(context, self)
         self.setAcceptDrops(True)
         build_menus(self)
@@ -250,14 +255,6 @@ class Window(QMainWindow):
         if box.clickedButton() is stop:
             return Urgency.END
         return Urgency.LEAVE if leave is not None and box.clickedButton() is leave else None
-
-    def _lay_out(self) -> None:
-        body = row(self.navigation, (self._stack, 1))
-        body.setSpacing(0)
-        middle = QWidget()
-        layout = fill_box(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
-        layout.setSpacing(0)
-        self.setCentralWidget(middle)
 
     def _connect(self) -> None:
         self.navigation.chosen.connect(self.show_page)

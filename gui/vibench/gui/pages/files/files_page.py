@@ -67,7 +67,14 @@ class FilesPage(Page):
         self._wanted: Path | None = None
         self._folder = context.folder
         self._looked_s = 0.0
-        self._build()
+        parts = PageParts(self.context, FILES, Qt.Orientation.Vertical)
+        parts.setAccessibleName("List and recording")
+        browser = ScrollArea("List of recordings", self._browser())
+        parts.show_parts(browser, ScrollArea("Open recording", self._viewer()), (200, 600))
+        fill_box(QVBoxLayout(self), parts)
+        QWidget.setTabOrder(self._note, self.table)  # from the table, Tab leads to the histories
+        self.time_histories.range_changed.connect(self._say_view)
+        self.time_histories.markers.moved.connect(self._say_view)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
         context.recording_requested.connect(self.open_path)
         context.recording_made.connect(lambda _path: self.list_folder())
@@ -270,16 +277,6 @@ class FilesPage(Page):
         if paths:
             self.context.comparison_requested.emit(paths)
             self.context.page_requested.emit(COMPARE)
-
-    def _build(self) -> None:
-        parts = PageParts(self.context, FILES, Qt.Orientation.Vertical)
-        parts.setAccessibleName("List and recording")
-        browser = ScrollArea("List of recordings", self._browser())
-        parts.show_parts(browser, ScrollArea("Open recording", self._viewer()), (200, 600))
-        fill_box(QVBoxLayout(self), parts)
-        QWidget.setTabOrder(self._note, self.table)  # from the table, Tab leads to the histories
-        self.time_histories.range_changed.connect(self._say_view)
-        self.time_histories.markers.moved.connect(self._say_view)
 
     def _browser(self) -> QWidget:
         self._folder_line = LineField(str(self._folder))

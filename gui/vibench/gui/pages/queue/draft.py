@@ -52,7 +52,13 @@ def with_sweep(
     }
     alone = validate({"name": USUAL_NAME, "sweeps": [sweep]}, Campaign, "the sweep")
     if rig is not None:
-        _require_playable(alone, rig)
+        needed_v = max(each.excitation.highest_amplitude_vpp for _, each in alone.recordings())
+        allowed = rig.generator.amplitude_limit_vpp
+        if needed_v > allowed:
+            raise ConfigurationError(
+                f"The sweep needs up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on "
+                "this bench (amplitude_limit_vpp of the hardware configuration). Lower the sweep's levels."
+            )
     if campaign is None:
         return alone
     return _update(campaign, sweeps=[*_dump_all(campaign.sweeps), sweep])
@@ -79,16 +85,6 @@ def move_up(campaign: Campaign, number: int) -> Campaign:
         return campaign
     kind[place - 1], kind[place] = kind[place], kind[place - 1]
     return _update(campaign, measurements=measurements, sweeps=sweeps)
-
-
-def _require_playable(campaign: Campaign, rig: Rig) -> None:
-    needed_v = max(each.excitation.highest_amplitude_vpp for _, each in campaign.recordings())
-    allowed = rig.generator.amplitude_limit_vpp
-    if needed_v > allowed:
-        raise ConfigurationError(
-            f"The sweep needs up to {needed_v:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on this "
-            "bench (amplitude_limit_vpp of the hardware configuration). Lower the levels of the sweep."
-        )
 
 
 def _update(campaign: Campaign, **parts: object) -> Campaign:

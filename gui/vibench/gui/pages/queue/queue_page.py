@@ -177,7 +177,13 @@ class QueuePage(Page):
             context.looks, preview_campaign, self._show_preview, context.fail, LOOK_MS, self
         )
         self._lay_out()
-        self._connect()
+        self.context.selection.campaign_changed.connect(self._show_campaign)
+        self.context.selection.rig_changed.connect(self._show_campaign)
+        self.context.folder_chosen.connect(lambda _folder: self._show_campaign())
+        self.context.recording_made.connect(lambda _path: self._show_campaign())
+        self.choice.activated.connect(self._take)
+        self.sweep.wanted.connect(self._add_sweep)
+        self.sweep.refused.connect(lambda text: self.context.warn(text, next_step="Correct the sweep."))
         self._restore()
 
     @property
@@ -346,15 +352,6 @@ class QueuePage(Page):
             else:
                 self.context.selection.choose_campaign(campaign)
         self._show_campaign()
-
-    def _connect(self) -> None:
-        self.context.selection.campaign_changed.connect(self._show_campaign)
-        self.context.selection.rig_changed.connect(self._show_campaign)
-        self.context.folder_chosen.connect(lambda _folder: self._show_campaign())
-        self.context.recording_made.connect(lambda _path: self._show_campaign())
-        self.choice.activated.connect(self._take)
-        self.sweep.wanted.connect(self._add_sweep)
-        self.sweep.refused.connect(lambda text: self.context.warn(text, next_step="Correct the sweep."))
 
     def _lay_out(self) -> None:
         self.choice.setAccessibleName("Known campaigns")

@@ -234,8 +234,18 @@ class RigPage(Page):
         )
         self.verdict = SentenceLabel()
         self.first_steps = SentenceLabel(FIRST_STEPS, rank="second")
-        self._lay_out()
-        self._connect()
+        buttons = self.open_button, self.check_button, self.find_button, self.close_button
+        side = QWidget()
+        left = fill_box(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
+        left.addSpacing(self.fontMetrics().height())
+        fill_box(left, self.first_steps, 1)
+        right = column(
+            (titled_box("Instruments", self.instruments), 1),
+            (titled_box("Check", self.verdict, self.findings), 3),
+        )
+        fill_box(QVBoxLayout(self), SideAndPicture(self.context, RIG, side, right))
+        self.choice.chosen.connect(self._show_choice)
+        self.choice.refused.connect(self.context.fail)
         otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
         remembered = Path(self.context.settings.text(SettingKey.BENCH, otherwise))
         self.choice.choose(self.context.first_bench or remembered)
@@ -349,19 +359,3 @@ class RigPage(Page):
     def _close(self) -> None:
         self.context.bridge.order(EngineClient.close_bench)
         self.instruments.show_rows([])
-
-    def _connect(self) -> None:
-        self.choice.chosen.connect(self._show_choice)
-        self.choice.refused.connect(self.context.fail)
-
-    def _lay_out(self) -> None:
-        buttons = self.open_button, self.check_button, self.find_button, self.close_button
-        side = QWidget()
-        left = fill_box(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
-        left.addSpacing(self.fontMetrics().height())
-        fill_box(left, self.first_steps, 1)
-        right = column(
-            (titled_box("Instruments", self.instruments), 1),
-            (titled_box("Check", self.verdict, self.findings), 3),
-        )
-        fill_box(QVBoxLayout(self), SideAndPicture(self.context, RIG, side, right))

@@ -355,7 +355,9 @@ class TestPage(Page):
             context.background, predict_test, self._on_result, self._on_failure, PREDICT_MS, self
         )
         self._lay_out()
-        self._connect()
+        self.choice.activated.connect(self._take)
+        self.form.changed.connect(self._on_change)
+        self.context.selection.rig_changed.connect(self._on_change)
         self._list_tests()
         self._restore()
 
@@ -498,11 +500,6 @@ class TestPage(Page):
             self.context.note_file(path)
         except ConfigurationError as error:
             self.context.fail(error)
-
-    def _connect(self) -> None:
-        self.choice.activated.connect(self._take)
-        self.form.changed.connect(self._on_change)
-        self.context.selection.rig_changed.connect(self._on_change)
 
     def _lay_out(self) -> None:
         self.choice.setAccessibleName("Known tests")
