@@ -47,7 +47,10 @@ class EngineBars:
         for row in status.rows:
             self._row(row)
         for message in status.messages:
-            self._warning(message)
+            if message.number > self._messages:
+                self._messages = message.number
+                if message.kind is MessageKind.WARNING:
+                    self._bars.console.print(sentence(message))
         if status.run is not None and status.state in DRIVING:
             self._run(status, status.run)
 
@@ -77,12 +80,6 @@ class EngineBars:
         if self._one is not None:
             self._bars.remove_task(self._one)
             self._one = None
-
-    def _warning(self, message: EngineMessage) -> None:
-        if message.number > self._messages:
-            self._messages = message.number
-            if message.kind is MessageKind.WARNING:
-                self._bars.console.print(sentence(message))
 
 
 def sentence(message: EngineMessage) -> str:

@@ -10,7 +10,7 @@ import typer
 
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis import InvalidRequest
-from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, open_source
+from vibench.analysis.exchange import ImportMapping, import_recording, open_source
 
 from .options import option
 from .output import console, print_json, print_warnings
@@ -56,17 +56,13 @@ def _print_contents(file: Path, as_json: bool) -> None:
         print_json({"file": str(file), "channels": [asdict(each) for each in channels]})
         return
     for each in channels:
-        console.print(_line(each))
+        low, high = each.rates_hz
+        rate = ""
+        if each.sample_rate_hz is not None:
+            rate = f", {each.sample_rate_hz:.9g} samples/s"
+        elif math.isfinite(high):
+            rate = f", about {(low + high) / 2:.5g} samples/s"
+        unit = f", {each.unit}" if each.unit else ""
+        label = f" ({each.label})" if each.label else ""
+        console.print(f"{each.name!r}{label}: {each.samples} samples{rate}{unit}")
     console.print("Describe the channels in a mapping (docs/exchange.md), and give its file with --mapping.")
-
-
-def _line(channel: SourceChannel) -> str:
-    low, high = channel.rates_hz
-    rate = ""
-    if channel.sample_rate_hz is not None:
-        rate = f", {channel.sample_rate_hz:.9g} samples/s"
-    elif math.isfinite(high):
-        rate = f", about {(low + high) / 2:.5g} samples/s"
-    unit = f", {channel.unit}" if channel.unit else ""
-    label = f" ({channel.label})" if channel.label else ""
-    return f"{channel.name!r}{label}: {channel.samples} samples{rate}{unit}"

@@ -74,7 +74,11 @@ class _Following:
         if status.state not in DRIVING or status.run is None or not _shows_m0(status):
             return IDLE_S
         if status.run_id != self.run_id:
-            self._begin(status)
+            self.run_id, self.plan = status.run_id, "" if status.run is None else status.run.plan
+            baseline = kept_baseline(baseline_path(self.rig, self.specimen))
+            self.live.begin_run(None if baseline is None else baseline.levels.get(self.plan))
+            self.missed, self.is_kept = 0, False
+            self.start_s, self.busy_s = time.monotonic(), time.process_time()
         rate_hz = 1.0 if status.bench is None else status.bench.sample_rate_hz
         waiting = status.samples - self.live.next_sample
         if waiting <= 0:
@@ -88,13 +92,6 @@ class _Following:
         self.missed += piece.first_sample - self.live.next_sample
         self._take(piece, status, round(PIECE_S * rate_hz))
         return 0.0
-
-    def _begin(self, status: EngineStatus) -> None:
-        self.run_id, self.plan = status.run_id, "" if status.run is None else status.run.plan
-        baseline = kept_baseline(baseline_path(self.rig, self.specimen))
-        self.live.begin_run(None if baseline is None else baseline.levels.get(self.plan))
-        self.missed, self.is_kept = 0, False
-        self.start_s, self.busy_s = time.monotonic(), time.process_time()
 
     def _take(self, piece: SampleSlice, status: EngineStatus, most: int) -> None:
         assert status.bench is not None
