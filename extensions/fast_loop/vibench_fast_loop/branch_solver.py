@@ -99,7 +99,10 @@ class BranchSolver:
             rows, columns = slice(2 * k - 1, 2 * k + 1), slice(2 * k, 2 * k + 2)
             self._slope[rows, columns] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
         self._last: MeasuredPoint | None = None
-        self._begin = self._unknowns(start)
+        rest = start.reference_v[1:] / self._volts[1:]
+        parts = np.column_stack([rest.real, rest.imag]).ravel()
+        first = np.log(start.reference_v[0].real / self._volts[0]) / _REFERENCE_STEP
+        self._begin = np.concatenate([[start.frequency_hz / self._step_hz, first], parts])
 
     def first(self) -> PredictedPoint:
         """Return the first prediction, at the fixed frequency of the branch's start."""
@@ -159,12 +162,6 @@ class BranchSolver:
         step = np.linalg.lstsq(table, wanted, rcond=1e-3)[0]
         length = float(np.hypot(*step[:2]))
         return np.asarray(point.unknowns + step * min(1.0, 1.0 / max(length, 1e-12)))
-
-    def _unknowns(self, setting: LoopSetting) -> Vector:
-        rest = setting.reference_v[1:] / self._volts[1:]
-        parts = np.column_stack([rest.real, rest.imag]).ravel()
-        first = np.log(setting.reference_v[0].real / self._volts[0]) / _REFERENCE_STEP
-        return np.concatenate([[setting.frequency_hz / self._step_hz, first], parts])
 
 
 def is_new(point: MeasuredPoint, predicted: PredictedPoint) -> bool:

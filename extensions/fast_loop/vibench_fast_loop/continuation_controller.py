@@ -248,7 +248,9 @@ def perturbed_stability(
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz
     count = plan.perturbed_periods // (2 * _EACH)
-    changes = _changes(count, number)
+    # Changes of magnitude 1 with random signs of both parts, shape (count, coefficients).
+    corners = np.random.default_rng(number).integers(0, 4, (count, len(_CHANGED)))
+    changes = np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
     first_v = _FIRST_SIZE * abs(setting.reference_v[0])
     phases = yield from _play_changes(player, setting, first_v * changes[:_TRIAL], None)
     seen = max(envelope_deviation(each, period) for each in _join(phases, channels))
@@ -258,12 +260,6 @@ def perturbed_stability(
     phases = yield from _play_changes(player, setting, size_v * course, segment)
     after = yield from player.measure(setting, abs(before.base_m[0]))
     return stability_note(_fit(phases, channels, period, count), number, plan.perturbation, before, after)
-
-
-def _changes(count: int, seed: int) -> Coefficients:
-    """Return complex changes of magnitude 1, with random signs of both parts, shape (count, coefficients)."""
-    corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
-    return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 
 
 def _play_changes(

@@ -27,7 +27,6 @@ from .protocol import (
     LOOP_PROTOCOL,
     LoopBlock,
     LoopFacts,
-    LoopFeedback,
     LoopProgram,
     LoopReport,
     LoopRequest,
@@ -146,7 +145,13 @@ class VirtualController:
         now["block"] = program.block_periods
         now["turns"] = now["weight"] = now["is_steady"] = now["sums"] = 0
         if began or before is None or program.feedback != before.feedback:
-            _fill_law(now, program.feedback)
+            now["remembered"] = now["memory"] = now["direct"] = 0
+            if program.feedback is not None:
+                size = len(program.feedback.output)
+                now["remembered"] = size
+                now["step"][:size, :size] = np.reshape(program.feedback.step, (size, size))
+                now["inlet"][:size] = np.reshape(program.feedback.inlet, (size, 2))
+                now["output"][:size], now["direct"] = program.feedback.output, program.feedback.direct
         self._program, self._state, self._reason = program, LoopState.PLAYING, ""
         now["is_on"] = 1
 
@@ -234,16 +239,6 @@ def controller_of(
     values = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
     facts = LoopFacts(name="simulated controller", serial="virtual", **values)
     return VirtualController(facts, clock, grid_rate_hz)
-
-
-def _fill_law(now: Structure, feedback: LoopFeedback | None) -> None:
-    now["remembered"] = now["memory"] = now["direct"] = 0
-    if feedback is not None:
-        size = len(feedback.output)
-        now["remembered"] = size
-        now["step"][:size, :size] = np.reshape(feedback.step, (size, size))
-        now["inlet"][:size] = np.reshape(feedback.inlet, (size, 2))
-        now["output"][:size], now["direct"] = feedback.output, feedback.direct
 
 
 def _refusal(sentence: str) -> str:

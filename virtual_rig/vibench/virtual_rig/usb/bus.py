@@ -327,7 +327,14 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         device = self._present(dev_handle)
         incoming = usb.util.ctrl_direction(bmRequestType) == usb.util.CTRL_IN
         if bmRequestType & _REQUEST_TYPE_MASK == usb.util.CTRL_TYPE_STANDARD:
-            return _fill(data, _standard_reply(device, bRequest, wValue)[: len(data)])
+            # PyUSB uses only GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); other requests stall.
+            kind, index = divmod(wValue, 256)
+            found = device.identification
+            texts = {_MAKER: found.maker, _PRODUCT: found.product, _SERIAL: found.serial}
+            bodies = {0: _ENGLISH} | {number: text.encode("utf-16-le") for number, text in texts.items()}
+            if bRequest != _GET_DESCRIPTOR or kind != usb.util.DESC_TYPE_STRING or index not in bodies:
+                raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
+            return _fill(data, (bytes([len(bodies[index]) + 2, kind]) + bodies[index])[: len(data)])
         with _usb_errors():
             reply = device.control(bRequest, wValue, len(data))  # no class request of pyvisa carries data
         return _fill(data, reply) if incoming else len(data)
@@ -338,17 +345,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
             if handle.port not in self._ports:
                 raise usb.core.USBError("No such device (it may have been disconnected)", errno=errno.ENODEV)
         return handle.port.device
-
-
-def _standard_reply(device: UsbDevice, request: int, value: int) -> bytes:
-    """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall other requests, which PyUSB does not use."""
-    kind, index = divmod(value, 256)
-    found = device.identification
-    texts = {_MAKER: found.maker, _PRODUCT: found.product, _SERIAL: found.serial}
-    bodies = {0: _ENGLISH} | {number: text.encode("utf-16-le") for number, text in texts.items()}
-    if request != _GET_DESCRIPTOR or kind != usb.util.DESC_TYPE_STRING or index not in bodies:
-        raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
-    return bytes([len(bodies[index]) + 2, kind]) + bodies[index]
 
 
 def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
