@@ -357,7 +357,15 @@ def surrogate_test(
     seed
         Seed of the surrogates.
     """
-    matched = _with_matching_ends(series)
+    # Trim the series: a jump between its ends would act like noise in the spectrum.
+    most = max(1, series.size // 10)
+    heads = series[:most]
+    tails = series[series.size - most :]
+    slopes_head = series[1 : most + 1] - heads
+    slopes_tail = np.diff(series[series.size - most - 1 :])
+    gap = np.abs(heads[:, np.newaxis] - tails) + np.abs(slopes_head[:, np.newaxis] - slopes_tail)
+    head, tail = np.unravel_index(int(np.argmin(gap)), gap.shape)
+    matched = series[int(head) : series.size - most + int(tail) + 1]
     rng = np.random.default_rng(seed)
     made = [surrogate(matched, rng) for _ in range(SURROGATES)]
     return SurrogateTest(
@@ -374,15 +382,3 @@ def normal_scores(series: Reals) -> Reals:
     """
     rank = np.argsort(np.argsort(series))
     return np.asarray(ndtri((rank + 0.5) / series.size))
-
-
-def _with_matching_ends(series: Reals) -> Reals:
-    """Trim a series so that its ends match; a jump between the ends would act like noise in the spectrum."""
-    most = max(1, series.size // 10)
-    heads = series[:most]
-    tails = series[series.size - most :]
-    slopes_head = series[1 : most + 1] - heads
-    slopes_tail = np.diff(series[series.size - most - 1 :])
-    gap = np.abs(heads[:, np.newaxis] - tails) + np.abs(slopes_head[:, np.newaxis] - slopes_tail)
-    head, tail = np.unravel_index(int(np.argmin(gap)), gap.shape)
-    return series[int(head) : series.size - most + int(tail) + 1]

@@ -17,7 +17,6 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.plan import present_word
-from vibench.acquisition.recording import Recording
 
 from ..errors import InvalidRequest, NotEnoughData
 from ._excerpt import TransferObserver, ignore_progress
@@ -193,21 +192,17 @@ def _file_entity(path: Path, folder: Path, untrusted: Mapping[str, str]) -> Enti
         return entity
     try:
         with open_recording(path) as recording:
-            entity |= _recording_facts(recording)
+            kind = present_word(recording.plan.get("excitation", {}).get("kind", "recording"))
+            measured = "; ".join(f"{each.role} [{each.unit}]" for each in recording.channels)
+            entity |= {
+                "encodingFormat": HDF5_TYPE,
+                "identifier": recording.recording_id,
+                "dateCreated": recording.started_utc,
+                "description": f"{kind}, {recording.origin.value}, {recording.duration_s:.6g} s at "
+                f"{recording.sample_rate_hz:.6g} Hz; {recording.state.value}: {recording.reason}; {measured}",
+            }
     except RecordingError as error:
         entity["description"] = f"Cannot be read as a recording: {error}"
     if why := untrusted.get(str(entity["@id"])):
         entity["description"] = f"Cannot be trusted ({why})"
     return entity
-
-
-def _recording_facts(recording: Recording) -> Entity:
-    kind = present_word(recording.plan.get("excitation", {}).get("kind", "recording"))
-    measured = "; ".join(f"{each.role} [{each.unit}]" for each in recording.channels)
-    return {
-        "encodingFormat": HDF5_TYPE,
-        "identifier": recording.recording_id,
-        "dateCreated": recording.started_utc,
-        "description": f"{kind}, {recording.origin.value}, {recording.duration_s:.6g} s at "
-        f"{recording.sample_rate_hz:.6g} Hz; {recording.state.value}: {recording.reason}; {measured}",
-    }

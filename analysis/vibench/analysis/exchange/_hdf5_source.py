@@ -83,16 +83,12 @@ def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int
     for attribute in {"_FillValue", "missing_value"} & dataset.attrs.keys():
         values[raw == dataset.attrs[attribute]] = np.nan
     if dataset.chunks:
-        _mark_unwritten(dataset, axis, start, values)
+        # HDF5 returns a fill value for samples of chunks that were never written.
+        length, corner = dataset.chunks[axis], [0] * dataset.ndim
+        for corner[axis] in range(start - start % length, start + len(values), length):
+            if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:
+                values[max(corner[axis] - start, 0) : corner[axis] + length - start] = np.nan
     return values
-
-
-def _mark_unwritten(dataset: h5py.Dataset, axis: int, start: int, values: Reals) -> None:
-    """Set samples of unwritten chunks to NaN; HDF5 returns a fill value for these samples."""
-    length, corner = dataset.chunks[axis], [0] * dataset.ndim
-    for corner[axis] in range(start - start % length, start + len(values), length):
-        if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:
-            values[max(corner[axis] - start, 0) : corner[axis] + length - start] = np.nan
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:
@@ -112,6 +108,7 @@ def _channel(
     own = (*dataset.attrs.items(), *named)
     step = exact_step(dataset.dtype) if _number(dataset, "add_offset", 0.0, place) == 0.0 else None
     scale = scale_among((*own, *beside), are_counts=step is not None)
+    origin = str(dataset.file.attrs.get("origin", ""))
     return SourceChannel(
         name=name,
         samples=samples,
@@ -119,14 +116,8 @@ def _channel(
         unit=unit_among(own, place) or unit_among(beside, place),
         stated_scale="" if "scale_factor" in dataset.attrs else scale,
         step=None if step is None else step * abs(_number(dataset, "scale_factor", 1.0, place)),
-        origin=_origin(dataset.file),
+        origin=Origin(origin) if origin in set(Origin) else None,
     )
-
-
-def _origin(file: h5py.File) -> Origin | None:
-    """Return the origin stated by a recording or by the export of a recording; None if not stated."""
-    origin = str(file.attrs.get("origin", ""))
-    return Origin(origin) if origin in set(Origin) else None
 
 
 def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:

@@ -80,7 +80,11 @@ def _look(content: memoryview, order: str, depth: int) -> None:
             case _ if kind == MATRIX:
                 _look(data, order, depth + 1)
             case _ if kind == COMPRESSED:
-                _look(memoryview(_decompress(data)), order, depth + 1)
+                unpacking = zlib.decompressobj()
+                found = unpacking.decompress(data, LARGEST_BYTES)
+                if unpacking.unconsumed_tail:
+                    raise ValueError(f"a variable of more than {LARGEST_BYTES} bytes")
+                _look(memoryview(found), order, depth + 1)
             case _:
                 _require_plain(kind)
         padding = 0 if kind == COMPRESSED else -size % TAG_BYTES
@@ -92,32 +96,11 @@ def _require_plain(kind: int) -> None:
         raise ValueError(f"an element of the unknown type {kind}")
 
 
-def _decompress(data: memoryview) -> bytes:
-    unpacking = zlib.decompressobj()
-    found = unpacking.decompress(data, LARGEST_BYTES)
-    if unpacking.unconsumed_tail:
-        raise ValueError(f"a variable of more than {LARGEST_BYTES} bytes")
-    return found
-
-
 LARGEST_BYTES = 2**31
 """Largest MATLAB 5 file: sizes of variables have 31 bits, and many readers limit files to 31 bits too."""
 VALUE_BYTES = 8
 LONGEST_NAME = 63
 """Longest name of a MATLAB variable; longer channel names are cut."""
-
-
-def require_small(excerpt: Excerpt) -> None:
-    """Raise InvalidRequest when samples and times are too large for a MATLAB 5 file."""
-    columns = len(excerpt.channels) + 1
-    size = excerpt.samples * columns * VALUE_BYTES
-    if size >= LARGEST_BYTES:
-        longest_s = LARGEST_BYTES // (columns * VALUE_BYTES) / excerpt.recording.sample_rate_hz
-        raise InvalidRequest(
-            f"{excerpt.samples} samples of {len(excerpt.channels)} channels need {size / 2**30:.1f} GiB, but "
-            f"a MATLAB 5 file has at most 2 GiB; export {longest_s:.0f} s or less, export fewer channels, or "
-            f"read {excerpt.recording.path.name} in MATLAB with ncread"
-        )
 
 
 def write_mat(
@@ -127,9 +110,22 @@ def write_mat(
 
     Raises InvalidRequest when the file would be larger than the format allows.
     """
-    require_small(excerpt)
+    columns = len(excerpt.channels) + 1
+    size = excerpt.samples * columns * VALUE_BYTES
+    if size >= LARGEST_BYTES:
+        longest_s = LARGEST_BYTES // (columns * VALUE_BYTES) / excerpt.recording.sample_rate_hz
+        raise InvalidRequest(
+            f"{excerpt.samples} samples of {len(excerpt.channels)} channels need {size / 2**30:.1f} GiB, but "
+            f"a MATLAB 5 file has at most 2 GiB; export {longest_s:.0f} s or less, export fewer channels, or "
+            f"read {excerpt.recording.path.name} in MATLAB with ncread"
+        )
     with path.open("xb") as file:
-        _save(file, {"recording": _facts(excerpt)})
+        # Numbers and texts are stored unchanged, nested values as JSON for ``jsondecode``.
+        facts = facts_document(excerpt)
+        del facts["segments"]
+        plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
+        nested = {f"{name}_json": json.dumps(value) for name, value in facts.items() if name not in plain}
+        _save(file, {"recording": {**plain, **nested, "segments": _segments(excerpt)}})
         if results:
             _save(file, {"results": results})
         _save(file, {"time_s": excerpt.recording.time_s(excerpt.start, excerpt.stop)[:, np.newaxis]})
@@ -162,15 +158,6 @@ def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
         "add_offset": channel.add_offset,
         **known,
     }
-
-
-def _facts(excerpt: Excerpt) -> dict[str, Any]:
-    """Return the facts for MATLAB: numbers and texts unchanged, nested values as JSON for ``jsondecode``."""
-    facts = facts_document(excerpt)
-    del facts["segments"]
-    plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
-    nested = {f"{name}_json": json.dumps(value) for name, value in facts.items() if name not in plain}
-    return {**plain, **nested, "segments": _segments(excerpt)}
 
 
 def _segments(excerpt: Excerpt) -> dict[str, Any]:

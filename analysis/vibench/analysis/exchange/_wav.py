@@ -27,7 +27,12 @@ LARGEST_BYTES = 2**32 - 1024
 FULL_COUNT = 2**31
 
 
-def _require_sound(excerpt: Excerpt) -> None:
+def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
+    """Write all channels in blocks; lost samples become zero, larger values are clipped to full scale.
+
+    Counts of converters of up to 32 bits stay exact. Raises InvalidRequest for a fractional sample rate, or
+    too many samples for a WAV file.
+    """
     rate = excerpt.recording.sample_rate_hz
     if rate != round(rate):
         raise InvalidRequest(
@@ -40,15 +45,6 @@ def _require_sound(excerpt: Excerpt) -> None:
             f"{excerpt.samples} samples of {len(excerpt.channels)} channels need {size / 2**30:.1f} GiB, but "
             "a WAV file has at most 4 GiB; export fewer seconds, or fewer channels"
         )
-
-
-def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write all channels in blocks; lost samples become zero, values beyond full scale are clipped.
-
-    Counts of converters of up to 32 bits stay exact. Raises InvalidRequest for a fractional sample rate, or
-    too many samples for a WAV file.
-    """
-    _require_sound(excerpt)
     full_scales = np.array([[abs(each.physical_per_volt) * each.range_v] for each in excerpt.channels])
     with path.open("xb") as raw, wave.open(raw, "wb") as file:
         file.setnchannels(len(excerpt.channels))

@@ -30,19 +30,14 @@ def bench_levels_figure(facts: RecordingFacts) -> style.DrawnFigure:
     for level in facts.channels:
         columns[f"{level.header.role}_lower"] = level.envelope.lower
         columns[f"{level.header.role}_upper"] = level.envelope.upper
+    parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
     return style.DrawnFigure(
         name=f"levels_{facts.name}",
         title="Levels of all channels",
-        caption=bench_levels_caption(facts),
+        caption=f"Extremes of every channel, including ramps and waits. Peaks: {', '.join(parts)}.",
         figure=figure,
         tables=(table(f"levels_{facts.name}", **columns),),
     )
-
-
-def bench_levels_caption(facts: RecordingFacts) -> str:
-    """Return the caption with the peak of each channel, in its unit and relative to the input range."""
-    parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
-    return f"Extremes of every channel, including ramps and waits. Peaks: {', '.join(parts)}."
 
 
 def _peak(level: ChannelLevel) -> str:

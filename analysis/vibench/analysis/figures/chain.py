@@ -38,16 +38,6 @@ def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
         _waves(waves, found)
         _draw_cells(across, found)
         style.legend_above(figure, [waves, across], columns=4)
-    return style.DrawnFigure(
-        name="chain",
-        title=f"Chain: {found.request.title}",
-        caption=_caption(found, last),
-        figure=figure,
-        tables=tuple(_numbers(found)),
-    )
-
-
-def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
     caption = (
         "Above: phase and decay per unit of the infinite chain without contact; grey: band gaps. Below: "
         "transmission from the base to m0 of each cell, without contact and as driven."
@@ -58,7 +48,13 @@ def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
             f" Map: {what} over place and time in the last run; dots: impacts. Bottom: mean energy with "
             "standard error, and number of impacts, of each cell."
         )
-    return f"{caption} {found.cost_sentence} {found.request.sentence}"
+    return style.DrawnFigure(
+        name="chain",
+        title=f"Chain: {found.request.title}",
+        caption=f"{caption} {found.cost_sentence} {found.request.sentence}",
+        figure=figure,
+        tables=tuple(_numbers(found)),
+    )
 
 
 def _shade(axes: Axes, found: ChainAnswer) -> None:

@@ -3,8 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, measured_gaps
-from ..signals.arrays import Reals
+from ..hidden_motion import Hidden, HiddenMotion, measured_gaps
 from ..tables import Table, columns, table
 from . import style
 
@@ -133,16 +132,12 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     if not is_determined or at_1um is None or exponent is None:
         axes.set_title("as described (not determined by this motion)", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
-    low, high = _band(depth, at_1um, exponent)
-    axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5)
-    return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force, low_n=low, high_n=high),)
-
-
-def _band(depth: Reals, at_1um: FoundParameter, exponent: FoundParameter) -> tuple[Reals, Reals]:
-    """Return the envelope of all force laws whose two parameters lie within their bounds."""
+    # The envelope of all force laws whose two parameters lie within their bounds.
     exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
     laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
-    return np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))
+    low, high = np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))
+    axes.fill_between(_MICRO * depth, low, high, color=style.BOUNDS, alpha=0.5)
+    return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force, low_n=low, high_n=high),)
 
 
 def _energy(axes: Axes, motion: HiddenMotion) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..sine.jumps import Hysteresis, Jump, hysteresis
+from ..sine.jumps import Jump, hysteresis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import columns, table
 from . import style
@@ -41,10 +41,16 @@ def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigu
         style.legend_above(figure, [axes])
     name = f"hysteresis_{up.facts.name}_{down.facts.name}"
     content = columns(found, "frequency_hz response_ii_up=up response_ii_down=down")
+    widths = "; ".join(
+        f"hysteresis {width:.1f} Hz wide ({low:.1f} to {high:.1f})" for width, low, high in found.widths_hz
+    )
+    share = float(np.mean(found.differs))
     return style.DrawnFigure(
         name=name,
         title=f"Sweeps up and down, {up.excitation.amplitude_vpp:g} Vpp",
-        caption=_caption(up, down, found),
+        caption=f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
+        f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
+        f"Grey: the sweeps differ by more than 1.5 dB ({100 * share:.0f} % of the band).",
         figure=figure,
         tables=(table(name, **content, differs=found.differs.astype(np.int64)),),
     )
@@ -58,16 +64,4 @@ def jumps_text(jumps: tuple[Jump, ...]) -> str:
         f"a jump of {each.decibel:+.1f} dB at {each.frequency_hz:.1f} Hz ({each.lower_hz:.1f} to "
         f"{each.upper_hz:.1f})"
         for each in jumps
-    )
-
-
-def _caption(up: SweepAnalysis, down: SweepAnalysis, found: Hysteresis) -> str:
-    widths = "; ".join(
-        f"hysteresis {width:.1f} Hz wide ({low:.1f} to {high:.1f})" for width, low, high in found.widths_hz
-    )
-    share = float(np.mean(found.differs))
-    return (
-        f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
-        f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
-        f"Grey: the sweeps differ by more than 1.5 dB ({100 * share:.0f} % of the band)."
     )

@@ -88,7 +88,12 @@ def _map(
         mesh = _draw(axes, results, results.map_values(name), norm=_scale(name, results.map_values(name)))
         figure.colorbar(mesh, ax=axes, label=SHOWN[name])
         for level in levels:
-            _draw_level(axes, level, mesh)
+            frequency_hz, amplitude_m = np.array(level.pairs).T
+            label = style.plain_label(level.name)
+            axes.plot(frequency_hz, MICRO * amplitude_m, color=style.MEASURED, linewidth=4.0, label=label)
+            for curve in level.measured:
+                place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
+                axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)
     for axes in panels:
         _place(axes, results)
     return figure
@@ -160,16 +165,6 @@ def _scale(name: str, values: Reals) -> Normalize:
         return Normalize(float(known.min(initial=0.0)), float(known.max(initial=1.0)))
     low, high = np.quantile(positive, [0.002, 0.998])
     return LogNorm(float(low), float(max(high, 1.001 * low)))
-
-
-def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
-    """Draw a recording's level as a line, with its measured responses in the colours of the map."""
-    frequency_hz, amplitude_m = np.array(level.pairs).T
-    label = style.plain_label(level.name)
-    axes.plot(frequency_hz, MICRO * amplitude_m, color=style.MEASURED, linewidth=4.0, label=label)
-    for curve in level.measured:
-        place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
-        axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)
 
 
 def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:

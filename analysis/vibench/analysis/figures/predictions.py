@@ -92,7 +92,10 @@ def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
         figure = style.new_figure(_SPECTRUM_HEIGHT_IN)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         _exponents(upper, place, found)
-        _dimension(lower, place, found)
+        middle, low, high = (found.column(n) for n in ("dimension", "dimension_low", "dimension_high"))
+        reach = np.nan_to_num(np.abs(np.stack([middle - low, high - middle])))
+        lower.errorbar(place, middle, reach, fmt=".-", color=style.MEASURED, linewidth=0.9)
+        lower.set_ylabel("dimension")
         lower.set_xlabel("drive frequency [Hz]" if is_frequency else "base amplitude A0 [µm]")
         style.legend_above(figure, [upper], columns=6)
         figure.align_ylabels()
@@ -123,13 +126,6 @@ def _exponents(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
         )
     axes.axhline(0.0, color=style.BOUNDS, linewidth=0.7)
     axes.set_ylabel("exponent [1/s]")
-
-
-def _dimension(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
-    middle, low, high = (found.column(n) for n in ("dimension", "dimension_low", "dimension_high"))
-    reach = np.nan_to_num(np.abs(np.stack([middle - low, high - middle])))
-    axes.errorbar(place, middle, reach, fmt=".-", color=style.MEASURED, linewidth=0.9)
-    axes.set_ylabel("dimension")
 
 
 def _numbers(found: ExponentSpectrum) -> Table:

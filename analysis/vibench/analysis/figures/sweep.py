@@ -188,12 +188,17 @@ def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
         _orders(orders, analysis)
         style.legend_above(figure, [orders], columns=6)
     name = f"orders_{analysis.facts.name}"
+    tracked = analysis.response.harmonics
+    columns = {"frequency_hz": analysis.response.harmonics_hz}
+    for order, value, sd in zip(tracked.orders, tracked.amplitude, tracked.sd, strict=True):
+        label = order_label(order).replace(" ", "_")
+        columns[f"{label}_m"], columns[f"sd_{label}_m"] = value, sd
     return style.DrawnFigure(
         name=name,
         title=f"Orders of a sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
         caption=_caption(analysis),
         figure=figure,
-        tables=(_table(name, analysis),),
+        tables=(table(name, **columns),),
     )
 
 
@@ -242,12 +247,3 @@ def _caption(analysis: SweepAnalysis) -> str:
         f"masses collide; there, orders also contain chaotic motion near their frequency. Strongest after "
         f"order 1: {loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB re order 1 (median)."
     )
-
-
-def _table(name: str, analysis: SweepAnalysis) -> Table:
-    tracked = analysis.response.harmonics
-    columns = {"frequency_hz": analysis.response.harmonics_hz}
-    for order, value, sd in zip(tracked.orders, tracked.amplitude, tracked.sd, strict=True):
-        label = order_label(order).replace(" ", "_")
-        columns[f"{label}_m"], columns[f"sd_{label}_m"] = value, sd
-    return table(name, **columns)

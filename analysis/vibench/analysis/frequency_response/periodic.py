@@ -533,6 +533,9 @@ class PeriodicSums:
             periods,
             frequency_hz[driven],
         )
+        strong = np.flatnonzero(driven)
+        inside = np.arange(strong[0], strong[-1] + 1)
+        quiet = inside[~driven[inside]]
         return PeriodicFrequencyResponse(
             frequency_response=self._frequency_response(frequency_hz[driven], estimate, period).without_delay(
                 delay_s
@@ -543,7 +546,12 @@ class PeriodicSums:
             scatter=estimate.scatter,
             realisations=len(self._realisations),
             repetitions=tuple(one.repetition for one in self._realisations),
-            detection=_detection(frequency_hz, driven, response, covariance[1, 1].real),
+            detection=DetectionLines(
+                order=quiet,
+                frequency_hz=frequency_hz[quiet],
+                response_amplitude=np.sqrt(np.mean(np.abs(response[:, quiet]) ** 2, axis=0)),
+                noise_amplitude=np.sqrt(covariance[1, 1].real[quiet]),
+            ),
         )
 
     def _frequency_response(
@@ -583,15 +591,3 @@ def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
             f"({frequency_hz[-1]:g} Hz): record with a higher sample rate"
         )
     return np.asarray(marked)
-
-
-def _detection(frequency_hz: Reals, driven: Flags, response: Complexes, variance: Reals) -> DetectionLines:
-    strong = np.flatnonzero(driven)
-    inside = np.arange(strong[0], strong[-1] + 1)
-    quiet = inside[~driven[inside]]
-    return DetectionLines(
-        order=quiet,
-        frequency_hz=frequency_hz[quiet],
-        response_amplitude=np.sqrt(np.mean(np.abs(response[:, quiet]) ** 2, axis=0)),
-        noise_amplitude=np.sqrt(variance[quiet]),
-    )

@@ -193,7 +193,8 @@ class FrequencyResponseRequest:
 
     def _requested_samples(self, samples: int, sample_rate_hz: float) -> float:
         if self.resolution_hz is not None:
-            lines = float(_bandwidth_lines(self.window))
+            values = taper(self.window, _PROXY_SAMPLES)
+            lines = float(values.size * (values @ values) / np.sum(values) ** 2)
             return max(2.0, float(np.ceil(lines * sample_rate_hz / self.resolution_hz)))
         if self.segment_s is not None:
             return max(2.0, float(np.rint(self.segment_s * sample_rate_hz)))
@@ -215,9 +216,3 @@ def longest_segment(samples: int, averages: float, window: Window, overlap: floa
     shared = sum((float(values[:-lag] @ values[lag:]) / energy) ** 2 for lag in lags)
     segments = int(np.ceil(averages * (1 + 2 * shared)))
     return max(2, int(samples / (1 + (segments - 1) * (1 - overlap))))
-
-
-def _bandwidth_lines(window: Window) -> float:
-    """Return the noise bandwidth of a window in spectral lines: 1.5 for Hann."""
-    values = taper(window, _PROXY_SAMPLES)
-    return float(values.size * (values @ values) / np.sum(values) ** 2)

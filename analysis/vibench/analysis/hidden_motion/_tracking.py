@@ -164,7 +164,8 @@ def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iter
         whole = run
         if ahead and not is_lost:
             beyond = run_filter(model, motion, at.copy(), ahead)
-            whole = _join_runs(run, beyond)
+            pairs = zip(run.arrays.values(), beyond.arrays.values(), strict=True)
+            whole = FilterPredictions(run.first, *(np.concatenate(pair) for pair in pairs))
         if kept:
             seen = whole.samples(0, kept) if is_lost else whole
             yield _piece(smooth(model, seen), run, kept)
@@ -182,11 +183,6 @@ def _piece(smoothed: RtsTrack, run: FilterPredictions, kept: int) -> TrackedPiec
         ),
         run.samples(0, kept),
     )
-
-
-def _join_runs(one: FilterPredictions, other: FilterPredictions) -> FilterPredictions:
-    pairs = zip(one.arrays.values(), other.arrays.values(), strict=True)
-    return FilterPredictions(one.first, *(np.concatenate(pair) for pair in pairs))
 
 
 def reliable_samples(run: FilterPredictions, sample_rate_hz: float) -> int:

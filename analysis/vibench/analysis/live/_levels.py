@@ -62,19 +62,16 @@ class LevelMeters:
         peak = np.max(np.abs(known), axis=1) / self._full_scale
         rms = np.sqrt(np.mean(known.astype(np.float64) ** 2, axis=1)) / self._full_scale
         lasted_s = values.shape[1] / self._rate_hz
-        self._hold(peak, lasted_s)
+        self._held_for_s += lasted_s
+        is_new = (peak >= self._held) | (self._held_for_s > HOLD_S)
+        self._held = np.where(is_new, peak, self._held)
+        self._held_for_s = np.where(is_new, 0.0, self._held_for_s)
         self._quiet_for_s = np.where(peak < QUIET_SHARE, self._quiet_for_s + lasted_s, 0.0)
         self._levels = tuple(
             Level(float(p), float(r), float(h), _verdict(float(h), float(q)))
             for p, r, h, q in zip(peak, rms, self._held, self._quiet_for_s, strict=True)
         )
         return self._levels
-
-    def _hold(self, peak: Reals, lasted_s: float) -> None:
-        self._held_for_s += lasted_s
-        is_new = (peak >= self._held) | (self._held_for_s > HOLD_S)
-        self._held = np.where(is_new, peak, self._held)
-        self._held_for_s = np.where(is_new, 0.0, self._held_for_s)
 
 
 def _verdict(held_share: float, quiet_for_s: float) -> LevelVerdict:

@@ -132,7 +132,10 @@ def similarity(
     if not threshold > 0.0:
         raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")
     base, other = reference.logarithm(logarithm_of), model.logarithm(logarithm_of)
-    difference = _relative(base, other)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(other - base) / np.abs(base)
+    # Equal curves are similar even if the logarithm of the reference is zero.
+    difference = np.where(other == base, 0.0, ratio)
     known = np.isfinite(base) & np.isfinite(other)
     if not known.any():
         raise NotEnoughData("no frequency has a value in both curves, so nothing can be compared")
@@ -150,13 +153,6 @@ def similarity(
         block_points=block,
         left_out=int(np.sum(~known)),
     )
-
-
-def _relative(base: Reals, other: Reals) -> Reals:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.abs(other - base) / np.abs(base)
-    # Equal curves are similar even if the logarithm of the reference is zero.
-    return np.where(other == base, 0.0, ratio)
 
 
 def _block_length(flags: Reals) -> int:

@@ -146,7 +146,12 @@ def recording_facts(
     seal = require_intact(recording)
     measurement = plan_of(recording)
     response = response or response_role(recording) or VELOCITY
-    _require_band(recording, measurement, response)
+    low_hz = measurement.excitation.band_hz[0]
+    if response.endswith(ACCELERATION) and low_hz < LOWEST_INTEGRATED_HZ:
+        raise UnusableData(
+            f"{recording.path.name}: the plan starts at {low_hz:g} Hz, but {response} can be integrated only "
+            f"from {LOWEST_INTEGRATED_HZ:g} Hz on; measure a velocity or displacement"
+        )
     _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
@@ -182,15 +187,6 @@ def recording_facts(
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
     )
-
-
-def _require_band(recording: Recording, measurement: Measurement, response: str) -> None:
-    low_hz = measurement.excitation.band_hz[0]
-    if response.endswith(ACCELERATION) and low_hz < LOWEST_INTEGRATED_HZ:
-        raise UnusableData(
-            f"{recording.path.name}: the plan starts at {low_hz:g} Hz, but {response} can be integrated only "
-            f"from {LOWEST_INTEGRATED_HZ:g} Hz on; measure a velocity or displacement"
-        )
 
 
 def _dropouts(recording: Recording, response: str) -> tuple[Dropout, ...]:

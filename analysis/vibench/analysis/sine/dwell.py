@@ -1,6 +1,5 @@
 """Results of a dwell at one frequency: Responses I and II, spectrum, lines and noise."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -375,7 +374,12 @@ def dwell_response(
     whole, base_whole, repeating = track_signals(
         (response[window], base[window], motion), phase, interval_samples=motion.size, orders=orders
     )
-    parts, base_parts = _tenths((response[window], base[window]), phase, orders)
+    # Fit in tenths of the window, or in fewer parts of a short one: their scatter includes all changes.
+    cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
+    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
+    parts, base_parts = track_signals(
+        (response[window], base[window]), phase, interval_samples=phase.size // blocks, orders=orders
+    )
     omega = 2 * np.pi * level.frequency_hz
     turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
@@ -456,16 +460,6 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
             f"drop-outs, but {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear
-
-
-def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -> tuple[TrackedOrders, ...]:
-    """Fit the orders in tenths of the window; their scatter includes all changes and chaos.
-
-    A window that is too short for ten parts is divided into fewer parts.
-    """
-    cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
-    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
-    return track_signals(signals, phase, interval_samples=phase.size // blocks, orders=orders)
 
 
 def _slow_changes(

@@ -30,7 +30,7 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import UntilNote
 from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, Role, amplifier_of, shaker_of, specimen_of
-from vibench.sim import Specimen, base_transmissibility, fault_in_words
+from vibench.sim import base_transmissibility, fault_in_words
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
 from ..errors import AnalysisError, InvalidRequest
@@ -370,7 +370,11 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: ChannelSd) -> Iterator
     time_s = recorded_s(measurement)
     low_hz, high_hz = excitation.band_hz
     rms_v = preview_measurement(measurement, rig).rms_v * rig.generator.terminal_factor()
-    if _fills_gap(specimen, rig, rms_v, low_hz, high_hz):
+    # Without contact, p is Gaussian over many cycles; check whether it would reach a stop.
+    grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
+    p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
+    rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
+    if _HIGHEST_TURN * rms_m > min(specimen.gaps_m):
         yield ExpectedResult("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
         return
     modes: list[tuple[float, tuple[float | None, ...]]] = [
@@ -442,14 +446,6 @@ def _expected_lines(
         segments_excluded=0,
         settings=settings,
     )
-
-
-def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
-    """Return whether p of the linear specimen reaches a stop, if p is Gaussian over many cycles."""
-    grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
-    p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
-    rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
-    return _HIGHEST_TURN * rms_m > min(specimen.gaps_m)
 
 
 def _of_sine(measurement: Measurement, rig: Rig, stated: ChannelSd, at_hz: float) -> Iterator[ExpectedResult]:
