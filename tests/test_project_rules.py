@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 27_762,
-    "analysis": 33_498,
-    "cli": 5_048,
-    "extensions": 2_610,
-    "gui": 11_920,
+    "acquisition": 27_088,
+    "analysis": 33_575,
+    "cli": 5_084,
+    "extensions": 3_389,
+    "gui": 11_898,
     "native": 6_837,
-    "sim": 20_580,
-    "studies": 3_129,
-    "virtual_rig": 6_713,
+    "sim": 20_551,
+    "studies": 3_125,
+    "virtual_rig": 6_535,
 }
 """Lines of Python, stubs, templates and C++, without the C++ test program; their sum only decreases."""
 
@@ -118,4 +118,4 @@ def test_a_package_stays_within_its_line_budget(folder):
     ]
     lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
     assert 0 < lines <= LINES_AT_MOST[folder]
-    assert sum(LINES_AT_MOST.values()) <= 118_097
+    assert sum(LINES_AT_MOST.values()) <= 118_082
