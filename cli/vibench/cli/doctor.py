@@ -29,12 +29,12 @@ FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
     STATE_VARIABLE: "folder for locks, bench checks and measured run times; by default the user's own",
-    LOCK_VARIABLE: "folder of locks shared by all users of a computer; by default /tmp",
+    LOCK_VARIABLE: "folder of the locks that all users of a computer share; by default /tmp",
     TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
     KEY_VARIABLE: "key file for signing the seals of recordings",
     "OPENBLAS_NUM_THREADS": "threads of linear algebra; default 1, because the matrices are small",
-    "MALLOC_MMAP_THRESHOLD_": "size of a block [bytes] above which background processes on Linux "
-    "return memory at once; default 4 MiB",
+    "MALLOC_MMAP_THRESHOLD_": "size above which background processes on Linux return memory at once "
+    "[bytes]; default 4 MiB",
     "QT_QPA_PLATFORM": "Qt's platform plug-in; 'offscreen' without a display",
     "PYQTGRAPH_QT_LIB": "Qt binding of the plots; default PySide6",
 }

@@ -150,6 +150,8 @@ class FilesPage(Page):
 
     def _open_chosen(self) -> None:
         paths = self.table.chosen_paths()
+        if paths and paths != (self._wanted,):
+            self._wanted = None  # the user has selected other recordings since
         for button in (self._compare, self._export, self._note):
             button.setEnabled(bool(paths))
         if paths and (self._opened is None or self._opened.path != paths[0]):
