@@ -361,7 +361,6 @@ def test_an_impossible_folder_name_is_refused(page, typed):
     assert page._folder_line.text() == str(page._folder)
 
 
-@pytest.mark.thorough
 def test_deleted_files_disappear_from_the_list_of_files(shared_context, record, tmp_path, wait_for, closing):
     gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
     shared_context.choose_folder(tmp_path)
