@@ -4,7 +4,7 @@
 #include "chain.hpp"
 #include "cubic.hpp"
 #include "filters.hpp"
-#include "tangent.hpp"
+#include "run.hpp"
 #include "world.hpp"
 
 #if defined(_WIN32)
@@ -123,28 +123,18 @@ bool is_usable(const State &state, double until, double tolerance) {
          state.level >= 0.0 && state.level <= LEVELS;
 }
 
-Outcome advance(State &state, const Tables &tables, double until, double tolerance, Record &record) {
-  Motion<double> motion = motion_of(state);
-  Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
-  keep(state, motion);
-  return outcome;
-}
-
-template <int M>
-Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
+// Compiled three times: without tangent vectors, for one, which is faster, and for up to six.
+Outcome advance(State &state, Tangent *tangent, const Tables &tables, double until, double tolerance,
                 Record &record) {
-  Motion<Dual<double, M>> motion = with_changes<M>(motion_of(state), tangent);
-  Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
-  keep(state, values_of(motion));
-  keep_changes(tangent, motion);
-  return outcome;
-}
-
-// Compiled twice: for one tangent vector, which is faster, and for up to six.
-Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
-                Record &record) {
-  if (tangent.changes == 1) return advance<1>(state, tangent, tables, until, tolerance, record);
-  return advance<6>(state, tangent, tables, until, tolerance, record);
+  auto with = [&](auto motion) {
+    Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+    keep(state, values_of(motion));
+    if (tangent != nullptr) keep_changes(*tangent, motion);
+    return outcome;
+  };
+  if (tangent == nullptr) return with(motion_of(state));
+  if (tangent->changes == 1) return with(with_changes<1>(motion_of(state), *tangent));
+  return with(with_changes<6>(motion_of(state), *tangent));
 }
 
 #define DESCRIBED(Name) {Name##_text, sizeof(Name)}
@@ -202,19 +192,14 @@ VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double toler
   return REACHED_END;
 }
 
-// Advances `state` to the time `until` [s], and fills `record`. Returns an `Outcome`.
-VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record) {
+// Advances `state` and its tangent vectors, if any, to the time `until` [s], and fills `record`. Returns an
+// `Outcome`.
+VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record,
+                                Tangent *tangent) {
   if (tables == nullptr || state == nullptr || record == nullptr) return REFUSED;
   if (!is_usable(*state, until, tolerance) || !is_usable(*record)) return REFUSED;
-  return advance(*state, *tables, until, tolerance, *record);
-}
-
-// Advances `state` like vibench_run, together with the tangent vectors in `tangent`.
-VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state, double until, double tolerance,
-                                             Record *record, Tangent *tangent) {
-  if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr) return REFUSED;
-  if (!is_usable(*state, until, tolerance) || !is_usable(*record) || !is_usable(*tangent)) return REFUSED;
-  return advance(*state, *tangent, *tables, until, tolerance, *record);
+  if (tangent != nullptr && !is_usable(*tangent)) return REFUSED;
+  return advance(*state, tangent, *tables, until, tolerance, *record);
 }
 
 // Advances `state` and `tangent`, and stores the growth up to reading `last`. Returns an `Outcome`.
@@ -225,7 +210,7 @@ VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, do
   if (!is_usable(*state, 0.0, tolerance) || !is_usable(*record) || !is_usable(*tangent)) return REFUSED;
   if (!is_usable(*readings) || last > readings->room) return REFUSED;
   return take_readings(*state, *record, *tangent, *readings, last, [&](double until) {
-    return advance(*state, *tangent, *tables, until, tolerance, *record);
+    return advance(*state, tangent, *tables, until, tolerance, *record);
   });
 }
 
@@ -341,6 +326,8 @@ bool is_usable(const BatchMotion &motion, const Specimen &specimen, double toler
   for (double number : motion.now->motion)
     if (!is_finite(number)) return false;
   if (motion.record != nullptr && !is_usable(*motion.record)) return false;
+  if (const Tangent *of = motion.tangent; of != nullptr)
+    if (!is_usable(*of) || of->changes != 1 || motion.growth == nullptr || motion.struck == nullptr) return false;
   return motion.periods > 0 && motion.periods <= MOST_PERIODS && is_usable(*motion.now, 0.0, tolerance);
 }
 

@@ -6,9 +6,11 @@
 //
 // Observed motions: lines need only the moments of each collision's force. New peaks are rare, and bounds
 // exclude almost all steps and collisions. The others are observed one by one, as in observe.hpp.
+//
+// Tangent vectors: the derivatives of the terms fly like the terms. Touches and collisions are computed with
+// dual numbers, so a tangent vector is the exact derivative of the batch's motion.
 #pragma once
-#include "collision_fit.hpp"
-#include "observe.hpp"
+#include "run.hpp"
 
 namespace vibench {
 
@@ -27,10 +29,12 @@ constexpr double LONGEST_PART = 0.25;     // longest collision / drive period, s
 // middle, plus a part proportional to the derivative of this acceleration. It is at most 0.7 % too large.
 constexpr double DEEPEST[3] = {1.005, 0.796, 0.16}, DEEPER_BY_CHANGE = -0.728;
 constexpr double SPARE = 2.0;             // factor on a bound of x, because a stop's force bends x a little
+constexpr double LARGEST_CHANGE = 1e60;   // square of a tangent vector above which it is rescaled
 constexpr int64_t MOST_EVENTS = 10000;    // limit of the mean number of events per drive period
 static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
 
 using Lanes = Vector<LANES>;
+using LaneDual = Dual<Lanes, 1>;
 using LanePhasor = Complex<Lanes>;
 
 struct InverseFactorials {
@@ -42,11 +46,23 @@ struct InverseFactorials {
 };
 constexpr InverseFactorials INVERSE_FACTORIALS;
 
-INLINE LanePhasor fused_product(const LanePhasor &x, const LanePhasor &y) {
-  return {fused(x.re, y.re, -(x.im * y.im)), fused(x.re, y.im, x.im * y.re)};
+// Returns a b + c if a, b or c is a dual number; the values are those of plain numbers.
+template <class A, class B, class C>
+  requires(is_dual<A> || is_dual<B> || is_dual<C>)
+INLINE LaneDual fused(const A &a, const B &b, const C &c) {
+  Lanes slope = 0.0;
+  if constexpr (is_dual<C>) slope = c.slope[0];
+  if constexpr (is_dual<B>) slope = fused(value_of(a), b.slope[0], slope);
+  if constexpr (is_dual<A>) slope = fused(a.slope[0], value_of(b), slope);
+  return {fused(value_of(a), value_of(b), value_of(c)), {slope}};
+}
+
+template <class A, class B> INLINE auto fused_product(const Complex<A> &x, const Complex<B> &y) {
+  auto re = fused(x.re, y.re, -(x.im * y.im));
+  return Complex<decltype(re)>{re, fused(x.re, y.im, x.im * y.re)};
 }
 // Returns sum + Re(x y).
-INLINE Lanes with_real_of_product(Lanes sum, const LanePhasor &x, const LanePhasor &y) {
+template <class T> INLINE T with_real_of_product(const T &sum, const Complex<T> &x, const LanePhasor &y) {
   return fused(-x.im, y.im, fused(x.re, y.re, sum));
 }
 INLINE LanePhasor select(Mask mask, const LanePhasor &a, const LanePhasor &b) {
@@ -74,6 +90,11 @@ template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes
   return {size * turned.re, size * turned.im};
 }
 
+template <int N> INLINE Complex<LaneDual> grown_by_series(const LanePhasor &rate, const LaneDual &time) {
+  LanePhasor now = grown_by_series<N>(rate, time.value);
+  return chained(now, fused_product(now, rate), time);
+}
+
 // Calls `act` with the index of each lane whose bit is set.
 template <class Act> INLINE void for_each_lane(unsigned lanes, const Act &act) {
   for (; lanes != 0; lanes &= lanes - 1) act(__builtin_ctz(lanes));
@@ -90,8 +111,9 @@ class BatchRun {
  private:
   // States that are due, once per drive period. Stored as terms until eight states are computed together.
   struct DueStates {
-    LanePhasor term[FLYING];
+    LanePhasor term[FLYING], change[FLYING];
     Lanes later;  // due time minus time of the terms, zero or negative [s]
+    double lost[LANES];
   };
 
   const Batch &batch;
@@ -119,6 +141,11 @@ class BatchRun {
   Lanes low = {}, high = {};                 // a step has no touch if p is within these limits at both ends
   Lanes low_four = {}, high_four = {};       // the same limits for four steps
   Lanes touch = {};                          // time until the next touch [s]
+  // Tangent vector of each lane in `carried`: derivatives of the terms at constant time, divided by exp(lost).
+  LanePhasor change[FLYING] = {};            // zero for the drive
+  double lost[LANES] = {}, last_change[LANES][6] = {};  // and the vector at the last computed due state
+  Lanes slip = {};                           // derivative of the touch time
+  unsigned carried = 0;                      // bits of lanes with a tangent vector
   DueStates due_states[LANES] = {};
   int waiting[LANES] = {};                   // number of due states not yet computed
   int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
@@ -150,44 +177,52 @@ class BatchRun {
     const Specimen &s = next.tables->specimen;
     Phasor phasors[PHASORS];
     start_flight(phasors, next.now->motion, next.tables->drive.start, flight);
-    auto set = [&](LanePhasor &to, const Phasor &value) { to.re.set(lane, value.re), to.im.set(lane, value.im); };
     for (int j = 0; j < FLYING; j++) {
       double size = magnitude(flight.rates[j]);
-      set(term[j], phasors[j] * flight.path[j]);
-      set(rate[j], flight.rates[j]);
-      set(one_step[j], {flight.ahead[j][REAL][0], flight.ahead[j][IMAG][0]});
-      set(four_steps[j], {flight.ahead[j][REAL][3], flight.ahead[j][IMAG][3]});
-      for (int k = 0; k < ORDERS; k++) set(series[k][j], {flight.series[j][REAL][k], flight.series[j][IMAG][k]});
+      set(term[j], lane, phasors[j] * flight.path[j]);
+      set(rate[j], lane, flight.rates[j]);
+      set(one_step[j], lane, {flight.ahead[j][REAL][0], flight.ahead[j][IMAG][0]});
+      set(four_steps[j], lane, {flight.ahead[j][REAL][3], flight.ahead[j][IMAG][3]});
+      for (int k = 0; k < ORDERS; k++) set(series[k][j], lane, {flight.series[j][REAL][k], flight.series[j][IMAG][k]});
       square[j].set(lane, flight.squares[j]), cube[j].set(lane, flight.squares[j] * size);
       for (int i = 0; i < 6; i++) shapes[lane][j][i] = quotient(flight.shapes[j][i], flight.path[j]);
-      set(across[j], shapes[lane][j][X]);
+      set(across[j], lane, shapes[lane][j][X]);
       across_square[j].set(lane, magnitude(shapes[lane][j][X]) * flight.squares[j]);
       if (j == DRIVEN) continue;
       Phasor impulse = (1.0 / s.m2) * flight.rows[j][VZ] - (1.0 / s.m1) * flight.rows[j][VY];
-      set(kick[j], next.tables->pair * (impulse * flight.path[j]));
+      set(kick[j], lane, next.tables->pair * (impulse * flight.path[j]));
     }
-    set(drive, phasors[DRIVEN] * flight.path[DRIVEN]);
+    set(drive, lane, phasors[DRIVEN] * flight.path[DRIVEN]);
     double once = 1.0 / next.tables->drive.frequency;
     period.set(lane, once), left.set(lane, once), frequency.set(lane, next.tables->drive.frequency);
     grid.set(lane, flight.grid);
     motion[lane] = &next, waiting[lane] = 0, kept[lane] = impacts[lane] = events[lane] = 0;
     bool is_observed = next.record != nullptr && next.record->watch != WATCH_NOTHING;
     observed = (observed & ~(1u << lane)) | unsigned(is_observed) << lane;
-    set(impulse, {0.0, 0.0});
+    set(impulse, lane, {0.0, 0.0});
+    carried = (carried & ~(1u << lane)) | unsigned(next.tangent != nullptr) << lane;
+    Tangent none{};
+    const Tangent &tangent = next.tangent == nullptr ? none : *next.tangent;
+    start_flight(phasors, tangent.rows[0], {0.0, 0.0}, flight);
+    for (int j = 0; j < DRIVEN; j++) set(change[j], lane, phasors[j] * flight.path[j]);
+    lost[lane] = tangent.growth[0];
     __builtin_memcpy(first[lane], next.now->motion, sizeof first[lane]);
     if (is_observed) see_end(*next.record, first[lane]);
     note_peaks(lane);
   }
 
-  Phasor term_of(int lane, int j) const { return {term[j].re[lane], term[j].im[lane]}; }
+  static Phasor one_of(const LanePhasor &of, int lane) { return {of.re[lane], of.im[lane]}; }
+  static void set(LanePhasor &of, int lane, const Phasor &to) { of.re.set(lane, to.re), of.im.set(lane, to.im); }
 
   // Stores the due state of a lane in flight. Returns whether all states of the motion are stored.
   bool keep_due(int lane) {
     DueStates &due = due_states[lane];
     int place = waiting[lane]++;
-    for (int j = 0; j < FLYING; j++) {
-      Phasor now = term_of(lane, j);
-      due.term[j].re.set(place, now.re), due.term[j].im.set(place, now.im);
+    for (int j = 0; j < FLYING; j++) set(due.term[j], place, one_of(term[j], lane));
+    if (carried >> lane & 1) {
+      for (int j = 0; j < DRIVEN; j++) set(due.change[j], place, one_of(change[j], lane));
+      due.lost[place] = lost[lane];
+      motion[lane]->struck[kept[lane]] = impacts[lane];
     }
     due.later.set(place, left[lane]);
     left.set(lane, left[lane] + period[lane]);
@@ -197,29 +232,62 @@ class BatchRun {
   }
 
   // Stores a due state during a contact.
-  bool keep_due(int lane, const double (&at)[6]) {
+  template <class T> bool keep_due(int lane, const T (&at)[6]) {
     form_states(lane);
-    __builtin_memcpy(motion[lane]->sections + 6 * kept[lane], at, sizeof at);
+    for (int i = 0; i < 6; i++) motion[lane]->sections[6 * kept[lane] + i] = value_of(at[i]);
+    if constexpr (is_dual<T>) {
+      double row[6];
+      for (int i = 0; i < 6; i++) row[i] = at[i].slope[0];
+      motion[lane]->struck[kept[lane]] = impacts[lane];
+      note_growth(lane, kept[lane], row, lost[lane]);
+    }
     left.set(lane, period[lane]);
     return ++kept[lane] == motion[lane]->periods;
   }
 
-  // Computes the stored due states of a lane from their terms.
+  // Computes the stored due states of a lane, and their derivatives, from the terms.
   void form_states(int lane) {
     const DueStates &due = due_states[lane];
-    double *to = motion[lane]->sections + 6 * (kept[lane] - waiting[lane]);
-    LanePhasor there[FLYING];
+    int64_t first = kept[lane] - waiting[lane];
+    LanePhasor grows[FLYING];
     for (int j = 0; j < FLYING; j++)
-      there[j] = fused_product(due.term[j], grown_by_series<LONG>({rate[j].re[lane], rate[j].im[lane]}, due.later));
-    for (int i = 0; i < 6; i++) {
-      Lanes sum = 0.0;
-      for (int j = 0; j < FLYING; j++) {
-        const Phasor &shape = shapes[lane][j][i];
-        sum = with_real_of_product(sum, there[j], {shape.re, shape.im});
+      grows[j] = grown_by_series<LONG>({rate[j].re[lane], rate[j].im[lane]}, due.later);
+    auto form = [&](const LanePhasor(&terms)[FLYING], auto keep) {
+      for (int i = 0; i < 6; i++) {
+        Lanes sum = 0.0;
+        for (int j = 0; j < FLYING; j++) {
+          const Phasor &shape = shapes[lane][j][i];
+          sum = with_real_of_product(sum, fused_product(terms[j], grows[j]), {shape.re, shape.im});
+        }
+        for (int n = 0; n < waiting[lane]; n++) keep(n, i, sum[n]);
       }
-      for (int n = 0; n < waiting[lane]; n++) to[6 * n + i] = sum[n];
+    };
+    double *to = motion[lane]->sections + 6 * first;
+    form(due.term, [&](int n, int i, double number) { to[6 * n + i] = number; });
+    if (carried >> lane & 1) {
+      double rows[LANES][6];
+      form(due.change, [&](int n, int i, double number) { rows[n][i] = number; });
+      for (int n = 0; n < waiting[lane]; n++) note_growth(lane, first + n, rows[n], due.lost[n]);
     }
     waiting[lane] = 0;
+  }
+
+  void note_growth(int lane, int64_t place, const double (&row)[6], double removed) {
+    __builtin_memcpy(last_change[lane], row, sizeof row);
+    motion[lane]->growth[place] = removed + 0.5 * logarithm(inner(row, row, batch.metric));
+  }
+
+  // Keeps the tangent vectors within the range of numbers.
+  void rescale(unsigned lanes) {
+    Lanes square = 0.0;
+    for (int j = 0; j < DRIVEN; j++)
+      square = fused(change[j].re, change[j].re, fused(change[j].im, change[j].im, square));
+    for_each_lane(lanes & ((Lanes(LARGEST_CHANGE) < square) | (square < 1.0 / LARGEST_CHANGE)).bits(), [&](int lane) {
+      double size = square_root(square[lane]);
+      if (!(0.0 < size && is_finite(size))) return;
+      for (int j = 0; j < DRIVEN; j++) set(change[j], lane, {change[j].re[lane] / size, change[j].im[lane] / size});
+      lost[lane] += logarithm(size);
+    });
   }
 
   // ---- Observation of one lane
@@ -245,7 +313,7 @@ class BatchRun {
   void see_flight(int lane, const LanePhasor (&now)[FLYING], double length, double to_go) {
     const LinearTables &flight = motion[lane]->tables->flight;
     Phasor phasors[PHASORS];
-    for (int j = 0; j < FLYING; j++) phasors[j] = quotient({now[j].re[lane], now[j].im[lane]}, flight.path[j]);
+    for (int j = 0; j < FLYING; j++) phasors[j] = quotient(one_of(now[j], lane), flight.path[j]);
     if (kept[lane] + 1 == motion[lane]->periods) length = smaller(length, to_go);
     if (length > 0.0) observer_of(lane).see_flight(phasors, {-to_go, 0.0, 0.0}, length);
     note_peaks(lane);
@@ -254,7 +322,7 @@ class BatchRun {
   // Observes the peaks of the collision that begins now, without changing the motion.
   void see_collision(int lane) {
     const Tables &own = *motion[lane]->tables;
-    ContactStart start = contact_start(lane);
+    auto start = contact_start<double>(lane);
     Observer observer = observer_of(lane);
     Collision<double> c;
     if (start.collide(c, period[lane], batch.tolerance, own)) {
@@ -273,7 +341,7 @@ class BatchRun {
   void add_lines(int lane, const Motion<double> &last) {
     Observer observer = observer_of(lane);
     const Phasor &start = motion[lane]->tables->drive.start;
-    observer.impulse = Phasor{impulse.re[lane], impulse.im[lane]} * conjugate(start);
+    observer.impulse = one_of(impulse, lane) * conjugate(start);
     Observer::End from{{}, {}, start}, to{{}, {double(motion[lane]->periods) * period[lane], 0.0, 0.0}, start};
     __builtin_memcpy(from.motion, first[lane], sizeof from.motion);
     __builtin_memcpy(to.motion, last.at, sizeof to.motion);
@@ -290,29 +358,42 @@ class BatchRun {
     last.contact = contact;
     vibench::keep(*of.now, last);
     if (observed >> lane & 1) see_end(*of.record, last.at), add_lines(lane, last);
+    if (of.tangent != nullptr) {
+      __builtin_memcpy(of.tangent->rows[0], last_change[lane], sizeof last_change[lane]);
+      of.tangent->growth[0] = lost[lane];
+    }
     of.outcome = REACHED_END, of.impacts = impacts[lane];
   }
   void lose(int lane) { motion[lane]->outcome = STALLED, motion[lane]->impacts = impacts[lane]; }
 
   // A contact that begins at a touch.
-  struct ContactStart {
-    double at[6];
-    Contact<double> contact;
-    Phasor drive;
+  template <class T> struct ContactStart {
+    T at[6], slip;  // `slip` contains the derivative of the time
+    Contact<T> contact;
+    Complex<T> drive;
 
     // Advances the motion by the whole collision. Returns false if that is impossible in the time `longest`.
-    bool collide(Collision<double> &c, double longest, double tolerance, const Tables &own) {
+    bool collide(Collision<T> &c, double longest, double tolerance, const Tables &own) {
       return vibench::collide(c, at, contact.side, contact.pace, drive, longest, tolerance, own);
     }
   };
-  ContactStart contact_start(int lane) const {
+  template <class T> ContactStart<T> contact_start(int lane) const {
     const Tables &own = *motion[lane]->tables;
-    ContactStart start{};
-    place_lane(start.at, lane);
-    double side = touched_side(start.at[Y] - start.at[Z], start.at[VY] - start.at[VZ], own.specimen);
+    ContactStart<T> start{};
+    double at[6], later = slip[lane];
+    place_lane(at, lane);
+    for (int i = 0; i < 6; i++) start.at[i] = constant<T>(at[i]);
+    if constexpr (is_dual<T>) {
+      start.slip.slope[0] = later;
+      for (int j = 0; j < FLYING; j++) {
+        Phasor moved = later * (one_of(rate[j], lane) * one_of(term[j], lane)) + one_of(change[j], lane);
+        for (int i = 0; i < 6; i++) start.at[i].slope[0] += real_of_product(moved, shapes[lane][j][i]);
+      }
+    }
+    double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
     begin_contact(start.contact, start.at, side, batch.tolerance, own);
-    start.contact.w = 0.0;  // removes the rounding error: the penetration at a touch is zero
-    start.drive = drive_phasor(due_clock(lane), 0.0, own);
+    start.contact.w = constant<T>(0.0);  // removes the rounding error: the penetration at a touch is zero
+    start.drive = drive_phasor(Clock<T>{-left[lane], 0.0, start.slip}, constant<T>(0.0), own);
     return start;
   }
   // The next state is due at clock time zero, a whole number of drive periods after the start.
@@ -321,43 +402,58 @@ class BatchRun {
   enum class SlowContact { LEFT, ENDED, LOST };
 
   // Integrates a contact of one lane as a whole or in steps, and stores the states that become due meanwhile.
-  SlowContact contact_alone(int lane) {
+  template <class T> SlowContact contact_alone(int lane) {
     const Tables &own = *motion[lane]->tables;
-    ContactStart start = contact_start(lane);
-    double(&at)[6] = start.at;
-    Contact<double> &contact = start.contact;
+    auto start = contact_start<T>(lane);
+    T(&at)[6] = start.at, &slip = start.slip;
+    Contact<T> &contact = start.contact;
     HertzForce force{own.specimen.contact_stiffness};
     bool is_observed = observed >> lane & 1;
     Record unused{};
     Observer observer{is_observed ? *motion[lane]->record : unused, own, {}};
-    auto seen = [&](const auto &steps, double h) {
-      if (is_observed) observer.see_step(steps, h, contact);
+    auto seen = [&](const auto &steps, const T &h) {
+      if (is_observed) observer.see_step(steps, value_of(h), contact);
     };
-    if (Collision<double> c; start.collide(c, left[lane], batch.tolerance, own)) {
-      if (is_observed) observer.see_collision(c, contact.side, start.drive);
+    if (Collision<T> c; start.collide(c, left[lane], batch.tolerance, own)) {
+      if (is_observed)
+        observer.see_collision(values_of(c), contact.side, {value_of(start.drive.re), value_of(start.drive.im)});
       add_impulse(lane, observer);
-      left.set(lane, left[lane] - c.duration);
+      left.set(lane, left[lane] - value_of(c.duration));
+      slip = slip + slopes_only(c.duration);
       contact.side = 0.0;
     }
     while (contact.side != 0.0) {
-      double longest = STRETCH_TURN / own.omega, passed = 0.0;
+      double longest = STRETCH_TURN / own.omega;
       bool is_due = left[lane] <= longest;
       if (is_due) longest = left[lane];
       BaseForce base(due_clock(lane), 0.5 * longest, own);
-      ContactEnd end = advance_contact(contact, at, passed, longest, base, force, batch.tolerance, own, seen);
+      T limit = constant<T>(longest), passed = slip;
+      ContactEnd end = advance_contact(contact, at, passed, limit, base, force, batch.tolerance, own, seen);
       if (end != ContactEnd::LEFT && end != ContactEnd::HELD) return SlowContact::LOST;
-      left.set(lane, left[lane] - passed);
+      left.set(lane, left[lane] - value_of(passed));
+      slip = slopes_only(passed);
       add_impulse(lane, observer);
       if (is_due && end == ContactEnd::HELD && keep_due(lane, at)) {
-        this->end(lane, contact);
+        Motion<T> last{};
+        last.contact = contact;
+        this->end(lane, values_of(last).contact);
         return SlowContact::ENDED;
       }
     }
-    Phasor phasors[PHASORS], now = drive_phasor(due_clock(lane), 0.0, own);
-    start_flight(phasors, at, now, own.flight);
+    Complex<T> phasors[PHASORS];
+    Phasor values[PHASORS];
+    Clock<T> clock{-left[lane], 0.0, slip};
+    start_flight(phasors, at, drive_phasor(clock, constant<T>(0.0), own), own.flight);
+    copy_values(values, phasors, own.flight);
     for (int j = 0; j < FLYING; j++) {
-      Phasor of_p = phasors[j] * own.flight.path[j];
-      term[j].re.set(lane, of_p.re), term[j].im.set(lane, of_p.im);
+      Phasor of_p = values[j] * own.flight.path[j];
+      set(term[j], lane, of_p);
+      if constexpr (is_dual<T>) {
+        if (j == DRIVEN) continue;
+        Phasor moved = Phasor{phasors[j].re.slope[0], phasors[j].im.slope[0]} * own.flight.path[j];
+        moved = moved - slip.slope[0] * (one_of(rate[j], lane) * of_p);
+        set(change[j], lane, moved);
+      }
     }
     note_peaks(lane);
     return SlowContact::LEFT;
@@ -365,15 +461,14 @@ class BatchRun {
 
   // Moves the impulse of a contact computed in steps, which has the drive's phase, to the lane's impulse.
   void add_impulse(int lane, Observer &observer) {
-    Phasor sum = observer.impulse * motion[lane]->tables->drive.start;
-    impulse.re.set(lane, impulse.re[lane] + sum.re), impulse.im.set(lane, impulse.im[lane] + sum.im);
+    set(impulse, lane, one_of(impulse, lane) + observer.impulse * motion[lane]->tables->drive.start);
     observer.impulse = {0.0, 0.0};
   }
 
   void place_lane(double *at, int lane) const {
     for (int i = 0; i < 6; i++) {
       at[i] = 0.0;
-      for (int j = 0; j < FLYING; j++) at[i] += real_of_product(term_of(lane, j), shapes[lane][j][i]);
+      for (int j = 0; j < FLYING; j++) at[i] += real_of_product(one_of(term[j], lane), shapes[lane][j][i]);
     }
   }
 
@@ -419,14 +514,16 @@ class BatchRun {
   }
 
   // Advances until at most `enough` lanes are clear of the stops. Returns the lanes with a due state.
-  template <bool IS_OBSERVED> unsigned march(int enough) {
+  template <bool IS_OBSERVED, bool IS_CARRIED> unsigned march(int enough) {
     Mask going = Mask::of(moving), one_by_one = Mask::of(careful);
-    LanePhasor now[FLYING], next[FLYING];
+    LanePhasor now[FLYING], next[FLYING], factor[FLYING], moved[DRIVEN];
     for (int j = 0; j < FLYING; j++) now[j] = term[j];
+    for (int j = 0; j < DRIVEN; j++) moved[j] = change[j];
     Lanes to_go = left, p = sum_of_terms(now), x = x_of(now);
     for (;;) {
       Mask four = (low_four < p) & (p < high_four) & ~one_by_one, clear = going & (low < p) & (p < high);
-      for (int j = 0; j < FLYING; j++) next[j] = fused_product(now[j], select(four, four_steps[j], one_step[j]));
+      for (int j = 0; j < FLYING; j++) factor[j] = select(four, four_steps[j], one_step[j]);
+      for (int j = 0; j < FLYING; j++) next[j] = fused_product(now[j], factor[j]);
       Lanes ahead = sum_of_terms(next);
       clear = clear & (select(four, low_four, low) < ahead) & (ahead < select(four, high_four, high));
       if constexpr (IS_OBSERVED) {
@@ -443,6 +540,8 @@ class BatchRun {
         x = select(clear, x_ahead, x);
       }
       for (int j = 0; j < FLYING; j++) now[j] = select(clear, next[j], now[j]);
+      if constexpr (IS_CARRIED)
+        for (int j = 0; j < DRIVEN; j++) moved[j] = select(clear, fused_product(moved[j], factor[j]), moved[j]);
       p = select(clear, ahead, p);
       to_go = to_go - select(clear, select(four, FOUR * grid, grid), 0.0);
       one_by_one = one_by_one | (four & ~clear);
@@ -450,6 +549,7 @@ class BatchRun {
       unsigned due = (clear & ~(0.0 < to_go)).bits();
       if (due != 0 || __builtin_popcount(going.bits()) <= enough) {
         for (int j = 0; j < FLYING; j++) term[j] = now[j];
+        for (int j = 0; j < DRIVEN; j++) change[j] = moved[j];
         left = to_go, moving = going.bits(), careful = one_by_one.bits();
         return due;
       }
@@ -551,8 +651,11 @@ class BatchRun {
     Mask of = Mask::of(lanes);
     Lanes later = select(of, touch, 0.0);
     see_short_flight(lanes, later);
-    for (int j = 0; j < DRIVEN; j++)
-      term[j] = select(of, fused_product(term[j], grown_by_series<SHORT>(rate[j], later)), term[j]);
+    for (int j = 0; j < DRIVEN; j++) {
+      LanePhasor grows = grown_by_series<SHORT>(rate[j], later);
+      term[j] = select(of, fused_product(term[j], grows), term[j]);
+      change[j] = select(of, fused_product(change[j], grows), change[j]);
+    }
     pass(of, later);
   }
 
@@ -561,54 +664,80 @@ class BatchRun {
     Mask of = Mask::of(lanes);
     see_short_flight(lanes, grid);
     for (int j = 0; j < FLYING; j++) term[j] = select(of, fused_product(term[j], one_step[j]), term[j]);
+    for (int j = 0; j < DRIVEN; j++) change[j] = select(of, fused_product(change[j], one_step[j]), change[j]);
     left = left - select(of, grid, 0.0);
     return (of & ~(0.0 < left)).bits();
   }
 
   // Computes the collisions of lanes that touch a stop. Returns the lanes outside the polynomials' range.
   // Lanes in `last` end at their next due state; they are also returned if that state is due in a collision.
-  unsigned collide(unsigned lanes, unsigned last) {
-    Lanes approach = 0.0;
-    for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, term[j], rate[j]);
-    Lanes side = select(Lanes(0.0) < approach, 1.0, -1.0), speed = magnitude(approach);
+  template <class T> unsigned collide(unsigned lanes, unsigned last) {
+    Complex<T> at_touch[FLYING];
+    T approach{};
+    fill_terms(at_touch);
+    for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, at_touch[j], rate[j]);
+    Lanes side = select(Lanes(0.0) < value_of(approach), 1.0, -1.0), speed = magnitude(value_of(approach));
     Lanes fourth = square_root(square_root(speed)), root = fit.guess[0];
     for (int n = 1; n < 4; n++) root = fused(root, fourth, fit.guess[n]);
     for (int n = 0; n < ROOT_CORRECTIONS; n++) {  // Newton's method for speed^(-1/5)
       Lanes twice = root * root;
       root = root * fused(-0.2 * (speed * twice), twice * root, 1.2);
     }
-    Lanes unit = fit.unit * root, variables[VARIABLES], values[POLYNOMIALS];
-    fill_variables(variables, side / speed, unit);
-    Lanes by_press = fused(fused(variables[0], DEEPEST[2], DEEPEST[1]), variables[0], DEEPEST[0]);
-    Lanes deepest = speed * unit * fused(variables[1], DEEPER_BY_CHANGE, by_press);
+    Lanes scale = side / speed;
+    T unit = chained(fit.unit * root, -0.2 * fit.unit * root * scale, approach);
+    T variables[VARIABLES], values[POLYNOMIALS];
+    fill_variables(variables, at_touch, chained(scale, -scale * scale, approach), unit);
+    Lanes press = value_of(variables[0]), by_press = fused(fused(press, DEEPEST[2], DEEPEST[1]), press, DEEPEST[0]);
+    Lanes deepest = speed * value_of(unit) * fused(value_of(variables[1]), DEEPER_BY_CHANGE, by_press);
     Mask inside = Mask::of(lanes) & (Lanes(0.0) < speed);
     for (int k = 0; k < VARIABLES; k++) {
       variables[k] = (variables[k] - fit.middle[k]) * (1.0 / fit.half[k]);
-      inside = inside & (magnitude(variables[k]) < 1.0);
+      inside = inside & (magnitude(value_of(variables[k])) < 1.0);
     }
     evaluate(values, variables, fit.coefficients);
-    Lanes length = unit * values[0];
+    T duration = unit * values[0];
+    Lanes length = value_of(duration);
     inside = inside & (length * frequency < LONGEST_PART) & ~(Mask::of(last) & (left < length));
     if (observed != 0) see_collisions(inside, side, deepest, length);
-    kick_modes(inside, 0.5 * length, unit, side * speed, values);
+    kick_modes(inside, at_touch, duration, unit, approach, values);
     LanePhasor end = pass(inside, length);
-    if (observed != 0) add_impulses(inside, 0.5 * length, unit, tables.pair * side * speed, end, values);
+    if (observed != 0) {
+      Lanes plain[POLYNOMIALS];
+      for (int n = 0; n < POLYNOMIALS; n++) plain[n] = value_of(values[n]);
+      add_impulses(inside, 0.5 * length, value_of(unit), tables.pair * side * speed, end, plain);
+    }
     return lanes & ~inside.bits();
+  }
+
+  // Copies the terms at a touch. Their derivatives contain the derivative of the touch time, `slip`.
+  void fill_terms(LanePhasor (&terms)[FLYING]) { __builtin_memcpy(terms, term, sizeof terms); }
+  void fill_terms(Complex<LaneDual> (&terms)[FLYING]) {
+    Lanes closing = 0.0, speed = 0.0;
+    for (int j = 0; j < FLYING; j++) speed = with_real_of_product(speed, term[j], rate[j]);
+    for (int j = 0; j < DRIVEN; j++) closing = closing + change[j].re;
+    Lanes least = select(speed < 0.0, -SLOWEST_TOUCH, SLOWEST_TOUCH);
+    slip = -closing / select(magnitude(speed) < SLOWEST_TOUCH, least, speed);
+    for (int j = 0; j < FLYING; j++) {
+      LanePhasor turns = fused_product(rate[j], term[j]);
+      LanePhasor moved = LanePhasor{turns.re * slip, turns.im * slip} + change[j];
+      terms[j] = {{term[j].re, {moved.re}}, {term[j].im, {moved.im}}};
+    }
   }
 
   // Computes the variables of the polynomials: acceleration at the collision's middle, its derivatives, and
   // u, in units of the collision. `scale` is side / speed, which normalises the rate of p to 1.
-  INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
-    for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
+  template <class T>
+  INLINE void fill_variables(T (&variables)[VARIABLES], const Complex<T> (&terms)[FLYING], T scale, T unit) const {
+    for (int k = 0; k < DERIVATIVES; k++) variables[k] = T{};
     variables[DERIVATIVES] = unit;
     for (int order = 2; order <= HIGHEST; order++) {
-      Lanes value = 0.0;
-      for (int j = 0; j < FLYING; j++) value = with_real_of_product(value, term[j], series[order][j]);
+      T value{};
+      for (int j = 0; j < FLYING; j++) value = with_real_of_product(value, terms[j], series[order][j]);
       scale = scale * unit;
       value = value * scale * (1.0 / INVERSE_FACTORIALS.of[order]);
       double away = 1.0;  // COLLISION_MIDDLE^n / n! for the derivative of an order lower by n
       for (int k = order - 2; k >= 0; k--) {
-        if (k < DERIVATIVES) variables[k] = fused(value, away, variables[k]);
+        if (k < DERIVATIVES) variables[k] = fused(value, Lanes(away), variables[k]);
         away *= COLLISION_MIDDLE / (order - 1 - k);
       }
     }
@@ -616,8 +745,9 @@ class BatchRun {
 
   // Returns the integral of F exp(rate (T / 2 - t)) dt over a collision of duration T, divided by the
   // impulse `pair` times the approach speed.
-  static INLINE LanePhasor weighted_force(const LanePhasor &rate, Lanes unit, const Lanes (&values)[POLYNOMIALS]) {
-    LanePhasor turn{rate.re * unit, rate.im * unit}, sum{(1.0 / (MOMENTS - 1)) * values[MOMENTS], 0.0};
+  template <class T>
+  static INLINE Complex<T> weighted_force(const LanePhasor &rate, const T &unit, const T (&values)[POLYNOMIALS]) {
+    Complex<T> turn{rate.re * unit, rate.im * unit}, sum{(1.0 / (MOMENTS - 1)) * values[MOMENTS], T{}};
     for (int m = MOMENTS - 2; m >= 0; m--) {
       sum = {fused(sum.re, turn.re, fused(-sum.im, turn.im, values[1 + m])),
              fused(sum.re, turn.im, sum.im * turn.re)};
@@ -627,13 +757,20 @@ class BatchRun {
   }
 
   // Advances the modes by half a collision, adds its impulse, and advances them by the other half.
-  INLINE void kick_modes(Mask of, Lanes half, Lanes unit, Lanes push, const Lanes (&values)[POLYNOMIALS]) {
+  template <class T>
+  INLINE void kick_modes(Mask of, const Complex<T> (&terms)[FLYING], const T &length, const T &unit, const T &push,
+                         const T (&values)[POLYNOMIALS]) {
     for (int j = 0; j < DRIVEN; j++) {
-      LanePhasor by = grown_by_series<SHORT>(rate[j], half), sum = weighted_force(rate[j], unit, values);
-      LanePhasor pushed = fused_product(sum, {push * kick[j].re, push * kick[j].im});
-      LanePhasor middle = fused_product(term[j], by);
-      middle = {middle.re + pushed.re, middle.im + pushed.im};
-      term[j] = select(of, fused_product(middle, by), term[j]);
+      Complex<T> by = grown_by_series<SHORT>(rate[j], 0.5 * length), sum = weighted_force(rate[j], unit, values);
+      Complex<T> pushed = fused_product(sum, Complex<T>{push * kick[j].re, push * kick[j].im});
+      Complex<T> end = fused_product(fused_product(terms[j], by) + pushed, by);
+      term[j] = select(of, {value_of(end.re), value_of(end.im)}, term[j]);
+      if constexpr (is_dual<T>) {
+        Lanes later = slip + length.slope[0];
+        LanePhasor turns = fused_product(rate[j], term[j]);
+        LanePhasor moved{end.re.slope[0] - later * turns.re, end.im.slope[0] - later * turns.im};
+        change[j] = select(of, moved, change[j]);
+      }
     }
   }
 
@@ -648,7 +785,7 @@ class BatchRun {
                     const Lanes (&values)[POLYNOMIALS]) {
     LanePhasor line = weighted_force(rate[DRIVEN], unit, values);
     line = fused_product(line, turned_by_series<SHORT>(rate[DRIVEN].im * half));
-    line = fused_product(line, {end.re, -end.im});
+    line = fused_product(line, conjugate(end));
     impulse = select(of, {fused(push, line.re, impulse.re), fused(push, line.im, impulse.im)}, impulse);
   }
 
@@ -685,7 +822,8 @@ inline void BatchRun::follow() {
     }
     int enough = alive == ALL_LANES ? WAITING : 0;
     if (__builtin_popcount(moving) > enough) {
-      over = keep_due(observed ? march<true>(enough) : march<false>(enough));
+      over = keep_due(carried != 0 ? observed != 0 ? march<true, true>(enough) : march<false, true>(enough)
+                      : observed != 0 ? march<true, false>(enough) : march<false, false>(enough));
       if (over != 0 || __builtin_popcount(moving) > enough) continue;
     }
     unsigned stopped = alive & ~moving;
@@ -708,12 +846,13 @@ inline void BatchRun::follow() {
       impacts[lane]++;
       if (kept[lane] + 1 == motion[lane]->periods) last |= 1u << lane;
     });
-    for_each_lane(collide(touched, last), [&](int lane) {
-      SlowContact ends = contact_alone(lane);
+    for_each_lane(carried != 0 ? collide<LaneDual>(touched, last) : collide<Lanes>(touched, last), [&](int lane) {
+      SlowContact ends = carried >> lane & 1 ? contact_alone<Dual<double, 1>>(lane) : contact_alone<double>(lane);
       if (ends == SlowContact::LOST) lose(lane);
       if (ends != SlowContact::LEFT) over |= 1u << lane;
     });
     touched &= ~over;
+    rescale(touched & carried);
     over |= keep_due(touched & ~(0.0 < left).bits());
     touched &= ~over;
     bound_flights(touched);

@@ -192,7 +192,8 @@ struct CellStep {
     double weight = length * length * kind.tables.inverse_pair;
     double size = larger(larger(cell.size, magnitude(cell.at[P])), largest(magnitude(free))) + NOTHING_MOVES;
     double close = size * larger(CLOSE_PLACE * tolerance, CLOSEST_PLACE), first = kind.power(cell.at[P]);
-    if (!settle(free, weight, close, first)) return INFINITE;
+    force = Vector<GAUSS>(first);
+    if (!substitute(force, places, kind.power, kind.gain, free, weight, close)) return INFINITE;
     for (int m = 0; m < WINDOW_MOMENTS; m++) moments[m] = total(Vector<GAUSS>::load(shapes.ends[m]) * force);
     course.place(after, length);
     for (int n = 0; n < 2 * NUMBERS; n++) add_shares(n, [&](double factor, int m) { after[n] += factor * moments[m]; });
@@ -234,19 +235,6 @@ struct CellStep {
     Vector<GAUSS> sum = course_at(number);
     add_shares(number, [&](double factor, int m) { sum = sum + factor * times(shapes.shares[m], force); });
     return sum;
-  }
-  bool settle(const Vector<GAUSS> &free, double weight, double close, double first) {
-    force = Vector<GAUSS>(first);
-    for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
-      places = free + times(kind.gain, force);
-      Vector<GAUSS> fresh = kind.power(places);
-      double change = weight * largest(magnitude(fresh - force));
-      bool is_number = is_finite(total(fresh));
-      force = fresh;
-      if (!is_number) return false;
-      if (change <= close) return true;
-    }
-    return false;
   }
 };
 

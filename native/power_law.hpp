@@ -168,6 +168,19 @@ inline void fill_power_tables(PowerTables &t, const Scene &scene, const LinearTa
 
 // ---- One step
 
+// Iterates F at the points. `weight` is the change of p per force [m/N], `close` a negligible distance [m].
+inline bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const PowerForce &law,
+                       const double (&gain)[GAUSS][GAUSS], const Vector<GAUSS> &free, double weight, double close) {
+  for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
+    places = free + times(gain, pushes);
+    Vector<GAUSS> fresh = law(places), off = fresh - pushes;
+    pushes = fresh;
+    if (!is_finite(total(off))) return false;
+    if (weight * largest(magnitude(off)) <= close) return true;
+  }
+  return false;
+}
+
 template <class T> struct PowerStep {
   const Body &t;
   const PowerTables &of;
@@ -209,7 +222,7 @@ template <class T> struct PowerStep {
     double weight = numbers.length * numbers.length * t.inverse_pair;
     double close = largest_unseen(begin, free.end) * larger(CLOSE_FORCE * tolerance, CLOSEST_FORCE);
     Vector<GAUSS> pushes = guessed_force(numbers.length), places;
-    if (!substitute(pushes, places, numbers, free.places, weight, close)) return INFINITE;
+    if (!substitute(pushes, places, of.force, numbers.p.gain, free.places, weight, close)) return INFINITE;
     Vector<WIDE> now = free.end + times(numbers.feed, pushes);
     push_ahead = of.force(now[P]);
     double before = total(Vector<GAUSS>::load(of.shapes->at_start) * pushes) - push;
@@ -274,21 +287,6 @@ template <class T> struct PowerStep {
     Vector<GAUSS> sum(course[COURSE_DEGREE]);
     for (int degree = COURSE_DEGREE - 1; degree >= 0; degree--) sum = sum * s + course[degree];
     return sum;
-  }
-
-  // Iterates F at the points. `weight` is the change of p per force [m/N], `close` a negligible distance [m].
-  bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const StepNumbers &numbers, const Vector<GAUSS> &free,
-                  double weight, double close) const {
-    for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
-      places = free + times(numbers.p.gain, pushes);
-      Vector<GAUSS> fresh = of.force(places), off = fresh - pushes;
-      double change = weight * larger(largest(off), largest(-off));
-      bool is_number = is_finite(total(off));
-      pushes = fresh;
-      if (!is_number) return false;
-      if (change <= close) return true;
-    }
-    return false;
   }
 
   // Returns the reference size for errors: the smallest recent magnitude of p, x and z, up to the step's end.

@@ -23,76 +23,54 @@ template <class T> constexpr bool is_dual = DualTrait<T>::is_dual;
 template <class T>
 concept Plain = !is_dual<T>;
 
+// Returns a dual number; slope(i) is its derivative in direction i.
+template <int M, class R, class Slope> INLINE Dual<R, M> dual(const R &value, const Slope &slope) {
+  Dual<R, M> number;
+  number.value = value;
+  for (int i = 0; i < M; i++) number.slope[i] = slope(i);
+  return number;
+}
+
 template <class A, class B, int M> INLINE auto operator+(const Dual<A, M> &x, const Dual<B, M> &y) {
-  Dual<decltype(x.value + y.value), M> sum;
-  sum.value = x.value + y.value;
-  for (int i = 0; i < M; i++) sum.slope[i] = x.slope[i] + y.slope[i];
-  return sum;
+  return dual<M>(x.value + y.value, [&](int i) { return x.slope[i] + y.slope[i]; });
 }
 template <class A, class B, int M> INLINE auto operator-(const Dual<A, M> &x, const Dual<B, M> &y) {
-  Dual<decltype(x.value - y.value), M> difference;
-  difference.value = x.value - y.value;
-  for (int i = 0; i < M; i++) difference.slope[i] = x.slope[i] - y.slope[i];
-  return difference;
+  return dual<M>(x.value - y.value, [&](int i) { return x.slope[i] - y.slope[i]; });
 }
 template <class A, class B, int M> INLINE auto operator*(const Dual<A, M> &x, const Dual<B, M> &y) {
-  Dual<decltype(x.value * y.value), M> product;
-  product.value = x.value * y.value;
-  for (int i = 0; i < M; i++) product.slope[i] = x.value * y.slope[i] + x.slope[i] * y.value;
-  return product;
+  return dual<M>(x.value * y.value, [&](int i) { return x.value * y.slope[i] + x.slope[i] * y.value; });
 }
 template <int M> INLINE Dual<double, M> operator/(const Dual<double, M> &x, const Dual<double, M> &y) {
-  Dual<double, M> ratio;
-  ratio.value = x.value / y.value;
-  for (int i = 0; i < M; i++) ratio.slope[i] = (x.slope[i] - ratio.value * y.slope[i]) / y.value;
-  return ratio;
+  double ratio = x.value / y.value;
+  return dual<M>(ratio, [&](int i) { return (x.slope[i] - ratio * y.slope[i]) / y.value; });
 }
 template <class A, Plain B, int M> INLINE auto operator+(const Dual<A, M> &x, const B &y) {
-  Dual<decltype(x.value + y), M> sum;
-  sum.value = x.value + y;
-  for (int i = 0; i < M; i++) sum.slope[i] = x.slope[i];
-  return sum;
+  return dual<M>(x.value + y, [&](int i) { return x.slope[i]; });
 }
 template <class A, Plain B, int M> INLINE auto operator+(const B &y, const Dual<A, M> &x) { return x + y; }
 template <class A, Plain B, int M> INLINE auto operator-(const Dual<A, M> &x, const B &y) {
-  Dual<decltype(x.value - y), M> difference;
-  difference.value = x.value - y;
-  for (int i = 0; i < M; i++) difference.slope[i] = x.slope[i];
-  return difference;
+  return dual<M>(x.value - y, [&](int i) { return x.slope[i]; });
 }
 template <class A, Plain B, int M> INLINE auto operator-(const B &y, const Dual<A, M> &x) {
-  Dual<decltype(y - x.value), M> difference;
-  difference.value = y - x.value;
-  for (int i = 0; i < M; i++) difference.slope[i] = -x.slope[i];
-  return difference;
+  return dual<M>(y - x.value, [&](int i) { return -x.slope[i]; });
 }
 template <class A, Plain B, int M> INLINE auto operator*(const Dual<A, M> &x, const B &y) {
-  Dual<decltype(x.value * y), M> product;
-  product.value = x.value * y;
-  for (int i = 0; i < M; i++) product.slope[i] = x.slope[i] * y;
-  return product;
+  return dual<M>(x.value * y, [&](int i) { return x.slope[i] * y; });
 }
 template <class A, Plain B, int M> INLINE auto operator*(const B &y, const Dual<A, M> &x) { return x * y; }
 template <int M> INLINE Dual<double, M> operator/(const Dual<double, M> &x, double y) {
-  Dual<double, M> ratio;
-  ratio.value = x.value / y;
-  for (int i = 0; i < M; i++) ratio.slope[i] = x.slope[i] / y;
-  return ratio;
+  return dual<M>(x.value / y, [&](int i) { return x.slope[i] / y; });
 }
 template <class A, int M> INLINE Dual<A, M> operator-(const Dual<A, M> &x) { return 0.0 - x; }
 
-template <int N, int M> INLINE Dual<Vector<N>, M> square_root(const Dual<Vector<N>, M> &x) {
-  Dual<Vector<N>, M> root;
-  root.value = square_root(x.value);
-  Vector<N> rate = Vector<N>(0.5 / root.value.lanes);
-  for (int i = 0; i < M; i++) root.slope[i] = x.slope[i] * rate;
-  return root;
+// Returns f(x) with its derivatives, from the values of f and of df/dx.
+template <Plain R> INLINE R chained(const R &value, const R &, const R &) { return value; }
+template <class R, int M> INLINE Dual<R, M> chained(const R &value, const R &rate, const Dual<R, M> &x) {
+  return dual<M>(value, [&](int i) { return rate * x.slope[i]; });
 }
-template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
-  Dual<double, M> root;
-  root.value = square_root(x.value);
-  for (int i = 0; i < M; i++) root.slope[i] = x.slope[i] * (0.5 / root.value);
-  return root;
+template <class R, int M> INLINE Dual<R, M> square_root(const Dual<R, M> &x) {
+  R root = square_root(x.value);
+  return chained(root, 0.5 / root, x);
 }
 
 // Returns the value without derivatives. All decisions (touch, step, end of an iteration) use only values.
@@ -126,17 +104,11 @@ template <int N, int M> struct WideTrait<Dual<double, M>, N> {
 template <class T, int N> using Wide = typename WideTrait<T, N>::type;
 
 template <int N, int M> INLINE Dual<double, M> total(const Dual<Vector<N>, M> &x) {
-  Dual<double, M> sum;
-  sum.value = total(x.value);
-  for (int i = 0; i < M; i++) sum.slope[i] = total(x.slope[i]);
-  return sum;
+  return dual<M>(total(x.value), [&](int i) { return total(x.slope[i]); });
 }
 template <int N> INLINE double at(const Vector<N> &x, int lane) { return x[lane]; }
 template <int N, int M> INLINE Dual<double, M> at(const Dual<Vector<N>, M> &x, int lane) {
-  Dual<double, M> one;
-  one.value = x.value[lane];
-  for (int i = 0; i < M; i++) one.slope[i] = x.slope[i][lane];
-  return one;
+  return dual<M>(x.value[lane], [&](int i) { return x.slope[i][lane]; });
 }
 template <int N> INLINE Vector<N> gathered(const double (&from)[N]) { return Vector<N>::load(from); }
 template <int M, int N> INLINE Dual<Vector<N>, M> gathered(const Dual<double, M> (&from)[N]) {
@@ -160,10 +132,7 @@ template <int N, int K> INLINE Vector<N> times(const double (*table)[N], const V
 }
 template <int N, int K, int M>
 INLINE Dual<Vector<N>, M> times(const double (*table)[N], const Dual<Vector<K>, M> &x) {
-  Dual<Vector<N>, M> sum;
-  sum.value = times(table, x.value);
-  for (int i = 0; i < M; i++) sum.slope[i] = times(table, x.slope[i]);
-  return sum;
+  return dual<M>(times(table, x.value), [&](int i) { return times(table, x.slope[i]); });
 }
 
 // ---- Phasors
@@ -192,6 +161,11 @@ INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im
 // Returns Re(x y).
 template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }
 
+template <class R, int M>
+INLINE Complex<Dual<R, M>> chained(const Complex<R> &value, const Complex<R> &rate, const Dual<R, M> &x) {
+  return {chained(value.re, rate.re, x), chained(value.im, rate.im, x)};
+}
+
 // exp(i angle), and exp(rate time) with derivatives by the chain rule.
 INLINE Phasor turned_by(double angle) {
   auto [cosine, sine] = cosine_sine(angle);
@@ -201,11 +175,8 @@ INLINE Phasor grown(const Phasor &rate, double time) {
   return exponential(rate.re * time) * turned_by(rate.im * time);
 }
 template <int M> INLINE Complex<Dual<double, M>> grown(const Phasor &rate, const Dual<double, M> &time) {
-  Phasor now = grown(rate, time.value), change = now * rate;
-  Complex<Dual<double, M>> all;
-  all.re.value = now.re, all.im.value = now.im;
-  for (int i = 0; i < M; i++) all.re.slope[i] = change.re * time.slope[i], all.im.slope[i] = change.im * time.slope[i];
-  return all;
+  Phasor now = grown(rate, time.value);
+  return chained(now, now * rate, time);
 }
 
 }  // namespace vibench

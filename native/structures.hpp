@@ -223,6 +223,9 @@ STRUCTURE(BatchMotion,
   int64_t impacts;             // number of contacts
   int64_t outcome;             // REACHED_END; after TOO_LONG or STALLED simulate the motion alone
   Record *record;              // peaks and lines, as selected by its `watch`; may be null
+  Tangent *tangent;            // one tangent vector, advanced with the motion; may be null
+  double *growth;              // [periods]: logarithm of its length once per drive period; null without it
+  int64_t *struck;             // [periods]: number of contacts so far; null without it
 )
 
 STRUCTURE(Batch,
@@ -230,6 +233,7 @@ STRUCTURE(Batch,
   int64_t count;
   const CollisionFit *fit;     // fit for this specimen
   double tolerance;            // relative error of a contact step outside the range of the fit
+  double metric[6][6];         // metric for the length of tangent vectors
 )
 
 // ---- Signals

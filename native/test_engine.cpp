@@ -306,14 +306,20 @@ void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
   std::vector<double> sections(COUNT * PERIODS * 6);
   std::vector<BatchMotion> motions(COUNT);
   std::vector<Record> records(COUNT);
+  std::vector<double> growth(COUNT * PERIODS);
+  std::vector<int64_t> struck(COUNT * PERIODS);
+  const Tangent begun{1, {{1e-3, 2e-3, 3e-3, 0.4, 0.5, 0.6}}, {}};
+  std::vector<Tangent> tangents(COUNT, begun);
   for (int64_t n = 0; n < COUNT; n++) {
     states[n] = {};
     states[n].motion[VX] = 1e-3 * double(n);
     records[n].watch = WATCH_PEAKS_AND_LINES;
     Record *record = n == 4 ? nullptr : &records[n];
-    motions[n] = {&tables, &states[n], &sections[n * PERIODS * 6], 1 + n % PERIODS, 0, 0, record};
+    motions[n] = {&tables, &states[n], &sections[n * PERIODS * 6], 1 + n % PERIODS, 0, 0, record,
+                  n % 3 == 0 ? nullptr : &tangents[n], &growth[n * PERIODS], &struck[n * PERIODS]};
   }
-  Batch batch{motions.data(), COUNT, &fit, TOLERANCE};
+  Batch batch{motions.data(), COUNT, &fit, TOLERANCE, {}};
+  for (int i = 0; i < 6; i++) batch.metric[i][i] = i < 3 ? 1e6 : 1.0;
   expect(vibench_follow_batch(&batch) == REACHED_END, "a batch is accepted", 0);
   int64_t impacts = 0;
   for (int64_t n = 0; n < COUNT; n++) {
@@ -333,6 +339,26 @@ void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
     for (Phasor off : {found.line_x - seen.line_x, found.line_p - seen.line_p})
       expect(magnitude(off) <= 1e-7 * magnitude(seen.line_x), "lines of a batch are those of a run", magnitude(off));
     impacts += motions[n].impacts;
+    if (motions[n].tangent == nullptr) continue;
+    State state{};
+    state.motion[VX] = 1e-3 * double(n);
+    Record unseen{};
+    unseen.steps_left = MOST_STEPS;
+    std::vector<double> times(1000);
+    unseen.impact_times = times.data(), unseen.impact_room = 1000;
+    Tangent change = begun;
+    double end = double(motions[n].periods) / tables.drive.frequency;
+    expect(vibench_run(&tables, &state, end, TOLERANCE, &unseen, &change) == REACHED_END, "a run", 0);
+    double square = inner(change.rows[0], change.rows[0], batch.metric);
+    for (int i = 0; i < 6; i++) {
+      double scaled = std::exp(tangents[n].growth[0] - change.growth[0]) * tangents[n].rows[0][i];
+      double off = (scaled - change.rows[0][i]) * square_root(batch.metric[i][i] / square);
+      expect(std::fabs(off) < 1e-6, "a tangent vector of a batch is that of a run", off);
+    }
+    double length = 0.5 * std::log(square) + change.growth[0];
+    double off = growth[n * PERIODS + motions[n].periods - 1] - length;
+    expect(std::fabs(off) < 1e-6, "growth in a batch is that of a run", off);
+    expect(struck[n * PERIODS + motions[n].periods - 1] == motions[n].impacts, "impacts are counted", double(n));
   }
   expect(impacts > COUNT, "motions of the batch strike their stops", double(impacts));
 }

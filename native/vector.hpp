@@ -1,7 +1,7 @@
 // N doubles in parallel, in as many registers as necessary. Operations follow IEEE 754 in a fixed order, with
 // fused multiply-adds only in `fused`. Results therefore do not depend on the width of the registers.
 #pragma once
-#include "numbers.hpp"
+#include "elementary.hpp"
 
 namespace vibench {
 
@@ -83,7 +83,7 @@ INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
 
 INLINE Vector<8> magnitude(Vector<8> x) { return select(x < 0.0, -x, x); }
 
-// Returns a b + c, rounded once. The x86-64 baseline lacks this instruction, so its last digits differ.
+// Returns a b + c, rounded once. The x86-64 baseline has no such instruction, so its last digits differ.
 INLINE Vector<8> fused(Vector<8> a, Vector<8> b, Vector<8> c) {
 #if !defined(__FMA__) && !defined(__aarch64__)
   return a * b + c;

@@ -16,7 +16,7 @@ for coupled specimens. docs/accuracy.md states the computing time of each level 
 >>> round(response.relative_i, 2), round(response.relative_ii, 2), response.impacts
 (2.31, 1.21, 260)
 
-`integrate` computes a motion from any state; `lyapunov_exponent` shows whether it is chaotic. Periodic
+`integrate` computes a motion from any state; `lyapunov_exponent` shows whether a motion is chaotic. Periodic
 motions are found by shooting or harmonic balance and followed along frequency or amplitude:
 
 >>> from vibench.sim import Precision, integrate, lyapunov_exponent, periodic_branch, periodic_orbit

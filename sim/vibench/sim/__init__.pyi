@@ -1,4 +1,5 @@
 from .background import Progress as Progress
+from .engine.run import Accuracy as Accuracy, AccuracyWord as AccuracyWord, Outcome as Outcome
 from .exponents.lyapunov import (
     ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,
@@ -85,7 +86,6 @@ from .scene.solve import (
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )
-from .specimen.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
 from .specimen.contact_laws import (
     CONTACT_LAWS as CONTACT_LAWS,
     ContactLaw as ContactLaw,
@@ -116,7 +116,6 @@ from .specimen.modes import (
     base_response as base_response,
     base_transmissibility as base_transmissibility,
 )
-from .specimen.outcome import Outcome as Outcome
 from .specimen.specimen import Specimen as Specimen, bound_matrices as bound_matrices, gong2025 as gong2025
 from .specimen.specimen_description import (
     USUAL_SPECIMEN as USUAL_SPECIMEN,

@@ -1,7 +1,7 @@
 """Jobs in other processes, with progress reports, partial results and cancellation.
 
-A job is a function call in a spawned process of low priority. The process ends when its parent ends, even if
-the parent is killed.
+A job is a function call in a spawned process of low priority. The process ends when the parent process ends,
+even if the parent is killed.
 """
 
 import math
@@ -46,7 +46,7 @@ class Progress:
 Observer = Callable[[Progress], None]
 """Function that receives progress reports; called in the thread that does the work."""
 Cancelled = Callable[[], bool]
-"""Function that returns True if a job should end early; the job calls it several times per second."""
+"""Function that returns True if a job should end early; called by the job several times per second."""
 
 
 def ignore_progress(progress: Progress) -> None:
@@ -71,7 +71,7 @@ def _ignore(*_: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """Function call to run in another process, with the callbacks that receive its messages."""
+    """Function call for another process, with the callbacks that receive the messages of the call."""
 
     work: Callable[..., Any]
     on_part: Callable[[Any], None]
@@ -80,7 +80,7 @@ class Job:
     longest_s: float
     is_wanted: bool = True
     is_answered: bool = False
-    """Whether the job's result or error has been delivered to its owner."""
+    """Whether the job's result or error has been delivered to the job's owner."""
     end_s: float = math.inf
     """Value of `monotonic` at which the process is killed if the job is still running [s]."""
     cancel: Callable[[], None] = _ignore
@@ -91,14 +91,14 @@ class Job:
         return self.is_answered or not self.is_wanted
 
     def drop(self) -> None:
-        """Cancel the job and ignore all further messages from it."""
+        """Cancel the job and ignore all further messages from the job."""
         if not self.is_over:
             self.is_wanted, self.end_s = False, monotonic() + GRACE_S
             self.cancel()
 
 
 class Pool:
-    """Pool of worker processes; its owner must call `poll` regularly.
+    """Pool of worker processes; the owner of the pool must call `poll` regularly.
 
     Functions, arguments and results must be picklable. ``on_error`` receives ChildProcessError if the worker
     died, TimeoutError or MemoryError if a limit was exceeded, otherwise the exception of the function.
@@ -153,7 +153,7 @@ class Pool:
         return job
 
     def poll(self, wait_s: float = 0.0) -> None:
-        """Wait at most ``wait_s`` for messages, deliver them, and end jobs that exceed their time limit."""
+        """Deliver messages, waiting for them at most ``wait_s``; end jobs that exceed their time limit."""
         self._arrived.wait(wait_s)
         self._arrived.clear()
         for worker in tuple(self.workers):
@@ -199,7 +199,7 @@ class Pool:
                     _call_back(job, kind, value)
 
     def _drop_worker(self, worker: "Worker", error: BaseException) -> None:
-        if worker in self.workers:  # false if a callback has closed the pool
+        if worker in self.workers:  # unless a callback has closed the pool
             self.workers.remove(worker)
             worker.end()
             if worker.job is not None:
@@ -226,7 +226,7 @@ def _call_back(job: Job, kind: str, value: Any) -> None:
 
 
 class Worker:
-    """Worker process with its current job, and a thread in this process that receives its messages."""
+    """Worker process, the worker's current job, and the thread that receives the worker's messages here."""
 
     def __init__(self, arrived: Event) -> None:
         context = get_context("spawn")
@@ -253,14 +253,14 @@ class Worker:
         self._is_ended = True
         self.process.kill()
         with suppress(Empty):
-            while True:  # a full queue would block the thread
+            while True:  # empty the queue: a full queue blocks the thread
                 self.messages.get_nowait()
         self._thread.join()
         self.process.join()
         self._connection.close()
 
     def _send(self, order: Callable[..., Any] | None) -> None:
-        with suppress(OSError):  # the process has ended; the receiving thread reports that
+        with suppress(OSError):  # the process has ended, as the receiving thread reports
             self._connection.send(order)
 
     def _receive(self) -> None:
@@ -276,7 +276,7 @@ class Worker:
 
 
 def _serve(connection: Any) -> None:
-    """Run jobs in a worker process until the parent closes its end of the pipe."""
+    """Run jobs in a worker process until the parent process closes the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     with suppress(OSError):
         lower_priority(NICE)

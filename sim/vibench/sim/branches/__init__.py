@@ -1,8 +1,8 @@
 """Branches of periodic motions over drive frequency or level, with switching at bifurcations.
 
 `shoot_branches` searches for motions from rest, from the linear motion between the stops and from random
-states, and follows each by shooting. It also follows branches that fork off where a period doubles or a
-symmetry breaks. `balance_branches` does the same for harmonic balances, including the paper's. Branches are
+states, and follows each motion by shooting. It also follows branches that fork off where a period doubles or
+a symmetry breaks. `balance_branches` does the same for harmonic balances, including the paper's. Branches are
 computed one by one, on demand. A motion on no known branch starts a new branch, which may be isolated.
 
 >>> from itertools import islice

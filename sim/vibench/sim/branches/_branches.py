@@ -27,8 +27,7 @@ from ..periodic.orbit_branch import periodic_branch_within
 from ..periodic.restoring_force import PowerSpring, spring_of
 from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 from ..specimen.drive import Harmonic
-from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Floats, Vector
+from ..specimen.specimen import Floats, Specimen, state_scales
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 INTERPOLATED = 0.06
@@ -37,7 +36,7 @@ length. The value follows from the largest rotation of the tangent in one step."
 SAME_MOTION = 1e-5
 """Additional distance between scaled states that `lies_on` allows for rounding errors."""
 LATE, LEAST_LATE_S = 0.25, 0.1
-"""Extra time allowed to end a branch after the time limit: fraction of the limit, and smallest value [s]."""
+"""Extra time allowed to end a branch after the time limit: fraction of the limit, and lower bound [s]."""
 LENGTHS = 10.0
 """Length of the whole parameter range in the scaled units of branch following."""
 
@@ -54,7 +53,7 @@ class BranchOrigin(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class FoundBranch:
-    """Branch of periodic motions: their period and symmetry, the branch's origin, and its computing time."""
+    """Branch of periodic motions, with their period and symmetry, and its origin and computing time."""
 
     branch: Branch
     shape: OrbitShape
@@ -68,7 +67,7 @@ class FoundBranch:
 
     @property
     def is_isolated(self) -> bool:
-        """Whether the branch is a closed curve, out of reach of sweeps along other branches."""
+        """Whether the branch is a closed curve, which sweeps along other branches cannot reach."""
         return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
@@ -114,7 +113,7 @@ def branches_from(
     leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
     until_s: float,
 ) -> Iterator[FoundBranch]:
-    """Yield branches through new motions, and branches that fork off them, until a time limit."""
+    """Yield branches through new motions, and branches that fork off these branches, until a time limit."""
     known: list[FoundBranch] = []
     last_s = until_s + max(LEAST_LATE_S, LATE * (until_s - time.monotonic()))
     for value in np.linspace(*bounds, search.places):
@@ -125,7 +124,7 @@ def branches_from(
                 one = fresh.pop()
                 if any(lies_on(each, specimen, path, one.drive, one.states) for each in known):
                     continue
-                # After ``until_s`` a branch ends at its next point, unless that takes too long.
+                # After ``until_s``, end the branch at its next point, or earlier if this takes too long.
                 for found in parts_within(last_s, map(follow, [one])):
                     known.append(replace(found, elapsed_s=time.perf_counter() - began))
                     yield known[-1]
@@ -165,7 +164,7 @@ def shoot_branches(
     low, high
         Range of the parameter, ascending [Hz, or m].
     search
-        Settings of the search. It may miss branches; more starts find more branches.
+        Settings of the search, which may miss branches; more starts find more branches.
     steps
         Step lengths and tolerances. In scaled units the range has length 10, and the gap has length 1.
 
@@ -209,7 +208,7 @@ def _branch_switches(
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
-        # Two branches meet at a bifurcation. Switch only from the branch with the simpler motion.
+        # Two branches meet at a bifurcation: switch branches only from the branch with the simpler motion.
         is_own = (event.kind is BifurcationKind.SYMMETRY_BREAKING) == (found.shape is OrbitShape.MIRRORED)
         if not leaves or not is_own:
             continue
@@ -243,7 +242,7 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
     return simplest(orbit) is orbit and float(np.abs(orbit.signs.apart).max(initial=1.0)) > LEFT
 
 
-def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
+def _direction(mapping: PeriodMap, state: Floats, drive: Harmonic) -> Floats:
     """Return the scaled eigenvector of the Floquet multiplier nearest to -1, shape (6,); largest entry 1."""
     values, vectors = np.linalg.eig(mapping.derivative(state, drive))
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
@@ -255,7 +254,7 @@ UPDATES_TO_HOLD = 10.0
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Return the time in which a small perturbation of a motion grows by a factor e [s]; infinite if stable.
+    """Return the time in which a small perturbation grows by a factor e [s]; infinite without growth.
 
     It is T / ln|mu|, with the motion's period T and largest multiplier mu, for a prescribed base motion.
 

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..engine.run import Accuracy, Outcome
 from ..motion.integrate import integrate
-from ..motion.poincare import smallest_period
 from ..periodic.branch import OrbitShape
-from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
-from ..specimen.accuracy import Accuracy
+from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit, smallest_period
 from ..specimen.drive import Harmonic
 from ..specimen.modes import base_transmissibility
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Floats, Vector
+from ..specimen.specimen import Floats, Specimen, state_scales
 
 SETTLED = 1e-3
 """Relative change of the state per period of the motion, below which Newton's iteration is started."""
@@ -45,7 +42,7 @@ class MotionSearch:
     most_branches: int = 60
     seed: int = 1
     time_s: float = math.inf
-    """Limit of the computing time for the search and all branches [s]; a branch in progress is cut off."""
+    """Limit of the computing time for the search and all branches [s]; an unfinished branch is cut off."""
 
     def __post_init__(self) -> None:
         if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
@@ -66,7 +63,7 @@ def periodic_motions(
     """Yield periodic motions at one drive, most of them stable.
 
     Each start is integrated for ``search.settling_periods``. If the motion then nearly repeats, Newton's
-    iteration finds the exact periodic motion. A motion and its mirror image are yielded as one.
+    iteration finds the exact periodic motion. A motion and its mirror image are yielded as one motion.
 
     Parameters
     ----------
@@ -75,7 +72,7 @@ def periodic_motions(
     search
         Settings of the search, such as the number of starts.
     until_s
-        Time limit as a value of `time.monotonic` [s]; after it no further start is tried.
+        Time limit as a value of `time.monotonic` [s]; after this time no further start is tried.
     """
     scales = state_scales(specimen, drive)
     met: list[Floats] = []
@@ -109,12 +106,12 @@ def orbit_states(orbit: PeriodicOrbit) -> Floats:
     return np.array(states)
 
 
-def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Vector]:
+def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Floats]:
     """Yield the initial states: rest, the linear motion if it never reaches a stop, then random states."""
     linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
-        # The steady motion without stops at time zero, driven by U = A0 sin(w t).
+        # The state at time zero of the steady motion without stops, driven by U = A0 sin(w t).
         phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
         yield np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
     rng = np.random.default_rng([search.seed, int(drive.frequency_hz * 1e3), int(drive.amplitude_m * 1e9)])
@@ -122,7 +119,7 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
         yield random_state(specimen, drive, rng)
 
 
-def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
+def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Floats:
     """Return a random state with m1 between the stops, drawn by ``rng``, shape (6,) [m, m/s].
 
     x and z are within three times the gap or, if larger, three times the amplitude of the motion without
@@ -140,7 +137,7 @@ def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) 
 
 
 def _orbit_from(
-    specimen: Specimen, drive: Harmonic, start: Vector, search: MotionSearch
+    specimen: Specimen, drive: Harmonic, start: Floats, search: MotionSearch
 ) -> PeriodicOrbit | None:
     run = integrate(
         specimen,
@@ -157,7 +154,7 @@ def _orbit_from(
     return settled_orbit(specimen, drive, run.final_state, periods or 1)
 
 
-def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
+def settled_orbit(specimen: Specimen, drive: Harmonic, state: Floats, periods: int) -> PeriodicOrbit | None:
     """Return the simplest motion that repeats after ``periods`` drive periods, found by shooting, or None."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
@@ -173,7 +170,7 @@ def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: i
 
 
 def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """Return a motion as a fixed point over its shortest period, or over half that period if symmetric."""
+    """Return a motion as a fixed point over its shortest period, or over half of it if symmetric."""
     mapping = orbit.period_map.simpler
     while mapping is not None:
         off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..specimen.specimen import Matrix, Specimen, Triple
+from ..specimen.specimen import Floats, Specimen, Triple, links_matrix
 from ..specimen.stops import Strict
 
 MASSES_PER_CELL = 3
@@ -47,12 +47,12 @@ class Chain(Strict):
         return np.asarray([mass for cell in self.cells for mass in cell.masses])
 
     @property
-    def stiffness_matrix(self) -> Matrix:
+    def stiffness_matrix(self) -> Floats:
         """Stiffness matrix K of the chain without contact, shape (3 cells, 3 cells) [N/m]."""
         return _assemble([cell.stiffnesses for cell in self.cells])
 
     @property
-    def damping_matrix(self) -> Matrix:
+    def damping_matrix(self) -> Floats:
         """Damping matrix C of the chain without contact, shape (3 cells, 3 cells) [N s/m]."""
         return _assemble([cell.dampings for cell in self.cells])
 
@@ -81,23 +81,15 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
     return Chain((specimen,) * cells)
 
 
-def _assemble(links: list[Triple]) -> Matrix:
+def _assemble(links: list[Triple]) -> Floats:
     """Return the stiffness or damping matrix of a chain from k_i or c_i, i = 0, 1, 2, of every cell."""
     size = MASSES_PER_CELL * len(links)
     matrix = np.zeros((size, size))
-    for cell, (outer, inner, middle) in enumerate(links):
-        x, y, z = range(MASSES_PER_CELL * cell, MASSES_PER_CELL * (cell + 1))
-        _join(matrix, y, z, inner)
-        _join(matrix, x, z, middle)
-        if cell == 0:
-            matrix[x, x] += outer
-        else:
-            _join(matrix, x - MASSES_PER_CELL, x, outer)
+    for x, link in zip(range(0, size, MASSES_PER_CELL), links, strict=True):
+        own = slice(x, x + MASSES_PER_CELL)
+        matrix[own, own] += links_matrix(link)
+        if x > 0:
+            before = x - MASSES_PER_CELL
+            matrix[before, before] += link[0]
+            matrix[before, x] = matrix[x, before] = -link[0]
     return matrix
-
-
-def _join(matrix: Matrix, one: int, other: int, link: float) -> None:
-    matrix[one, one] += link
-    matrix[other, other] += link
-    matrix[one, other] -= link
-    matrix[other, one] -= link

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..specimen.modes import angular_frequencies
-from ..specimen.specimen import Specimen
-from ..specimen.state import Complex
+from ..specimen.specimen import Complex, Specimen
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9
@@ -49,7 +48,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
         one = np.ones_like(outer)
         across = np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0) @ across
     cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
-    # The roots of q^2 - 2 cosine q + 1 have the product 1; only the larger root has no cancellation.
+    # The product of the roots of q^2 - 2 cosine q + 1 is 1. Only the larger root has no cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
@@ -61,11 +60,11 @@ class CellResponse(NamedTuple):
     link: Complex
     """Stiffness of the link to the previous cell, K = k0 + i w c0 [N/m]."""
     stiffness: Complex
-    """Ratio of the force on m0 to the displacement of m0 without the link, S(w) - w^2 m0 [N/m]."""
+    """Ratio of force to displacement at m0 if the link is removed, S(w) - w^2 m0 [N/m]."""
     inner: Complex
-    """Ratio y / x: displacement of m1 over that of m0."""
+    """Ratio y / x of the displacements of m1 and m0."""
     middle: Complex
-    """Ratio z / x: displacement of m2 over that of m0."""
+    """Ratio z / x of the displacements of m2 and m0."""
 
 
 def reduce_to_m0(cell: Specimen, omega: NDArray[np.float64]) -> CellResponse:
@@ -95,7 +94,7 @@ def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float
         raise ValueError("A wave number that is not finite is not allowed: give radians per unit.")
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
-    # The first cell is coupled to the last cell of the previous unit, which lags by the phase.
+    # The first cell is coupled to the previous unit's last cell; the previous unit lags by the phase.
     stiffness = np.tile(unit.stiffness_matrix.astype(np.complex128), (len(phase), 1, 1))
     stiffness[:, last, last] += link
     stiffness[:, first, last] -= link * np.exp(-1j * phase)
@@ -143,7 +142,7 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     """
     omega = angular_frequencies(frequency_hz)
     cells = [reduce_to_m0(cell, omega) for cell in chain.cells]
-    # Start at the free end. Reduce each cell, with all cells behind it, to a dynamic stiffness at its m0.
+    # Start at the free end. Reduce each cell and all cells behind it to a dynamic stiffness at its m0.
     seen = [cells[-1].stiffness]
     for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
         seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))

@@ -10,16 +10,17 @@ from ..engine.run import (
     MAX_IMPACT_RATE_HZ,
     MOST_IMPACTS,
     SPARE_IMPACTS,
+    Accuracy,
+    AccuracyWord,
+    Outcome,
     Watch,
     native_engine,
     next_slice,
 )
 from ..engine.scene import collision_structure, fill_drive, power_structure
 from ..motion.integrate import ROUNDING, Trajectory, check_impact_rate, check_times, check_within, integrate
-from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.drive import Drive, Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats
 from ..specimen.stops import member
 from ._chain import Chain
 from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces_between
@@ -27,9 +28,9 @@ from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces
 STATES_PER_CELL = 6
 """Number of state variables of a cell: x, y, z, vx, vy, vz."""
 MOST_WINDOWS = 10**11
-"""Largest number of windows of a run; `check_work` usually refuses even much shorter runs."""
+"""Largest number of windows of a run; `check_work` usually refuses runs with far fewer windows."""
 SLICE_CELL_WINDOWS = 1 << 12
-"""Product of the numbers of windows and cells between two time-limit checks; takes a few milliseconds."""
+"""Product of the numbers of windows and cells between two time-limit checks, a few milliseconds apart."""
 
 
 class ChainRun:
@@ -50,7 +51,7 @@ class ChainRun:
         """Allocate memory for impacts, and for samples at ``start_time_s`` + k / ``sample_rate_hz``."""
         engine, cells = native_engine(), chain.size
         self._states = engine.rows("CellState", cells)
-        # These arrays are not initialised, because only filled entries are read.
+        # Do not initialise these arrays, because only filled entries are read.
         self._times, self._places = np.empty(most_impacts), np.empty(most_impacts)
         self._samples = np.empty((samples, cells, STATES_PER_CELL))
         self.peaks_m, self._lines = np.zeros((cells, 2)), np.zeros(cells, np.complex128)
@@ -144,7 +145,7 @@ class ChainRun:
         kept = int(self._motion["samples_kept"])
         if outcome is not Outcome.REACHED_END:
             return self._samples[:kept]
-        # Rounding may place the last sample time just after the end of the run.
+        # Because of rounding, the last sample time may lie just after the end of the run.
         self._samples[kept:] = self.motion
         return self._samples
 

@@ -8,15 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import MAX_IMPACT_RATE_HZ, Watch
+from ..engine.run import MAX_IMPACT_RATE_HZ, Accuracy, AccuracyWord, Outcome, Watch
 from ..exponents.tangent_run import block_mean
 from ..motion.response import Response, steady_response, whole_periods
-from ..specimen.accuracy import Accuracy, AccuracyWord
 from ..specimen.contact_laws import PowerLaw
 from ..specimen.drive import Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats, Specimen
 from ..specimen.stops import member
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, most_chain_impacts, start_motion
@@ -192,7 +189,7 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 def chain_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> Floats:
     """Return the energy of every cell, shape (..., cells) [J].
 
-    It is the energy of masses, springs (with the link to the previous cell) and stops. A Hunt-Crossley
+    This energy includes masses, springs (with the link to the previous cell) and stops. A Hunt-Crossley
     contact stores the energy of its Hertz spring. Without damping and base motion, the total is constant.
 
     Parameters

@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.library import Structure
-from ..engine.run import native_engine
+from ..engine.run import Accuracy, native_engine
 from ..engine.scene import fill_cell
 from ..motion.integrate import sampled_motion
-from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled
-from ..specimen.specimen import Specimen
-from ..specimen.state import Table, Vector
+from ..specimen.specimen import Floats, Specimen
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2
@@ -34,7 +33,7 @@ CROSS_SHARE = 1.0
 the tolerance."""
 MOST_HALVINGS = 20
 KEPT = 2
-"""Number of window lengths that are tried before the shortest one."""
+"""Number of window lengths that are tried before the shortest length."""
 
 
 class ChainTables(NamedTuple):
@@ -42,18 +41,19 @@ class ChainTables(NamedTuple):
 
     kinds: Structure
     """One `CellKind` of native/structures.hpp for each kind of cell."""
-    kind_of: Vector
+    kind_of: Floats
     """Index of the kind of each cell, shape (cells,)."""
     fastest: float
     """Largest rate of change of the modes of the chain and of the drive [1/s]."""
-    windows: Vector
+    windows: Floats
     """Window lengths, the longest first, shape (windows,) [s]."""
-    clash: Vector
+    clash: Floats
     """For each window length, distance [cells] within which only one cell may be in contact, (windows,)."""
 
 
+@lru_cache(maxsize=8)
 def chain_tables(chain: Chain, drive: Drive, accuracy: Accuracy) -> ChainTables:
-    """Return the engine's tables for a chain, a drive and an accuracy level."""
+    """Return the engine's tables for a chain, a drive and an accuracy level; runs only read the tables."""
     links = [(cell.stiffnesses[0], cell.dampings[0]) for cell in chain.cells]
     cells = list(zip(chain.cells, [*links[1:], (0.0, 0.0)], strict=True))
     places = {each: place for place, each in enumerate(dict.fromkeys(cells))}
@@ -72,7 +72,7 @@ def _fastest(chain: Chain, drive: Drive) -> float:
     """Return an upper bound on the rates of all modes and of a harmonic drive [1/s].
 
     The rate of an oscillating mode is at most the highest undamped angular frequency; the rate of an
-    overdamped mode is at most that of the dampers alone.
+    overdamped mode is at most the rate of the dampers alone.
     """
     root = np.sqrt(chain.masses)
     creeping = float(np.linalg.eigvalsh(chain.damping_matrix / np.outer(root, root))[-1])
@@ -80,7 +80,7 @@ def _fastest(chain: Chain, drive: Drive) -> float:
     return max(2.0 * math.pi * max(float(chain.natural_frequencies_hz[-1]), driven), creeping)
 
 
-def markov_between(chain: Chain) -> Table:
+def markov_between(chain: Chain) -> Floats:
     """Return the Taylor coefficients of p(t) in every cell after a unit impulse in a nearby cell.
 
     Shape (MARKOV_TERMS, 2 REACH + 1, cells). The second axis is the distance from the cell with the impulse.
@@ -93,7 +93,7 @@ def markov_between(chain: Chain) -> Table:
     return answers
 
 
-def _answers(chain: Chain, moves: Table) -> Table:
+def _answers(chain: Chain, moves: Floats) -> Floats:
     """Return the Taylor coefficients of p(t) after unit impulses, shape (MARKOV_TERMS, cells, COLUMNS).
 
     Impulses too far apart to affect the same cell share a column. ``moves`` is 0 for fixed cells, else 1.
@@ -109,7 +109,7 @@ def _answers(chain: Chain, moves: Table) -> Table:
     return np.array(path)
 
 
-def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
+def _accelerations(chain: Chain, displacements: Floats, rates: Floats) -> Floats:
     """Return the accelerations without contact and drive, shape (masses of a cell, cells, columns)."""
     masses = chain.masses.reshape(chain.size, MASSES_PER_CELL)
     springs, dampers = (
@@ -124,14 +124,14 @@ def _accelerations(chain: Chain, displacements: Table, rates: Table) -> Table:
     return np.stack([middle - outer + behind, -inner, inner - middle]) / masses.T[..., None]
 
 
-def _stretches(motion: Table) -> tuple[Table, Table, Table]:
+def _stretches(motion: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the elongations of the three springs of every cell, from the displacements."""
     x, y, z = motion
     return np.diff(x, axis=0, prepend=0.0), y - z, z - x
 
 
-def cross_answers(between: Table, window: float) -> Vector:
-    """Return bounds on dp/dt of other cells, relative to the struck cell, in a window after an impulse.
+def cross_answers(between: Floats, window: float) -> Floats:
+    """Return bounds on dp/dt of other cells, relative to the struck cell's, in a window after an impulse.
 
     Shape (REACH + 1,): entry d is the bound for cells at distance d; entry 0 is not used.
     """
@@ -140,15 +140,15 @@ def cross_answers(between: Table, window: float) -> Vector:
     return np.asarray(np.maximum(relative[REACH:], relative[REACH::-1]))
 
 
-def _answer_within(coefficients: Table, window: float) -> Table:
-    """Return a bound on the derivative of Taylor series (coefficients on the first axis) in a window [s]."""
+def _answer_within(coefficients: Floats, window: float) -> Floats:
+    """Return a bound on the derivative of Taylor series within ``window`` [s]; first axis: coefficients."""
     orders = range(1, MARKOV_TERMS)
     return np.asarray(
         sum(np.abs(coefficients[k]) * window ** (k - 1) / math.factorial(k - 1) for k in orders)
     )
 
 
-def _back_action(chain: Chain, between: Table, window: float) -> float:
+def _back_action(chain: Chain, between: Floats, window: float) -> float:
     """Return a bound on the velocity that a cell's motion causes in the cell itself via its neighbours."""
     places = np.arange(chain.size)
     only_itself = places[:, None] % COLUMNS == np.arange(COLUMNS)
@@ -157,10 +157,10 @@ def _back_action(chain: Chain, between: Table, window: float) -> float:
     return float(np.max(_answer_within(own - alone, window) / own[1]))
 
 
-def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector, Vector]:
-    """Return the window lengths, and for each the distance within which only one cell may be in contact.
+def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Floats, Floats]:
+    """Return window lengths, and for each length the distance within which only one cell may be in contact.
 
-    In the shortest window even neighbours may both be in contact. In every window a cell in contact is
+    In the shortest window, even neighbours may both be in contact. In every window a cell in contact is
     integrated as if its neighbours did not react; windows are shortened until this error is negligible.
     """
     between = markov_between(chain)
@@ -180,7 +180,7 @@ def _windows(chain: Chain, lengths: list[float], allowed: float) -> tuple[Vector
     return np.array([lengths[k] for k in kept]), np.array([float(clash[k]) for k in kept])
 
 
-def _clash(answers: Vector, allowed: float) -> int:
+def _clash(answers: Floats, allowed: float) -> int:
     return max((d for d in range(1, len(answers)) if answers[d] > allowed), default=0)
 
 
@@ -190,13 +190,13 @@ def _clash(answers: Vector, allowed: float) -> int:
 # (docs/decisions/0011-chains.md).
 
 PIECE_TERMS = 8
-"""Number of polynomial terms per piece of the drive; eight fit a sine to 1e-14 over `WINDOW_TURN` rad."""
+"""Number of polynomial terms per piece of drive; eight terms fit a sine to 1e-14 over `WINDOW_TURN` rad."""
 ALMOST = 1e-9
 """Tolerance for rounding errors of time, relative to the length of a piece of the drive."""
 _NODES: NDArray[np.float64] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(PIECE_TERMS) + 0.5) / PIECE_TERMS)
 
 BATCH = 1 << 16
-"""Number of pieces of a sweep computed at once; limits the memory for a long sweep."""
+"""Number of pieces of a sweep computed at once, limited to save memory in long sweeps."""
 BaseDrive = Sampled | LinearSweep | LogarithmicSweep
 """Drives that are divided into polynomial pieces."""
 
@@ -204,7 +204,7 @@ BaseDrive = Sampled | LinearSweep | LogarithmicSweep
 class Pieces(NamedTuple):
     """Force of the base on the first m0, as a piecewise polynomial of time."""
 
-    terms: Table
+    terms: Floats
     """Coefficients of the force, in powers of the time since the start of each piece, shape (pieces,
     PIECE_TERMS)."""
     start_s: float
@@ -245,7 +245,7 @@ def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:
             return drive.duration_s / count, count
 
 
-def _force_table(drive: BaseDrive, first: Specimen, interval: float, begin: int, stop: int) -> Table:
+def _force_table(drive: BaseDrive, first: Specimen, interval: float, begin: int, stop: int) -> Floats:
     """Return the coefficients of the force on every piece, as in `Pieces.terms`, shape (pieces, 8)."""
     spring, damper = first.stiffnesses[0], first.dampings[0]
     match drive:

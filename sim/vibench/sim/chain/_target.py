@@ -1,4 +1,4 @@
-"""Responses of a chain, with a requested relative error or in a requested computing time. SI units."""
+"""Responses of a chain, with a target relative error or in a requested computing time. SI units."""
 
 import math
 import time
@@ -8,13 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..engine.run import time_limit
+from ..engine.run import Accuracy, Outcome, time_limit
 from ..scene.prediction import TargetReport
 from ..scene.refinement import LONGEST_S, OUT_OF_REACH_S, uncertainty_of_time
-from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats
 from ._chain import Chain
 from ._response import ChainResponse, chain_response
 
@@ -23,13 +21,13 @@ WINDOW_S, FEWEST_WINDOWS = 0.25, 32
 FEWEST_PAIRS, STUDENT = 8, 2.365
 """Smallest number of pairs of windows for an error estimate, and Student's t (95 %) for this number."""
 TOLERANCE_PART = 0.1
-"""Largest part of the requested error that may come from the integration."""
+"""Largest part of the target error that may come from the integration."""
 FIRST_S, FIRST_SHARE = 0.1, 0.75
-"""Computing time that the first period may take [s], or share of the time limit if that is longer, because
-callers compute a second period."""
+"""Limit of the first period's computing time: in seconds or, if longer, as a share of the time limit. The
+limit leaves time for a second period, which callers compute."""
 HOPELESS, STEADILY = 10.0, 0.5
 """Ratio of expected time to default limit above which the run ends early. Ratio of the error with all windows
-to that with half of them, above which the error is assumed to fall only like 1 / sqrt(time)."""
+to the error with half of them, above which the error is assumed to fall only like 1 / sqrt(time)."""
 
 
 class TargetedResponse(NamedTuple):
@@ -47,9 +45,9 @@ class TargetedResponse(NamedTuple):
 def chain_response_to(
     chain: Chain, drive: Harmonic, error: float | None, time_s: float | None
 ) -> TargetedResponse:
-    """Extend the run until the second half of its windows gives the requested error; return the response.
+    """Extend the run until the second half of its windows gives the target error; return the response.
 
-    Without a time limit, the run ends early if it would need more than ten minutes.
+    Without a time limit, the run ends early if more than ten minutes would be needed.
 
     Raises ValueError when the computation of one drive period takes longer than ``time_s``.
 
@@ -58,9 +56,9 @@ def chain_response_to(
     chain, drive
         As in `chain_response`; the chain starts from rest.
     error
-        Requested relative error of every cell's transmissibility; None for the smallest within ``time_s``.
+        Target relative error of every cell's transmissibility; None for the smallest error within ``time_s``.
     time_s
-        Limit of the computing time [s]; None for one minute.
+        Limit of the computing time [s]; None means 60 s.
     """
     began_s, limit_s = time.monotonic(), LONGEST_S if time_s is None else time_s
     wanted = 0.0 if error is None else error
@@ -101,7 +99,7 @@ def chain_response_to(
             errors = _errors(used) + accuracy.promise
             worst = float(errors.max())
             if time_s is None and worst > max(wanted, STEADILY * last):
-                needed_s = (worst / wanted) ** 2 * (time.monotonic() - began_s)
+                needed_s = (worst / max(wanted, accuracy.promise)) ** 2 * (time.monotonic() - began_s)
                 goes_on = goes_on and needed_s < HOPELESS * limit_s
     response = replace(
         used[-1],
@@ -117,7 +115,7 @@ def chain_response_to(
 def _report(
     errors: Floats, accuracy: Accuracy, asked: tuple[float | None, float | None], taken_s: float, windows: int
 ) -> TargetReport:
-    """Report the largest error and the time for the requested one, which falls with the root of the time."""
+    """Report the largest error and the time needed for the requested error; errors fall as 1 / sqrt(time)."""
     worst, (wanted, _) = float(errors.max()), asked
     error = worst if math.isfinite(worst) else None
     is_met = error is not None and (wanted is None or worst <= wanted)

@@ -1,6 +1,7 @@
 """The native engine, compiled from C++ in native/: motions, chains, filters, virtual rig.
 
-`NativeRun` integrates a motion of a specimen under a harmonic drive. The library that suits the processor is
+`NativeRun` integrates a motion of a specimen under a harmonic drive. `Accuracy` sets the error of the
+integration; `Outcome` states how a run ended. The library that suits the processor is
 loaded once and checked with a known scene (docs/decisions/0077-native-engine.md). Python prepares modal
 forms and the tables for collisions and time steps. `CubicRun` integrates a motion under sweeps and
 recordings: base motions that are cubic polynomials on equal intervals.

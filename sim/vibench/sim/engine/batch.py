@@ -1,7 +1,7 @@
 """SIMD batches: integrate eight motions of one specimen at the same time.
 
-native/batch.hpp supports Hertz contacts at the accuracy levels *quick* and *standard*. It returns states once
-per drive period, peaks and spectral lines (docs/decisions/0061-lanes.md). SI units.
+native/batch.hpp supports Hertz contacts at the accuracy levels *quick* and *standard*. The batch returns
+states once per drive period, peaks and spectral lines (docs/decisions/0061-lanes.md). SI units.
 """
 
 import math
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from ..specimen.contact_laws import Hertz
 from ..specimen.modes import modal_form
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import VY, VZ, Y, Z
+from ..specimen.specimen import VY, VZ, Floats, Specimen, Y, Z, energy_metric
 from .library import Engine, Structure
-from .run import DIRECTIONS, Floats, NativeRun, Watch, native_engine
+from .run import DIRECTIONS, NativeRun, Outcome, Watch, native_engine
 from .shapes import (
     DEPTHS,
     DURATION,
@@ -33,12 +31,10 @@ from .shapes import (
     SOFTEST,
     SPACING,
     TERMS,
-    Table,
-    Vector,
     collision_shapes,
 )
 
-# Fit of the polynomials with which a batch computes Hertz collisions (native/collision_fit.hpp). SI units.
+# Fit of the polynomials with which a batch computes Hertz collisions (native/collision.hpp). SI units.
 #
 # A collision is scaled by the depth and the time u that it would have at the same speed without other forces.
 # Once scaled, it depends only on u and on the acceleration due to all other springs. The variables of the fit
@@ -76,9 +72,9 @@ _ONE_THREAD = Lock()
 
 
 def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the `CollisionFit` of native/structures.hpp for a specimen; takes about 0.05 s.
+    """Return the `CollisionFit` of native/structures.hpp for a specimen; the fit takes about 0.05 s.
 
-    Return None if the stops are too soft or the fit is not accurate enough.
+    Return None if the stops are too soft, or if the fit is not accurate enough.
     """
     with _ONE_THREAD:
         return _collision_fit(engine, specimen)
@@ -93,7 +89,7 @@ def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
     places = rng.uniform(-1.0, 1.0, (count, VARIABLES))
-    # Draw more collisions near the ends of the variables' ranges, like Chebyshev points.
+    # Like Chebyshev points, draw more collisions near the ends of the variables' ranges.
     places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
     variables = middle + half * places
     solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
@@ -103,8 +99,8 @@ def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
     monomials = np.ones((len(places), MONOMIALS))
     for variable, power in enumerate(powers.T.astype(int)):
         monomials *= factors[:, variable, power]
-    # Normal equations are faster than a QR decomposition; a second solution for the residual makes up for
-    # their loss of digits (Björck, Linear Algebra Appl. 88 (1987) 31).
+    # Normal equations are faster than a QR decomposition, but lose digits. A second solution, for the
+    # residual, restores these digits (Björck, Linear Algebra Appl. 88 (1987) 31).
     known, checked = monomials[:COLLISIONS], monomials[COLLISIONS:]
     products = known.T @ known
     parts, errors = [], []
@@ -131,13 +127,13 @@ def _fastest(specimen: Specimen) -> float:
 
 
 def _time_over_fifth_root(specimen: Specimen) -> float:
-    """Return u times the fifth root of the approach speed v: u = d / v, m v^2 / 2 = 2 k d^(5/2) / 5."""
+    """Return u v^(1/5) at the approach speed v, with u = d / v and m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
     return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
 
 
-def _box(specimen: Specimen) -> tuple[Vector, Vector]:
+def _box(specimen: Specimen) -> tuple[Floats, Floats]:
     """Return the centre and the half width of the range of each variable of the fit, shape (6,) each."""
     unit = min(specimen.gaps_m) * _fastest(specimen)
     shortest, longest = (
@@ -149,7 +145,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
     return np.array([0.0] * DERIVATIVES + [0.5 * (longest + shortest)]), half
 
 
-def _coupling(specimen: Specimen) -> Vector:
+def _coupling(specimen: Specimen) -> Floats:
     """Return the effect of each repeated time integral of the force on p, relative to the second integral."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
@@ -157,7 +153,7 @@ def _coupling(specimen: Specimen) -> Vector:
     return np.asarray(onto_p / onto_p[1])
 
 
-def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
+def _solve(accelerations: Floats, units: Floats, coupling: Floats) -> Floats:
     """Return the durations of n collisions and the moments about their middles, shape (n, 6).
 
     Depths and duration are corrected with tabulated derivatives, as in native/collision.hpp.
@@ -168,7 +164,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
     onto_depths, onto_length = shapes[place, : POINTS + 1], shapes[place, ONTO_DURATION]
     onto_length = np.column_stack([onto_length, durations[place, END_ONTO_DURATION]])
     depths, length = shapes[place, DEPTHS], durations[place, DURATION]
-    # The indentation without contact force, in powers of time.
+    # Indentation if there were no contact force, in powers of time.
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
@@ -192,7 +188,7 @@ def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
     return np.column_stack([length, _about_the_middle(ends, length)])
 
 
-def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
+def _about_the_middle(ends: Floats, length: NDArray[np.float64]) -> Floats:
     """Convert integrals of F (T - t)^m to integrals of F (T / 2 - t)^m, shape (n, MOMENTS)."""
     return np.stack(
         [
@@ -209,7 +205,7 @@ FUSING_FAMILIES = ("x86_64_v3", "x86_64_v4")
 """Processor families with wide registers and fused multiply-add, on which batches are faster."""
 MODES = 3
 MOST_DAMPED = 0.05
-"""Largest damping ratio of a mode in batches; a larger one would need more terms of the series."""
+"""Largest damping ratio of a mode in batches; a larger ratio would need more terms of the series."""
 REACHED_END = Outcome.REACHED_END.value
 LEAST_PART = 1e-9
 """Smallest contribution of a mode to p, relative to the largest one; a batch derives all modes from p."""
@@ -226,8 +222,12 @@ class BatchedMotion:
     peak_x_m: float
     peak_p_m: float
     area_x: complex
-    """Integral of x exp(-i (omega t + phase)) over the periods [m s]; zero without observation."""
+    """Integral of x exp(-i (omega t + phase)) over the periods [m s]; zero if not observed."""
     area_p: complex
+    growth: Floats
+    """Logarithm of the tangent vector's length once per drive period, shape (periods,); empty without one."""
+    struck: NDArray[np.int64]
+    """Impact count until the end of each drive period, shape (periods,); empty without a tangent vector."""
 
 
 @cache
@@ -264,7 +264,8 @@ def follow_batch(
     Parameters
     ----------
     runs
-        Motions with equal tolerances, out of contact, at the end of a drive period, without tangent vectors.
+        Motions with equal tolerances, out of contact, at the end of a drive period, with at most one tangent
+        vector.
     periods
         Number of drive periods for each motion.
     watch
@@ -283,21 +284,30 @@ def follow_batch(
         raise ValueError(
             "This specimen cannot be simulated in a batch: use Hertz contacts and three oscillating modes."
         )
-    # Sort by length, the longest first, so that motions computed in parallel end at about the same time.
+    # Start with the longest motion, so that motions computed in parallel end at about the same time.
     order = np.argsort(-np.asarray(periods), kind="stable")
     states = [np.empty((periods[place], DIRECTIONS)) for place in order]
     records, motions = engine.rows("Record", len(runs)), engine.rows("BatchMotion", len(runs))
     records["watch"] = watch
-    motions["tables"], motions["now"] = np.transpose([runs[place].addresses for place in order])
+    for name, address in zip(
+        ("tables", "now", "tangent"), np.transpose([runs[place].addresses for place in order]), strict=True
+    ):
+        motions[name] = address
+    rooms = [len(own) if has else 0 for own, has in zip(states, motions["tangent"], strict=True)]
+    growth, struck = [np.empty(room) for room in rooms], [np.empty(room, np.int64) for room in rooms]
+    motions["growth"] = [own.ctypes.data for own in growth]
+    motions["struck"] = [own.ctypes.data for own in struck]
     motions["sections"], motions["periods"] = [own.ctypes.data for own in states], np.take(periods, order)
     motions["record"] = records.ctypes.data + records.strides[0] * np.arange(len(runs))
     batch = engine.new("Batch", count=len(runs), tolerance=first.tolerance)
+    batch["metric"] = energy_metric(first.specimen)
     batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
     engine.call("follow_batch", batch)
     seen = [records[name].tolist() for name in ("peak_x", "peak_p", "line_x", "line_p")]
     found: list[BatchedMotion | None] = [None] * len(runs)
     for place, outcome, *values in zip(
-        order, motions["outcome"].tolist(), states, motions["impacts"].tolist(), *seen, strict=True
+        *(order, motions["outcome"].tolist(), states, motions["impacts"].tolist(), *seen, growth, struck),
+        strict=True,
     ):
         if outcome == REACHED_END:
             found[place] = BatchedMotion(*values)

@@ -78,7 +78,7 @@ FUNCTIONS = (
 )
 """Functions of the native library that have a single structure as argument."""
 Tables = NDArray[np.float64]
-"""Tables of a scene, prepared by the engine in its own memory layout."""
+"""Tables of a scene, prepared by the engine in the engine's memory layout."""
 _Pointer = ctypes.c_void_p
 
 
@@ -107,10 +107,8 @@ class Engine:
         self._declare("vibench_size_of_cubic_tables", count, count)
         self._declare("vibench_prepare_cubics", count, _Pointer, _Pointer)
         self._declare("vibench_run_cubics", count, _Pointer, _Pointer, _Pointer, number, _Pointer)
-        run = (_Pointer, _Pointer, number, number, _Pointer)
-        self._declare("vibench_run", count, *run)
-        self._declare("vibench_run_with_tangent", count, *run, _Pointer)
         filled = (_Pointer, _Pointer, _Pointer)
+        self._declare("vibench_run", count, _Pointer, _Pointer, number, number, *filled[:2])
         self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
         self._declare("vibench_reach", number, _Pointer, _Pointer)
         self._declare("vibench_chain_memory", count, count, count)
@@ -132,7 +130,7 @@ class Engine:
             size = self._library.vibench_size_of(index)
             if size != of.itemsize:
                 raise EngineError(
-                    f"{self.path} uses {size} bytes for {name}, Python uses {of.itemsize}: run {REBUILD}."
+                    f"{self.path} uses {size} bytes for {name}, but Python uses {of.itemsize}: run {REBUILD}."
                 )
         return types
 
@@ -194,7 +192,7 @@ class Engine:
         tables = np.zeros(size // 8, np.float64)
         if getattr(self._library, f"vibench_{prepare}")(scene.ctypes.data, tables.ctypes.data) != 0:
             raise ValueError(
-                "This scene is not allowed: numbers must be finite, masses and springs positive."
+                "This scene is not allowed: numbers must be finite, and masses and springs positive."
             )
         return tables
 
@@ -216,9 +214,7 @@ class Engine:
         Return the number of an `Outcome`, or -1 if the input is refused.
         """
         run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
-        if tangent is None:
-            return int(self._library.vibench_run(*run))
-        return int(self._library.vibench_run_with_tangent(*run, tangent.ctypes.data))
+        return int(self._library.vibench_run(*run, None if tangent is None else tangent.ctypes.data))
 
     def run_cubics(
         self, tables: Tables, state: Structure, drive: Structure, tolerance: float, record: Structure
@@ -315,7 +311,7 @@ SIM = Path(__file__).parents[1]
 
 @cache
 def physics_digest() -> str:
-    """Return a digest of all simulation code; the same for a checkout and an installed wheel."""
+    """Return a digest of all simulation code; a checkout and an installed wheel have the same digest."""
     digest = hashlib.sha256(native_digest().encode())
     for path in sorted(each for kind in ("*.py", "*.pyi") for each in SIM.rglob(kind)):
         digest.update(path.relative_to(SIM).as_posix().encode())

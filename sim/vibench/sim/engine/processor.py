@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FAMILIES = ("x86_64", "x86_64_v3", "x86_64_v4", "arm64")
-"""Processor families by their names in compilers: all x86-64, with AVX2, with AVX-512, and ARM."""
+"""Processor families by their names in compilers: any x86-64, x86-64 with AVX2 or with AVX-512, and ARM."""
 _ARM = {"arm64", "aarch64"}
 _X86 = {"x86_64", "amd64"}
 _V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}

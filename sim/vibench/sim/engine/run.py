@@ -5,31 +5,27 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from functools import lru_cache
-from typing import Self, TypeVar
+from typing import Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..specimen.accuracy import Accuracy
 from ..specimen.contact_laws import PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.modes import state_matrix
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, gong2025
-from ..specimen.state import Y, Z
+from ..specimen.specimen import Floats, Specimen, Y, Z, gong2025
 from ..specimen.stops import require_positive
 from .library import Engine, EngineError, Structure, Tables, library_path
 from .scene import fill_power, fill_specimen, scene_of
 
-Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
 """Largest number of time steps out of contact: enough for two days of the paper's motion."""
 MOST_IMPACTS = 1 << 26
-"""Largest number of impacts in one run. Their times take up to 0.5 GB, allocated as they occur."""
+"""Largest number of impacts in one run. The impact times take up to 0.5 GB, allocated as impacts occur."""
 SPARE_IMPACTS = 100
-"""Number of impacts allowed in addition to the mean rate, so that even a short run may have a few."""
+"""Number of impacts allowed beyond the mean rate, so that even a short run may have a few impacts."""
 DIRECTIONS = 6
 """Dimension of a state, which is also the largest number of tangent vectors."""
 INSIDE = 1e-9
@@ -48,6 +44,8 @@ KNOWN_TO = 1e-6
 """Allowed deviation from the known state, in units of 100 um and 0.1 m/s."""
 SLICE_STEPS = 1 << 20
 """Number of time steps between two time-limit checks; these steps take a few milliseconds."""
+WITHOUT_LIMIT = 64
+"""Factor on the number of steps between checks if there is no time limit, for which only Ctrl-C matters."""
 _END_S: ContextVar[float] = ContextVar("end of the computing time", default=math.inf)
 
 
@@ -84,9 +82,68 @@ def parts_within(end_s: float, parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def next_slice(steps_left: int, size: int) -> int:
-    """Check the time limit; return the number of steps until the next check, or all steps without a limit."""
+    """Check the time limit; return the number of steps until the next check, when Python also sees Ctrl-C."""
     check_time()
-    return min(steps_left, size) if _END_S.get() < math.inf else steps_left
+    return min(steps_left, size if _END_S.get() < math.inf else WITHOUT_LIMIT * size)
+
+
+class Accuracy(StrEnum):
+    """Accuracy level: largest allowed error of the state after some seconds of periodic impacts.
+
+    Errors are in units of 100 um and 0.1 m/s, measured against an independent solution (docs/accuracy.md).
+    """
+
+    QUICK = "quick"
+    """Error 1e-5: enough for chaotic motion, whose results a stricter level does not improve."""
+    STANDARD = "standard"
+    """Error 1e-6: between the two other levels."""
+    REFERENCE = "reference"
+    """Error 1e-9: reference with which the two other levels are checked."""
+
+    @property
+    def tolerance(self) -> float:
+        """Relative tolerance of one time step in contact; smaller than `promise` because errors add up."""
+        return _TOLERANCES[self]
+
+    @property
+    def promise(self) -> float:
+        """Largest error of the state of a periodic motion, in the units of the class docstring."""
+        return _PROMISES[self]
+
+
+AccuracyWord = Literal["quick", "standard", "reference"]
+_TOLERANCES = {Accuracy.QUICK: 3e-6, Accuracy.STANDARD: 3e-7, Accuracy.REFERENCE: 1e-10}
+_PROMISES = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-9}
+
+_TEXTS = (
+    "reached the end time",
+    "more impacts than allowed: raise max_impact_rate_hz, shorten the run, or look for chatter",
+    "the motion overflows or loses all its digits: lower the drive, or check the specimen's numbers",
+    "a contact made no progress: start less deep in a stop, request less accuracy, or check the specimen",
+    "more steps than allowed: a mode is very fast; check masses and stiffnesses, or simulate less time",
+)
+
+
+class Outcome(IntEnum):
+    """Outcome of a run, with the codes of the engine."""
+
+    REACHED_END = 0
+    TOO_MANY_IMPACTS = 1
+    NOT_FINITE = 2
+    STALLED = 3
+    TOO_LONG = 4
+
+    @property
+    def text(self) -> str:
+        """Description of the outcome and advice for the user."""
+        return _TEXTS[self]
+
+
+def outcome_of(code: int, refused: str) -> Outcome:
+    """Return the outcome of a code of the engine; raise ValueError if the engine refused ``refused``."""
+    if code < 0:
+        raise ValueError(f"The native engine refuses {refused}.")
+    return Outcome(code)
 
 
 class Watch(IntEnum):
@@ -113,7 +170,7 @@ class RunRecord:
         engine: Engine | None = None,
     ) -> None:
         """Allocate memory for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
-        # Only filled entries are read. Initialising the arrays would take as long as a short run.
+        # Do not initialise the arrays: this takes as long as a short run, and only filled entries are read.
         self._samples = np.empty((samples, DIRECTIONS))
         self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
@@ -143,7 +200,7 @@ class RunRecord:
         return self._samples[: int(self.structure["samples_kept"])]
 
     def all_samples(self, last: ArrayLike) -> Floats:
-        """Return all samples, shape (samples, 6); ``last`` replaces any that rounding puts past the end."""
+        """Return all samples, shape (n, 6); ``last`` replaces samples that rounding puts past the end."""
         self._samples[int(self.structure["samples_kept"]) :] = last
         return self._samples
 
@@ -188,7 +245,7 @@ class _Run:
 
 
 class NativeRun(_Run):
-    """Motion under a harmonic drive; holds the current state and tangent vectors."""
+    """Motion under a harmonic drive, with the current state and tangent vectors."""
 
     def __init__(
         self,
@@ -223,7 +280,7 @@ class NativeRun(_Run):
 
     def copy(self, tolerance: float | None = None) -> Self:
         """Return an independent copy of the run; with a new `tolerance`, the copy has no tangent vectors."""
-        twin = object.__new__(type(self))  # faster than copy.copy
+        twin = object.__new__(type(self))  # this is faster than copy.copy
         twin.__dict__.update(self.__dict__, _state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
             twin.tolerance = tolerance
@@ -262,25 +319,21 @@ class NativeRun(_Run):
             if code != Outcome.TOO_LONG or left <= 0:
                 break
         record.structure["steps_left"] = max(left, 0)
-        if code < 0:
-            raise ValueError(
-                f"The native engine refuses to advance to {until_s} s: the end time must be finite."
-            )
-        return Outcome(code)
+        return outcome_of(code, f"to advance to {until_s} s: the end time must be finite")
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
         """Advance to the end of interval ``last``; add the growth of tangent vectors to ``readings``."""
-        return Outcome(
-            self.engine.take_readings(
-                *(self._tables, self._state, self.tolerance, record.structure),
-                *(self._tangent, readings.structure, last),
-            )
+        code = self.engine.take_readings(
+            *(self._tables, self._state, self.tolerance, record.structure),
+            *(self._tangent, readings.structure, last),
         )
+        return outcome_of(code, "exponents of a mode this fast or slow: check masses and stiffnesses")
 
     @property
-    def addresses(self) -> tuple[int, int]:
-        """Memory addresses of tables and state for a batch; valid as long as the run exists."""
-        return self._tables.ctypes.data, self._state.ctypes.data
+    def addresses(self) -> tuple[int, int, int]:
+        """Memory addresses of tables, state and tangent vector (0 without one); valid as long as the run."""
+        tangent = self._tangent.ctypes.data if self._tangent["changes"] > 0 else 0
+        return self._tables.ctypes.data, self._state.ctypes.data, tangent
 
     def pass_over(self, length_s: float) -> None:
         """Skip a period [s] after which the motion repeats: increase the time and keep the state."""
@@ -303,7 +356,7 @@ class GrowthReadings:
     """Growth of tangent vectors in equal time intervals; the vectors are kept orthonormal in a metric."""
 
     def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
-        """Allocate memory for ``room`` intervals of ``interval_s`` [s], each of ``parts`` equal parts."""
+        """Allocate memory for ``room`` intervals of ``interval_s`` [s], each with ``parts`` equal parts."""
         self._growth = np.zeros((room, changes))
         self._impacts = np.zeros(room, np.int64)
         self._motions = np.zeros((room, DIRECTIONS))
@@ -312,6 +365,12 @@ class GrowthReadings:
         readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
         readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
         readings["motions"], readings["room"] = self._motions.ctypes.data, room
+
+    def add(self, growth: Floats, impacts: NDArray[np.int64], motions: Floats) -> None:
+        """Add intervals of one tangent vector that were integrated elsewhere, one row for each interval."""
+        rows = slice(self.completed, self.completed + len(growth))
+        self._growth[rows, 0], self._impacts[rows], self._motions[rows] = growth, impacts, motions
+        self.structure["made"] = rows.stop
 
     @property
     def completed(self) -> int:
@@ -357,7 +416,7 @@ def most_impacts(rate_hz: float, duration_s: float) -> int:
 def native_engine() -> Engine:
     """Return the engine for this processor, loaded and checked with a known scene.
 
-    Raises EngineError when there is no engine or its result is wrong.
+    Raises EngineError when there is no engine, or the engine's result is wrong.
     """
     engine = Engine(library_path())
     check_known_answer(engine)
@@ -365,14 +424,14 @@ def native_engine() -> Engine:
 
 
 def check_known_answer(engine: Engine) -> None:
-    """Raise EngineError if the engine gives a wrong result, for example because it was compiled wrongly."""
+    """Raise EngineError if the engine gives a wrong result, for example after a faulty compilation."""
     specimen, drive = gong2025(contact="hunt_crossley:0.5"), Harmonic(130.0, 20e-6)
     run = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, engine=engine)
     outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
     off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
     if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
         raise EngineError(
-            f"{engine.path} fails its self-test by {off.max():.1e}: rebuild the file, or report this."
+            f"{engine.path} fails its self-test by {off.max():.1e}: rebuild the file, or report this error."
         )
 
 
@@ -458,9 +517,7 @@ class CubicRun(_Run):
 
     def _run(self, drive: Structure, record: RunRecord) -> Outcome:
         code = self._engine.run_cubics(self._tables, self._state, drive, self._tolerance, record.structure)
-        if code < 0:
-            raise ValueError("The native engine refuses the run: start and end must be within its intervals.")
-        return Outcome(code)
+        return outcome_of(code, "the run: start and end must be within its intervals")
 
 
 MAX_IMPACT_RATE_HZ = 200_000.0

@@ -6,14 +6,10 @@ from dataclasses import replace
 from functools import cache
 from threading import Lock
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..specimen.contact_laws import Hertz, LinearGap, NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.modes import ModalForm, bound_motion, harmonic_motion, modal_form
-from ..specimen.specimen import Specimen
-from ..specimen.state import Y, Z
+from ..specimen.specimen import Complex, Specimen, Y, Z
 from .library import Engine, Structure
 from .shapes import (
     ABOUT_MIDDLE,
@@ -36,7 +32,6 @@ from .shapes import (
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
 """Numeric code of each contact law, as in the enum `Law` of native/structures.hpp."""
-Phasors = NDArray[np.complex128]
 
 
 def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
@@ -72,7 +67,7 @@ def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_dam
     fill_specimen(target["specimen"], cell)
     match cell.contact:
         case LinearGap():
-            # In a chain, contacts with linear stops are integrated in time steps, not solved exactly.
+            # In a chain, integrate contacts with linear stops in time steps; there is no exact solution.
             target["specimen"]["law"] = YIELDING
         case PowerLaw() as law:
             _fill_power(target["power"], law)
@@ -100,7 +95,7 @@ def collision_structure(engine: Engine) -> Structure:
 
 
 # The tables of a run point to these structures, so they must never be freed. Without the lock, two threads
-# could both create one at the first call, and the cache would keep one of the two and free the other.
+# could each create a structure at the first call, and the cache would free one of the two.
 _ONE_THREAD = Lock()
 
 
@@ -185,7 +180,7 @@ def _fill_springs(
     try:
         _fill_free(held["motion"], pressed, omega, amplitude_m)
     except ValueError:
-        # Two modes of the motion in contact coincide, so integrate contacts in time steps.
+        # Two modes in contact coincide, so there is no exact solution: integrate contacts in time steps.
         scene["specimen"]["law"] = YIELDING
         return
     steady = held["motion"]["steady"]
@@ -195,7 +190,7 @@ def _fill_springs(
     held["let_go"], held["rests"] = k1 / (k1 + stop), stop / (k1 + stop)
 
 
-def _fill_motion(target: Structure, modes: ModalForm, steady: Phasors) -> None:
+def _fill_motion(target: Structure, modes: ModalForm, steady: Complex) -> None:
     target["modes"] = count = len(modes.rates)
     for name, values in modes._asdict().items():
         target[name][:count] = values

@@ -11,10 +11,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
+from ..specimen.specimen import Floats
 
 POINTS = 16
 """Number of Gauss points in phi, for a duration error of 1e-8 and only rounding errors in the speed."""
@@ -37,11 +35,11 @@ DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
 """Columns of the scalars of a tabulated collision. DEEPER is the ratio of the largest depth to the maximum of
 the polynomial through the points, whose error is 1e-5 in the middle and 1e-8 at the end. Columns from
 LASTS_BY on are derivatives of the duration, in the same order as the derivatives of the depths."""
-PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
-HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
+PHI: Floats = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
+HEIGHTS: Floats = 0.5 * (1.0 - np.cos(PHI))
 
 
-def _cardinal(at: Table, points: Vector) -> Table:
+def _cardinal(at: Floats, points: Floats) -> Floats:
     """Return the Lagrange polynomials of ``points`` at the arguments ``at``, shape (..., points)."""
     others = ~np.eye(len(points), dtype=np.bool_)
     away = np.where(others, at[..., None, None] - points, 1.0)
@@ -49,20 +47,20 @@ def _cardinal(at: Table, points: Vector) -> Table:
     return np.asarray(np.prod(away / apart, axis=-1))
 
 
-def _about_middle() -> Table:
+def _about_middle() -> Floats:
     """Return the matrix that maps depths at the Gauss points to Taylor coefficients about mid-phi."""
     cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
     return np.ascontiguousarray(cardinal[:TERMS].T)
 
 
-ABOUT_MIDDLE: Table = _about_middle()
+ABOUT_MIDDLE: Floats = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
-"""Largest distance of the maximum from mid-phi [rad]. At this distance eight terms have an error of 1e-7; at
+"""Largest distance of the maximum from mid-phi [rad]. At this distance, eight terms have an error of 1e-7; at
 a tenth of this distance, only rounding errors."""
 
 
-def _top_of(terms: Vector) -> float:
+def _top_of(terms: Floats) -> float:
     """Return the maximum of a Taylor polynomial near the centre of expansion."""
     polynomial = np.polynomial.Polynomial(terms)
     slope, bend = polynomial.deriv(), polynomial.deriv(2)
@@ -72,7 +70,7 @@ def _top_of(terms: Vector) -> float:
     return float(polynomial(at))
 
 
-def _shares() -> Table:
+def _shares() -> Floats:
     """Return the integrals of (t_i - t)^m times Lagrange polynomials, shape (TERMS, POINTS, POINTS + 1)."""
     places, weights = np.polynomial.legendre.leggauss(QUADRATURE)
     ends = np.append(PHI, math.pi)
@@ -83,10 +81,10 @@ def _shares() -> Table:
     return np.asarray(np.einsum("miq,iq,iqk->mki", powers, weights, _cardinal(phi, PHI), optimize=True))
 
 
-SHARES: Table = _shares()
+SHARES: Floats = _shares()
 
 
-def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Table]:
+def _misfits(depths: Floats, duration: float, press: float) -> tuple[Floats, Floats]:
     """Return residual and Jacobian of the collision equations, in units of free depth and speed."""
     times = np.append(HEIGHTS, 1.0)
     root = np.sqrt(np.maximum(depths, 0.0))
@@ -101,10 +99,10 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 
 @lru_cache(maxsize=1)
-def collision_shapes() -> tuple[Table, Table]:
-    """Return collisions and their scalars over the press; each solution starts from the previous one."""
+def collision_shapes() -> tuple[Floats, Floats]:
+    """Return collisions and their scalars over the press; each solution starts from the one before."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
-    # At zero press, the scaled duration of a collision is 2.943 and its depth nearly a half sine.
+    # At zero press, the scaled duration of a collision is 2.943, and the depth is nearly a half sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
     for softer in np.linspace(0.0, SOFTEST, SHAPES):
         depths, duration, _ = _solve_collision(depths, duration, float(softer))
@@ -131,14 +129,14 @@ def collision_shapes() -> tuple[Table, Table]:
 
 
 def _deepest(press: float) -> float:
-    """Return the largest depth d, in free depths, from the energy balance d^(5/2) = 1 + 2 press d."""
+    """Return the largest depth d, in units of free depth, from d^(5/2) = 1 + 2 press d (energy balance)."""
     depth = 1.0
     for _ in range(NEWTON_STEPS):
         depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
     return depth
 
 
-def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
+def _solve_collision(depths: Floats, duration: float, press: float) -> tuple[Floats, float, Floats]:
     """Solve a collision by Newton's method to rounding error; return depths, duration and Jacobian."""
     for _ in range(NEWTON_STEPS):
         found, slopes = _misfits(depths, duration, press)
@@ -149,12 +147,12 @@ def _solve_collision(depths: Vector, duration: float, press: float) -> tuple[Vec
     return depths, duration, _misfits(depths, duration, press)[1]
 
 
-# Weights for time steps under power laws, the same for every law and step length. The step is scaled to 0..1.
-# Within a step, the force F is the polynomial through its values at eight Gauss points. All results are
-# linear in these values (docs/decisions/0026-power-laws.md).
+# Weights for time steps under power laws. The weights are the same for every law and step length, because the
+# step is scaled to 0..1. Within a step, the force F is the polynomial through its values at eight Gauss
+# points. All results are linear in these values (docs/decisions/0026-power-laws.md).
 
 GAUSS_POINTS = 8
-"""Number of Gauss points in a time step; ten would cost 50 % more for only 10 % longer steps."""
+"""Number of Gauss points in a time step; ten points would cost 50 % more for only 10 % longer steps."""
 ORDER = 32
 """Number of terms of the series; in the longest step, the next term is 1e-20 of the largest."""
 POWER_QUADRATURE = 24
@@ -163,17 +161,17 @@ COURSE_DEGREE = 5
 """Degree of the polynomial that predicts the force F in a step, fitted to F in the preceding step."""
 END_WEIGHT = 3.0
 """Weight of the force F at the end of the preceding step, in the fit that predicts F."""
-POINTS_AT: Vector = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
+POINTS_AT: Floats = 0.5 * (np.polynomial.legendre.leggauss(GAUSS_POINTS)[0] + 1.0)
 """Gauss points c_i of a time step, on [0, 1]."""
-GAUSS_WEIGHTS: Vector = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
+GAUSS_WEIGHTS: Floats = 0.5 * np.polynomial.legendre.leggauss(GAUSS_POINTS)[1]
 
 
-AT_START: Vector = _cardinal(np.array(0.0), POINTS_AT)
-AT_END: Vector = _cardinal(np.array(1.0), POINTS_AT)
+AT_START: Floats = _cardinal(np.array(0.0), POINTS_AT)
+AT_END: Floats = _cardinal(np.array(1.0), POINTS_AT)
 """Weights by which values at the Gauss points give the polynomial's values at both ends of a step."""
 
 
-def _course() -> Table:
+def _course() -> Floats:
     """Return the matrix that extrapolates F: it maps values at the Gauss points and the end of a step to
     coefficients in powers of (s - 1). Shape (points + 1, points), zero beyond the degree.
     """
@@ -183,10 +181,10 @@ def _course() -> Table:
     return np.ascontiguousarray(np.pad(fit.T, ((0, 0), (0, GAUSS_POINTS - COURSE_DEGREE - 1))))
 
 
-COURSE: Table = _course()
+COURSE: Floats = _course()
 
 
-def _power_shares() -> Table:
+def _power_shares() -> Floats:
     """Return the integrals of (c_i - s)^m times Lagrange polynomials, shape (ORDER, points, points + 1)."""
     places, weights = np.polynomial.legendre.leggauss(POWER_QUADRATURE)
     places, weights = 0.5 * (places + 1.0), 0.5 * weights
@@ -197,18 +195,18 @@ def _power_shares() -> Table:
     return np.ascontiguousarray(whole)
 
 
-POWER_SHARES: Table = _power_shares()
-INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
-"""Times within a step at which the motion is observed: its start, its Gauss points and its end."""
+POWER_SHARES: Floats = _power_shares()
+INSTANTS: Floats = np.concatenate([[0.0], POINTS_AT, [1.0]])
+"""Times within a step at which the motion is observed: start, Gauss points and end of the step."""
 
 
-def _between(places: Vector) -> Table:
+def _between(places: Floats) -> Floats:
     """Return the differences between all pairs of points as a matrix, with 1 on the diagonal."""
     return np.asarray(places[:, None] - places + np.eye(len(places)))
 
 
-POINT_WEIGHTS: Vector = 1.0 / np.prod(_between(POINTS_AT), axis=1)
-INSTANT_WEIGHTS: Vector = 1.0 / np.prod(_between(INSTANTS), axis=1)
+POINT_WEIGHTS: Floats = 1.0 / np.prod(_between(POINTS_AT), axis=1)
+INSTANT_WEIGHTS: Floats = 1.0 / np.prod(_between(INSTANTS), axis=1)
 """Barycentric weights of the interpolation times (Berrut and Trefethen, SIAM Rev. 46 (2004) 501)."""
-INSTANT_SLOPES: Vector = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
+INSTANT_SLOPES: Floats = np.sum(1.0 / _between(INSTANTS), axis=1) - 1.0
 """Derivative of each Lagrange polynomial at its own node, shape of ``INSTANTS``."""

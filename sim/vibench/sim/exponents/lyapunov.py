@@ -7,38 +7,41 @@ intervals. Chaos that ends during the run is reported separately.
 """
 
 import math
+import sys
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..engine.run import MAX_IMPACT_RATE_HZ
-from ..motion.poincare import flow_derivative
-from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ, Accuracy, AccuracyWord, Outcome
+from ..periodic.shooting import FLOW_ERROR, flow_derivative
 from ..specimen.drive import Harmonic
 from ..specimen.modes import modal_form
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen, state_scales
 from ..specimen.stops import member
 from .tangent_run import (
     ALIGNING,
     ALMOST,
+    FEWEST_INTERVALS,
     SURE,
     BlockedMean,
     FinalMotion,
     Interval,
     Settling,
+    TangentCourse,
     TangentRun,
     block_mean,
     interval_for,
-    run_with_tangent,
     settling,
 )
 
-FEWEST_INTERVALS = 32
-"""Smallest number of intervals from which the error of the mean growth rate is estimated."""
+FARTHEST = 2.0
+"""Largest ratio of standard error to allowed error that is used to predict the length of a run."""
+NEWTON_STEPS = 3
+"""Number of Newton steps from the end of a run to its periodic motion."""
+RESOLVED_PER_S = 1e-2
+"""Largest error of an exponent from Floquet multipliers [1/s]; a larger error is not reliable."""
 
 
 class ExponentVerdict(StrEnum):
@@ -82,13 +85,15 @@ class Precision:
         if not (self.absolute_per_s >= 0.0 and self.relative >= 0.0):
             raise ValueError(f"Precision {self} is not allowed: give zero or positive numbers.")
 
-    def is_reached_by(self, exponents: Floats) -> bool:
-        """Return whether the mean of local exponents, shape (n,), has the required precision."""
-        if len(exponents) < FEWEST_INTERVALS:
-            return False
+    def count_for(self, exponents: Floats) -> float:
+        """Return about how many local exponents the mean needs; at most n for n that suffice, shape (n,)."""
+        count = len(exponents)
+        if count < FEWEST_INTERVALS:
+            return FEWEST_INTERVALS
         found = block_mean(exponents)
-        allowed = max(self.absolute_per_s, self.relative * abs(found.mean))
-        return found.is_long_enough and found.standard_error <= allowed
+        allowed = max(self.absolute_per_s, self.relative * abs(found.mean), sys.float_info.min)
+        ratio = min(found.standard_error / allowed, FARTHEST) if found.is_long_enough else FARTHEST
+        return count * ratio**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +104,7 @@ class LyapunovEstimate:
     accuracy: Accuracy
     exponent_per_s: float
     standard_error_per_s: float
-    """Standard error [1/s]; for Floquet multipliers half the difference of two cycles, for modes 0."""
+    """Standard error [1/s]: numerical error with multipliers, zero with modes."""
     verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
@@ -140,8 +145,8 @@ def lyapunov_exponent(
     """Return the largest Lyapunov exponent, the rate at which neighbouring motions separate.
 
     During ``settle_s`` the motion approaches its attractor. Growth is averaged over the following
-    ``duration_s``, or only over the final motion if that differs in kind. The defaults add up to the paper's
-    30 s from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
+    ``duration_s``, or only over the final motion if the kind of motion changes. The defaults add up to the
+    paper's 30 s from rest. Raises ValueError when an argument is not allowed, or for fewer than 32 intervals.
 
     Parameters
     ----------
@@ -150,61 +155,106 @@ def lyapunov_exponent(
     accuracy
         Accuracy of the motion. The exponent of a chaotic motion agrees at all levels within its error.
     duration_s, settle_s
-        Averaging time, and time before it for settling [s].
+        Averaging time, and the preceding settling time [s].
     initial_state
         x, y, z, vx, vy, vz, shape (6,); None for rest. The final motion may depend on it.
     interval_s
-        Approximate length of an interval [s]; None for two cycles of the slowest mode.
+        Approximate length of an interval [s]; None for 1.73 cycles of the slowest mode.
     precision
-        Required precision; the run ends when it is reached. None uses the whole duration, which also
-        detects chaos that ends late.
+        Required precision; the run ends when this precision is reached. None uses the whole duration, which
+        also detects chaos that ends late.
     max_impact_rate_hz
         As in `vibench.sim.motion.integrate`.
     """
-    accuracy = member(Accuracy, accuracy)
-    interval = interval_for(specimen, drive, interval_s)
-    skipped = intervals_to_skip(interval, duration_s, settle_s)
-
-    def is_enough(growth: Floats) -> bool:
-        settled = growth[skipped:, 0] / interval.length_s
-        return precision is not None and precision.is_reached_by(settled)
-
-    run = run_with_tangent(
-        specimen,
-        drive,
-        1,
-        settle_s + duration_s,
-        interval,
-        accuracy,
-        initial_state,
-        max_impact_rate_hz,
-        None if precision is None else is_enough,
+    exponent = ExponentRun(
+        *(specimen, drive, member(Accuracy, accuracy), duration_s, settle_s, initial_state),
+        *(interval_s, precision, max_impact_rate_hz),
     )
-    if run.outcome is not Outcome.REACHED_END:
-        return _estimate(drive, accuracy, run, Settling(FinalMotion.THROUGHOUT, 0), _LOST)
-    end = settling(run, state_scales(specimen, drive))
-    return _estimate(drive, accuracy, run, end, _exponent(specimen, drive, run, end, skipped))
+    exponent.course.follow()
+    return exponent.estimate()
+
+
+class ExponentRun:
+    """Run that determines the largest Lyapunov exponent; the arguments are those of `lyapunov_exponent`."""
+
+    def __init__(
+        self,
+        specimen: Specimen,
+        drive: Harmonic,
+        accuracy: Accuracy,
+        duration_s: float,
+        settle_s: float,
+        initial_state: ArrayLike | None,
+        interval_s: float | None = None,
+        precision: Precision | None = None,
+        max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
+    ) -> None:
+        self._specimen, self._drive, self._accuracy = specimen, drive, accuracy
+        interval = interval_for(specimen, drive, interval_s)
+        self._skipped = skipped = intervals_to_skip(interval, duration_s, settle_s)
+
+        def needed(growth: Floats) -> float:
+            rates = growth[skipped:, 0] / interval.length_s
+            return skipped + (0.0 if precision is None else precision.count_for(rates))
+
+        self.course = TangentCourse(
+            *(specimen, drive, 1, settle_s + duration_s, interval, accuracy, initial_state),
+            *(max_impact_rate_hz, None if precision is None else needed),
+        )
+        """The motion with its tangent vector, to be integrated before `estimate`."""
+
+    def estimate(self) -> LyapunovEstimate:
+        """Return the exponent of the integrated motion."""
+        specimen, drive = self._specimen, self._drive
+        run = self.course.result()
+        end, taken = Settling(FinalMotion.THROUGHOUT, 0), _LOST
+        if run.outcome is Outcome.REACHED_END:
+            end = settling(run, state_scales(specimen, drive))
+            taken = _exponent(specimen, drive, run, end, self._skipped)
+        length = run.interval.length_s
+        since = max(taken.since, end.since)
+        lasting = (len(run.growth) - since) * length
+        return LyapunovEstimate(
+            drive=drive,
+            accuracy=self._accuracy,
+            exponent_per_s=taken.mean,
+            standard_error_per_s=taken.error,
+            verdict=_verdict(taken, lasting),
+            source=taken.source,
+            motion=end.motion,
+            since_s=since * length,
+            blocks=taken.blocks,
+            interval_s=length,
+            local_time_s=length * np.arange(1.0, len(run.growth) + 1.0),
+            local_exponents_per_s=run.rates[:, 0],
+            transient=_transient(run, end),
+            impacts=run.total_impacts,
+            impact_rate_hz=float(run.impacts[since:].sum()) / lasting if lasting > 0.0 else 0.0,
+            final_state=run.final_state,
+            end_time_s=run.end_time_s,
+            outcome=run.outcome,
+        )
 
 
 def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) -> int:
     """Return the number of intervals for settling; raise ValueError if too few are left for the average."""
     if not 0.0 < duration_s < math.inf or not 0.0 <= settle_s < math.inf:
         raise ValueError(
-            f"Duration {duration_s} s after {settle_s} s of settling: both must be finite, the first > 0."
+            f"Duration {duration_s} s after {settle_s} s of settling: both must be finite, the duration > 0."
         )
     skipped = max(ALIGNING, math.ceil(settle_s / interval.length_s - ALMOST))
     left = interval.count_in(settle_s + duration_s) - skipped
     if left < FEWEST_INTERVALS:
         raise ValueError(
-            f"Duration {duration_s} s contains {max(left, 0)} intervals of {interval.length_s} s: "
-            f"request {FEWEST_INTERVALS} or more, by a longer duration or a shorter interval."
+            f"Duration {duration_s} s contains {max(left, 0)} intervals of {interval.length_s} s: request "
+            f"{FEWEST_INTERVALS} intervals or more, by a longer duration or a shorter interval."
         )
     return skipped
 
 
 @dataclass(frozen=True)
 class _Exponent:
-    """Lyapunov exponent and its error [1/s], with the method that determined them."""
+    """Lyapunov exponent and error [1/s], with the method that determined both."""
 
     mean: float
     error: float
@@ -224,72 +274,67 @@ def _exponent(specimen: Specimen, drive: Harmonic, run: TangentRun, end: Settlin
             slowest = float(np.max(modal_form(specimen).rates.real))
             return _Exponent(slowest, 0.0, Source.MODES, end.since)
         case FinalMotion.PERIODIC:
-            mean, error = _from_multipliers(specimen, drive, run, end.cycle)
-            return _Exponent(mean, error, Source.MULTIPLIERS, end.since)
-        case FinalMotion.SETTLED | FinalMotion.THROUGHOUT:
-            since = max(skipped, end.since)
-            blocks = block_mean(run.rates[since:, 0])
-            return _Exponent(blocks.mean, blocks.standard_error, Source.AVERAGE, since, blocks)
+            length_s = end.cycle * run.interval.length_s
+            exact, off = exponents_of_cycle(specimen, drive, run.section[-1], length_s)
+            if off[0] < RESOLVED_PER_S:
+                return _Exponent(float(exact[0]), float(off[0]), Source.MULTIPLIERS, end.since)
+    since = max(skipped, end.since)
+    blocks = block_mean(run.rates[since:, 0])
+    return _Exponent(blocks.mean, blocks.standard_error, Source.AVERAGE, since, blocks)
 
 
-def _from_multipliers(
-    specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
-) -> tuple[float, float]:
-    """Return a periodic motion's exponent (mean of two cycles) and error (half their difference) [1/s]."""
-    from ..periodic.floquet import multipliers  # noqa: PLC0415 - imports scipy, and is rarely needed
-
-    length, state, found = cycle * run.interval.length_s, run.section[-1], []
-    for _ in range(2):
-        state, derivative = flow_derivative(specimen, drive, state, length)
-        found.append(math.log(float(np.abs(multipliers(derivative)[0]))) / length)
-    return 0.5 * (found[0] + found[1]), 0.5 * abs(found[0] - found[1])
+_UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
-def _estimate(
-    drive: Harmonic, accuracy: Accuracy, run: TangentRun, end: Settling, taken: _Exponent
-) -> LyapunovEstimate:
-    length = run.interval.length_s
-    since = max(taken.since, end.since)
-    lasting = (len(run.growth) - since) * length
-    return LyapunovEstimate(
-        drive=drive,
-        accuracy=accuracy,
-        exponent_per_s=taken.mean,
-        standard_error_per_s=taken.error,
-        verdict=_verdict(taken),
-        source=taken.source,
-        motion=end.motion,
-        since_s=since * length,
-        blocks=taken.blocks,
-        interval_s=length,
-        local_time_s=length * np.arange(1.0, len(run.growth) + 1.0),
-        local_exponents_per_s=run.rates[:, 0],
-        transient=_transient(run, end),
-        impacts=len(run.impact_times_s),
-        impact_rate_hz=float(run.impacts[since:].sum()) / lasting if lasting > 0.0 else 0.0,
-        final_state=run.final_state,
-        end_time_s=run.end_time_s,
-        outcome=run.outcome,
-    )
+def exponents_of_cycle(
+    specimen: Specimen, drive: Harmonic, state: Floats, length_s: float
+) -> tuple[Floats, Floats]:
+    """Return all exponents of the periodic motion near a state, descending, and their errors [1/s].
+
+    The error is the change in the last Newton step plus the effect of the integration error, which is large
+    for multipliers that are close together or small.
+    """
+    scales, found, error = state_scales(specimen, drive), _UNKNOWN, _UNKNOWN
+    for _ in range(NEWTON_STEPS):
+        after, derivative = flow_derivative(specimen, drive, state, length_s)
+        if not bool(np.all(np.isfinite(derivative))):
+            return _UNKNOWN, _UNKNOWN
+        scaled = derivative * scales / scales[:, None]
+        values, vectors = np.linalg.eig(scaled)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a multiplier may be zero
+            lengths = np.linalg.norm(np.linalg.pinv(vectors, rcond=0.0), axis=1)
+            condition = np.linalg.norm(scaled, 2) * lengths / np.abs(values)
+            order = np.argsort(-np.abs(values))
+            before, found = found, np.log(np.abs(values[order])) / length_s
+            error = np.abs(found - before) + FLOW_ERROR * condition[order] / length_s
+        step = np.linalg.lstsq(scaled - np.eye(DIRECTIONS), (after - state) / scales)[0]
+        state = state - scales * step
+    return found, error
 
 
-def verdict_of(mean: float, error: float) -> ExponentVerdict:
-    """Return the verdict on the sign of an exponent, given its standard error [1/s]."""
+def verdict_of(mean: float, error: float, observed_s: float = math.inf) -> ExponentVerdict:
+    """Return the verdict on the sign of an exponent, given its standard error [1/s].
+
+    The sign is not known if perturbations change by less than a factor e in the observed time [s]: without
+    damping, for example, they neither grow nor decay, and a mean of finite length differs from zero.
+    """
     if not (math.isfinite(mean) and math.isfinite(error)):
         return ExponentVerdict.UNKNOWN
-    if abs(mean) <= SURE * error:
+    if abs(mean) <= max(SURE * error, 1.0 / observed_s):
         return ExponentVerdict.NEUTRAL
     return ExponentVerdict.CHAOTIC if mean > 0.0 else ExponentVerdict.REGULAR
 
 
-def _verdict(taken: _Exponent) -> ExponentVerdict:
-    if taken.blocks is not None and not taken.blocks.is_long_enough:
+def _verdict(taken: _Exponent, lasting_s: float) -> ExponentVerdict:
+    if taken.blocks is None:
+        return verdict_of(taken.mean, taken.error)
+    if not taken.blocks.is_long_enough:
         return ExponentVerdict.UNKNOWN
-    return verdict_of(taken.mean, taken.error)
+    return verdict_of(taken.mean, taken.error, lasting_s)
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
-    """Return the transient chaos before the final motion; None if there was none."""
+    """Return the transient chaos before the final motion; None if there was no chaos."""
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None

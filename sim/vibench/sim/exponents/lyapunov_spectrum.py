@@ -1,6 +1,6 @@
 """All six Lyapunov exponents of a specimen under a harmonic drive, and Kaplan-Yorke dimension. SI units.
 
-Six tangent vectors span all directions of the state. They are propagated together and orthogonalised
+Six tangent vectors span all directions of the state. These vectors are propagated together and orthogonalised
 repeatedly; their growth rates are the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9).
 The sum of the exponents is the mean rate of change of the logarithm of a volume in state space. For every
 elastic law and any motion this rate must be -tr(M^-1 C), which the tests check.
@@ -14,22 +14,26 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ
-from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ, Accuracy, AccuracyWord, Outcome
 from ..specimen.drive import Harmonic
 from ..specimen.modes import state_matrix
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen, state_scales
 from ..specimen.stops import member
-from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
+from .lyapunov import (
+    RESOLVED_PER_S,
+    ExponentVerdict,
+    Source,
+    exponents_of_cycle,
+    intervals_to_skip,
+    verdict_of,
+)
 from .tangent_run import (
     BlockedMean,
     FinalMotion,
+    TangentCourse,
     TangentRun,
     block_mean,
     interval_for,
-    run_with_tangent,
     settling,
 )
 
@@ -43,7 +47,8 @@ class LyapunovSpectrum:
     exponents_per_s: Floats
     """Exponents, largest first, shape (6,) [1/s]; -inf for directions lost while m1 sticks to a stop."""
     standard_errors_per_s: Floats
-    """Standard errors of the exponents, shape (6,) [1/s]; zero if the exponents are modal decay rates."""
+    """Standard errors of the exponents, shape (6,) [1/s]; numerical errors for Floquet multipliers, zero for
+    modal decay rates."""
     blocks: NDArray[np.int64]
     """Number of independent blocks from which each standard error is estimated, shape (6,)."""
     verdict: ExponentVerdict
@@ -56,7 +61,7 @@ class LyapunovSpectrum:
     impact_rate_hz: float
     """Mean impact rate of m1 in the final motion [1/s]."""
     dimension_standard_error: float
-    """Standard error of `dimension`, from the correlated errors of the exponents; 0 for a whole dimension."""
+    """Standard error of `dimension`, from the correlated errors of the exponents; 0 if it is an integer."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
@@ -68,7 +73,7 @@ class LyapunovSpectrum:
 
     @property
     def dimension(self) -> float:
-        """Kaplan-Yorke dimension of the attractor in the stroboscopic section; 1 less than in the flow."""
+        """Kaplan-Yorke dimension of the attractor in the stroboscopic section, 1 lower than in the flow."""
         return kaplan_yorke(self.exponents_per_s)
 
     def intervals_per_s(self, confidence: float = 0.95) -> Floats:
@@ -106,7 +111,7 @@ def lyapunov_spectrum(
     accuracy = member(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
-    run = run_with_tangent(
+    course = TangentCourse(
         specimen,
         drive,
         DIRECTIONS,
@@ -116,24 +121,19 @@ def lyapunov_spectrum(
         initial_state,
         max_impact_rate_hz,
     )
+    course.follow()
+    run = course.result()
     length = interval.length_s
     is_whole = run.outcome is Outcome.REACHED_END
-    parts = _exponents_of_run(specimen, drive, run, skipped) if is_whole else _RunExponents()
-    since = parts.since
+    since, found = _exponents_of_run(specimen, drive, run, skipped) if is_whole else (0, _RunExponents())
     lasting = (len(run.growth) - since) * length
     return LyapunovSpectrum(
         drive=drive,
         accuracy=accuracy,
-        exponents_per_s=parts.exponents,
-        standard_errors_per_s=parts.errors,
-        blocks=parts.blocks,
-        verdict=parts.verdict,
-        source=parts.source,
-        motion=parts.motion,
+        **found._asdict(),
         since_s=since * length,
-        impacts=len(run.impact_times_s),
+        impacts=run.total_impacts,
         impact_rate_hz=float(run.impacts[since:].sum()) / lasting if lasting > 0.0 else 0.0,
-        dimension_standard_error=parts.dimension_error,
         final_state=run.final_state,
         end_time_s=run.end_time_s,
         outcome=run.outcome,
@@ -145,48 +145,53 @@ UNKNOWN = np.full(DIRECTIONS, math.nan)
 
 
 class _RunExponents(NamedTuple):
-    """Lyapunov exponents of a run; the default values describe a run that did not reach its end."""
+    """Fields of `LyapunovSpectrum`; the default values describe a run that did not reach its end."""
 
-    exponents: Floats = UNKNOWN
-    errors: Floats = UNKNOWN
+    exponents_per_s: Floats = UNKNOWN
+    standard_errors_per_s: Floats = UNKNOWN
     blocks: NDArray[np.int64] = ONE_BLOCK
-    dimension_error: float = math.nan
+    dimension_standard_error: float = math.nan
     verdict: ExponentVerdict = ExponentVerdict.UNKNOWN
     source: Source = Source.AVERAGE
     motion: FinalMotion = FinalMotion.THROUGHOUT
-    since: int = 0
 
 
-def _exponents_of_run(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _RunExponents:
+def _exponents_of_run(
+    specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int
+) -> tuple[int, _RunExponents]:
+    """Return the number of intervals before the averaging, and the exponents."""
     end = settling(run, state_scales(specimen, drive))
     if end.motion is FinalMotion.QUIET:
         system, _ = state_matrix(specimen)
-        decays = np.sort(np.linalg.eigvals(system).real)[::-1]
-        verdict = verdict_of(float(decays[0]), 0.0)
-        return _RunExponents(
-            decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
-        )
-    # A motion that settles late leaves little time to average. Use at least the second half of the run.
+        rates = np.linalg.eigvals(system)
+        decays = np.sort(rates.real)[::-1]
+        verdict = verdict_of(float(decays[0]), float(np.finfo(np.float64).eps * np.abs(rates).max()))
+        errors = np.zeros(DIRECTIONS)
+        return end.since, _RunExponents(decays, errors, ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion)
+    # If a motion settles late, little time is left to average: use at least the second half of the run.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]
     means = [_mean(each) for each in rates.T]
     order = np.argsort([-each.mean for each in means], kind="stable")
     exponents = np.array([means[k].mean for k in order])
     errors = np.array([means[k].standard_error for k in order])
-    return _RunExponents(
-        exponents,
-        errors,
-        np.array([means[k].blocks for k in order], dtype=np.int64),
-        _dimension_error(rates[:, order], exponents),
-        verdict_of(float(exponents[0]), float(errors[0])),
-        Source.AVERAGE,
-        end.motion,
-        since,
-    )
+    blocks = np.array([means[k].blocks for k in order], dtype=np.int64)
+    dimension_error = _dimension_error(rates[:, order], exponents)
+    source, observed_s = Source.AVERAGE, len(rates) * run.interval.length_s
+    if end.motion is FinalMotion.PERIODIC:
+        exact, off = exponents_of_cycle(specimen, drive, run.section[-1], end.cycle * run.interval.length_s)
+        # A strongly damped direction, or one lost in contact, has only a mean.
+        known = off < RESOLVED_PER_S
+        exponents, errors = np.where(known, exact, exponents), np.where(known, off, errors)
+        blocks = np.where(known, 1, blocks)
+        if known[0]:
+            source, observed_s = Source.MULTIPLIERS, math.inf
+    verdict = verdict_of(float(exponents[0]), float(errors[0]), observed_s)
+    return since, _RunExponents(exponents, errors, blocks, dimension_error, verdict, source, end.motion)
 
 
 def _mean(rates: Floats) -> BlockedMean:
-    """Return the mean of local exponents with its standard error; -inf for a direction lost in contact."""
+    """Return the mean and standard error of local exponents; -inf for a direction lost in contact."""
     if not bool(np.all(np.isfinite(rates))):
         return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
     return block_mean(rates)
@@ -208,8 +213,8 @@ def _dimension_error(rates: Floats, exponents: Floats) -> float:
 def kaplan_yorke(exponents: Floats) -> float:
     """Return the Kaplan-Yorke dimension from exponents in descending order.
 
-    It is j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative, or the number of
-    exponents if no sum is negative (Kaplan and Yorke, Lecture Notes in Mathematics 730 (1979) 204).
+    The dimension is j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative, or the
+    number of exponents if no sum is negative (Kaplan and Yorke, Lecture Notes in Mathematics 730 (1979) 204).
     """
     sums = np.cumsum(exponents)
     kept = int(np.count_nonzero(np.cumprod(sums >= 0.0)))

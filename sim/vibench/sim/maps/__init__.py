@@ -1,8 +1,8 @@
 """Maps of motions: over two parameters, over two coordinates of the initial state, or along one quantity.
 
 A map is a plan as in `vibench.sim.study`; each point is a settled motion with its kind, period, responses and
-impacts. Points on a coarse lattice are computed first, then points whose neighbours differ. All others are
-filled in by interpolation; a random sample of them is computed to estimate their error rate (docs/maps.md).
+impacts. Points on a coarse lattice are computed first, then points whose neighbours differ. All other points
+are filled in by interpolation; a random sample is computed to estimate the error rate (docs/maps.md).
 
 >>> from vibench.sim.maps import Map, Range, solve_map
 >>> plan = Map(

@@ -1,21 +1,21 @@
-"""Analysis of basins of attraction: fractal dimension of their boundaries, and stability under kicks."""
+"""Analysis of basins of attraction: fractal dimension of the boundaries, and stability under kicks."""
 
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from ..engine.run import Outcome, refuse_inside_a_stop
 from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.scene import Given, Scene
 from ..scene.shares import Share, wilson_share
 from ..scene.solve import settle_scene
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import state_scales
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, state_scales
 from ..study import InvalidStudy
 from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults
@@ -27,8 +27,10 @@ FEWEST_UNCERTAIN = 100
 """Smallest number of uncertain initial states at each distance that the fit uses."""
 MOST_UNCERTAIN = 0.5
 """Largest share of uncertain initial states at each distance that the fit uses."""
+MOST_DRAWS = 100
+"""Largest number of draws for each kick that does not move m1 beyond a rigid stop."""
 SPREAD = 4.0
-"""Smallest ratio of the largest to the smallest distance of a fit; below it the slope is not reliable."""
+"""Smallest ratio of the largest to the smallest distance of a fit; below this, the slope is unreliable."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ def uncertainty_exponent(numbers: NDArray[np.int64]) -> UncertaintyExponent | No
     """Return the uncertainty exponent of the basin boundaries in a map over two initial coordinates.
 
     An initial state is uncertain at a distance if a step of this size along an axis leads to another motion.
-    The confidence interval is a jackknife estimate over parts of the map. Returns None unless at least three
-    distances each have 100 or more uncertain initial states, and these are at most half of all.
+    The confidence interval is a jackknife estimate over parts of the map. Returns None unless, at three or
+    more distances, at least 100 and at most half of the initial states are uncertain.
 
     Parameters
     ----------
@@ -124,7 +126,8 @@ def kick_stability(
 ) -> tuple[KickStability, ...]:
     """Return how often each motion of a basin map returns after random kicks (basin stability).
 
-    Raises InvalidStudy when drive or specimen vary in the map, or the number of kicks is below 1.
+    Raises InvalidStudy when drive or specimen vary in the map, when the specimen is undamped, or when the
+    number of kicks is below 1. A kick that moves m1 beyond a rigid stop is drawn again.
 
     Parameters
     ----------
@@ -140,8 +143,7 @@ def kick_stability(
     """
     if kicks < 1:
         raise InvalidStudy(f"{kicks} kicks were requested; give 1 or more.")
-    if not results.plan.is_basin:
-        raise InvalidStudy("kicks need a map that varies only the start; this map varies drive or specimen.")
+    results.plan.require_kicks_allowed()
     found = []
     with ThreadPoolExecutor(workers) as pool:
         for number, motion in enumerate(results.motions):
@@ -160,10 +162,17 @@ def _kick_scenes(results: MapResults, point: int, size: float, kicks: int, seed:
     )
     state: Floats = results.arrays["final_state"][point].astype(np.float64)
     rng = np.random.default_rng([seed, point])
-    drawn = state + size * state_scales(scene.specimen, scene.drive) * rng.standard_normal((kicks, 6))
-    return [
-        replace(scene, start=Given((x, y, z, vx, vy, vz), "kicked")) for x, y, z, vx, vy, vz in drawn.tolist()
-    ]
+    scale = size * state_scales(scene.specimen, scene.drive)
+    kicked: list[Scene] = []
+    for _ in range(MOST_DRAWS * kicks):
+        x, y, z, vx, vy, vz = (state + scale * rng.standard_normal(6)).tolist()
+        start = Given((x, y, z, vx, vy, vz), "kicked")
+        with suppress(ValueError):
+            refuse_inside_a_stop(np.array(start.state), scene.specimen)
+            kicked.append(replace(scene, start=start))
+        if len(kicked) == kicks:
+            return kicked
+    raise InvalidStudy(f"kicks of {size:g} gaps move m1 beyond the rigid stops; give smaller kicks.")
 
 
 def _is_same(motion: MapMotion, found: ScenePrediction) -> bool:

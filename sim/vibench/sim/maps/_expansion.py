@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
+from ..engine.run import Outcome
 from ..scene.cost import pilot_cost_s
 from ..scene.prediction import MotionKind, state_of
 from ..scene.refinement import LONGEST_S
 from ..scene.scene import Given, Scene
 from ..scene.solve import InBatches, Question, SolvedScene, settle_scene, solve_scene
-from ..specimen.outcome import Outcome
 from ..study import (
     NUMBERS,
     Arrays,
@@ -31,7 +31,7 @@ from ._refinement import ComparedCells, RefinementPlan, lattice, plan_refinement
 JUMP = 0.1
 """Relative difference of two neighbouring responses above which the points between them are computed."""
 BASIN_JUMP = 2e-3
-"""Replaces `JUMP` if only the initial state varies; values of one motion then differ only by transients."""
+"""Replaces `JUMP` if only the start varies; values of the same motion then differ only by transients."""
 NOTHING = -1
 BUNDLE_S = 0.3
 """Computing time of the scenes that a worker receives at once [s]; long enough to fill SIMD batches."""
@@ -57,7 +57,7 @@ class MapPoints(Points):
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
-        # Refuse random starts together with given starts here, not in `Map`: older files may have both.
+        # Refuse random starts with given starts here, not in `Map`, because older files may have both.
         of_start = [each.field for each in plan.varying if each in START]
         if plan.random_starts and of_start:
             raise InvalidStudy(
@@ -167,7 +167,7 @@ POINT_S = 2e-4
 
 @dataclass(frozen=True)
 class MapEstimate:
-    """Estimated computing time of a map; for an adaptive map two bounds: first lattice, and all points."""
+    """Estimated computing time of a map; if adaptive, bounds from the first lattice and from all points."""
 
     points: int
     coarse_points: int
@@ -202,7 +202,7 @@ class MapEstimate:
 
     @property
     def most_useful_workers(self) -> int:
-        """Largest useful number of workers; further workers would wait for the main process."""
+        """Largest useful number of workers; additional workers would wait for the main process."""
         return max(1, min(self.points, math.floor(self.work_s / (self.points * POINT_S))))
 
     def _elapsed_s(self, points: int, work_s: float) -> float:
@@ -214,7 +214,7 @@ class MapEstimate:
         """Estimated computing time of the map as text."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture. Estimated "
-            f"work: {self.work_s:.2g} s on one core, from {self.known_from}. With "
+            f"work: {self.work_s:.2g} s on one core, based on {self.known_from}. With "
             f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, all points after "
             f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats; "
             f"more than {self.most_useful_workers} workers do not help. The file takes "

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
+from ..engine.run import Accuracy
 from ..scene.prediction import MotionKind, ScenePrediction, state_of
 from ..scene.scene import BUDGET_S, AutomaticDuration, Given, Observable, Rest, Scene, Target
-from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.frozen_model import FrozenModel
+from ..specimen.modes import modal_form
 from ..specimen.specimen import Specimen, Triple
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..study import (
@@ -25,6 +26,7 @@ from ..study import (
     Cell,
     Column,
     GridPlan,
+    InvalidStudy,
     Start,
     StudyAxis,
     TargetError,
@@ -52,7 +54,7 @@ KEPT = (
 )
 """Columns of a study that are also columns of a map."""
 ERRORS = ("response_i_error", "response_ii_error", "relative_i_error", "relative_ii_error", "error_estimate")
-"""Additional columns of a map with a requested error or computing time."""
+"""Additional columns of a map with a target error or computing time."""
 MESSAGE_BYTES = 100
 ENERGY = Column("contact_energy", "<f8", "J", "largest energy that a stop has stored during the motion")
 SECTION_STATES = 64
@@ -156,7 +158,7 @@ QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)
 
 
 MOST_POINTS = 4_000_000
-"""Largest number of points of a map; file and memory then take 1 GB each."""
+"""Largest number of points of a map; such a map takes 1 GB on the disk and 1 GB of memory."""
 MOST_STEP = 16
 """Largest default spacing of the first lattice, in grid steps."""
 FEWEST_STEPS = 8
@@ -193,7 +195,7 @@ class Range(FrozenModel):
         if not is_ascending:
             raise ValueError(
                 f"{self.points} points from {self.start!r} to {self.stop!r} are not all different numbers; "
-                "give fewer points, or a range that is neither so narrow nor so wide"
+                "give fewer points, or another range (this range is too narrow or too wide)"
             )
         return self
 
@@ -275,7 +277,7 @@ class Map(GridPlan):
     accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy level of each point."""
     error: TargetError | None = None
-    """Requested relative error of each point, such as 0.01 or "1 %"; replaces the accuracy level."""
+    """Target relative error of each point, such as 0.01 or "1 %"; replaces the accuracy level."""
     time_s: TargetTime | None = None
     """Limit of the computing time per point, such as 2 or "2 s"; one minute if only an error is given."""
     periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
@@ -290,7 +292,7 @@ class Map(GridPlan):
 
     @property
     def target(self) -> Target | None:
-        """Requested error and time of each point; None if neither is given."""
+        """Target error and time of each point; None if neither is given."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @model_validator(mode="after")
@@ -354,6 +356,13 @@ class Map(GridPlan):
         """Whether only the initial state varies over the map."""
         return all(each in START for each in self.varying)
 
+    def require_kicks_allowed(self) -> None:
+        """Raise InvalidStudy if drive or specimen vary, or if no motion attracts its neighbours."""
+        if not self.is_basin:
+            raise InvalidStudy("kicks need a map in which only the initial state varies")
+        if modal_form(self.scene((0,) * len(self.grid.shape)).specimen).rates.real.max() >= 0.0:
+            raise InvalidStudy("kicks need damping: without damping, no motion returns")
+
     @property
     def is_over_drive(self) -> bool:
         """Whether drive frequency and amplitude vary, so that levels of recordings can be overlaid."""
@@ -361,7 +370,7 @@ class Map(GridPlan):
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether points may be interpolated: two varying quantities, and no point continues another."""
+        """Whether points may be interpolated: only if two quantities vary and no point continues another."""
         may_be = self.refinement is Refinement.ADAPTIVE and len(self.varying) == 2 and not self.chain
         return may_be and self.first_step > 1
 
@@ -462,7 +471,7 @@ def _specimen(
     stiffnesses: tuple[float | None, ...],
     hertz_stiffness: float | None,
 ) -> Specimen:
-    """Return the specimen with these values, built once for all points that share it."""
+    """Return the specimen with these values, built once for all points with the same values."""
     changes: dict[str, object] = {}
     if any(each is not None for each in stiffnesses):
         k0, k1, k2 = (

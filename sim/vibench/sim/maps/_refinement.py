@@ -1,7 +1,7 @@
 """Selection of the computed cells of a map: a coarse lattice first, then cells whose neighbours differ.
 
-The selection depends only on the known results. It is repeated from the coarse lattice whenever all
-requested cells are done. A resumed map therefore computes the same cells as an uninterrupted one.
+The selection depends only on the known results. The selection is repeated from the coarse lattice whenever
+all requested cells are done. A resumed map therefore computes the same cells as an uninterrupted one.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats
 
 Mask = NDArray[np.bool_]
 Codes = NDArray[np.int64]
@@ -36,7 +36,7 @@ class ComparedCells:
 
 @dataclass(frozen=True, eq=False)
 class Filling:
-    """Filled-in cells of one lattice level, with the cells and weights from which they are interpolated."""
+    """Filled-in cells of one lattice level, with the cells and weights for their interpolation."""
 
     cells: Indices
     """Flat indices of the filled-in cells, shape (n,)."""
@@ -138,7 +138,7 @@ class _Sketch:
             if missing.any():
                 return missing
             self.compute(wanted)
-            # Compute filled-in cells beside another motion: its region may be narrower than the lattice.
+            # Compute filled-in cells beside another motion, because the lattice may be too coarse.
             beside = self._has_other_neighbour(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
             if not beside.any():
                 return missing
@@ -198,7 +198,7 @@ def _lines(length: int, step: int) -> Indices:
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Return whether each cell is in a lattice row and column: every ``step``-th, and the last one."""
+    """Return whether each cell is in a lattice row and column: every ``step``-th one, and the last one."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found
@@ -221,7 +221,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
 
 
 def _neighbours(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
-    """Return the lattice lines below and above each index, and the index's position between them (0 to 1)."""
+    """Return the lattice lines below and above each index, and its position between these lines (0 to 1)."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]
     low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])

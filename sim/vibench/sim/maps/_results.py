@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..scene.prediction import MotionKind
 from ..scene.shares import UNSURE, Count, Share, shares_of, wilson_share
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats
 from ..study import GridResults, PointState, read_arrays, read_plan, read_sessions
 from ._expansion import BASIN_JUMP, cell_codes, refinement_of
 from ._map import Map, labels_of, without_impacts
@@ -47,13 +47,13 @@ class Audit:
     wrong: int
     """Number of audited cells whose filled-in motion was wrong."""
     gained: tuple[float, ...]
-    """Number of wrong audited cells per computed motion; may be a fraction with several initial states."""
+    """Number of wrong audited cells for each computed motion; fractional with several initial states."""
     lost: tuple[float, ...]
     """Number of wrong audited cells for each filled-in motion."""
 
     @property
     def wrong_share(self) -> Share:
-        """Share of filled-in cells that are wrong, with its 95 % confidence interval."""
+        """Share of filled-in cells that are wrong, with the 95 % confidence interval of the share."""
         if not self.audited:
             return Share(0.0, 0.0, 1.0 if self.filled else 0.0)
         return wilson_share(self.wrong, self.audited)
@@ -61,8 +61,8 @@ class Audit:
     def corrected_shares(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
         """Return the shares of the motions in a map with ``cells`` cells, corrected for filling errors.
 
-        Where motions are finely mixed, the most common one is filled in too often. The gains and losses found
-        by the audit are extrapolated to all filled-in cells.
+        Where motions are finely mixed, the most common motion is filled in too often. The gains and losses
+        found by the audit are extrapolated to all filled-in cells.
         """
         if not self.filled:
             return tuple(shares)
@@ -70,7 +70,7 @@ class Audit:
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            # Without audited cells, nothing is known about errors of the filled-in cells.
+            # If no filled-in cell was audited, nothing is known about errors of filled-in cells.
             come, gone = (
                 wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
                 for each in (gained, lost)
@@ -187,13 +187,13 @@ class MapResults(GridResults[Map]):
     @cached_property
     def _labels(self) -> NDArray[np.int64]:
         has_result = np.isin(self.state.reshape(-1), (PointState.DONE, PointState.FILLED))
-        # Points filled in from a failed point have no motion.
+        # A point that was filled in from a failed point has no motion.
         labels = labels_of(self.arrays)
         return np.where(has_result & (labels >= 0), labels, UNKNOWN)
 
     @cached_property
     def _sizes(self) -> Floats:
-        """Natural logarithm of Response I where it is reproducible, otherwise 0."""
+        """Natural logarithm of Response I where Response I is reproducible, otherwise 0."""
         response = np.maximum(self.arrays["response_i"].astype(np.float64), 1e-300)
         is_solid = (self._labels >= 0) & SOLID[self.arrays["motion"].astype(np.int64)]
         return np.where(is_solid, np.log(np.where(np.isfinite(response), response, 1.0)), 0.0)
@@ -237,7 +237,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Renumber motions by how common they are: 0 is the most common one, 1 the next, and so on."""
+    """Renumber motions by how common they are: 0 is the most common motion, 1 the next, and so on."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")

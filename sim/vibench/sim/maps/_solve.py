@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from ..background import Cancelled, Observer
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats
 from ..study import (
     Arrays,
     Executor,
@@ -35,7 +35,7 @@ BETWEEN = (
     "lyapunov",
     "duration",
 )
-"""Columns of a filled-in cell that are interpolated between its corners."""
+"""Columns of a filled-in cell that are interpolated between the corners around the cell."""
 
 
 def solve_map(
@@ -76,7 +76,7 @@ def compute_map(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the missing points of a map until done or ``cancelled``; when done, fill in the others.
+    """Compute the missing points of a map unless ``cancelled``; when all are done, fill in the other points.
 
     The solver of the executor must be `map_solver`.
     """
@@ -100,7 +100,7 @@ def fill_in(plan: Map, store: Store) -> None:
 
 
 def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
-    """Interpolate the filled-in cells of one level between their corners, for each initial state."""
+    """Interpolate the filled-in cells of one level between the cells' corners, for each initial state."""
     cells = points_of(filling.cells, plan.grid)
     starts = plan.grid.shape[-2]
     of_cells = points_of(filling.corners.reshape(-1), plan.grid).reshape(-1, 4, starts)

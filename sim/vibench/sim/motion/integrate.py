@@ -7,19 +7,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import MAX_IMPACT_RATE_HZ, CubicRun, NativeRun, RunRecord, most_impacts, start_motion
-from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..engine.run import (
+    MAX_IMPACT_RATE_HZ,
+    Accuracy,
+    AccuracyWord,
+    CubicRun,
+    NativeRun,
+    Outcome,
+    RunRecord,
+    most_impacts,
+    start_motion,
+)
 from ..specimen.drive import Drive, Harmonic, Sampled, Sweep
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats, Table, Vector
+from ..specimen.specimen import Floats, Specimen
 from ..specimen.stops import member
 
 # Drives: the base displacement as cubic polynomials in time, on equal time intervals. SI units.
 #
 # A sampled drive is defined as the C2 spline through its samples. For a sweep, the cubic matches the sweep's
-# displacement and velocity at both ends of each interval (C1). Its displacement error is at most amplitude
-# (omega h)^4 / 384 at the highest frequency. The chosen interval h makes it at most
+# displacement and velocity at both ends of each interval (C1). The displacement error is then at most
+# amplitude (omega h)^4 / 384 at the highest frequency. The interval h is chosen so that this error is at most
 # a thousandth of the tolerance.
 
 HERMITE = 384.0
@@ -27,7 +34,7 @@ HERMITE = 384.0
 SHARE = 1e-3
 """Largest error of the interpolation of a sweep, relative to the tolerance."""
 SHORTEST_TURN = 0.005
-"""Shortest interval [rad at the highest frequency]; its interpolation error is 2e-12 of the amplitude."""
+"""Shortest interval [rad at the highest frequency], with an interpolation error of 2e-12 of the amplitude."""
 
 
 class BaseMotion(NamedTuple):
@@ -42,7 +49,7 @@ class BaseMotion(NamedTuple):
 def sampled_motion(drive: Sampled) -> BaseMotion:
     """Return the base motion of a sampled drive, with one cubic between successive samples."""
     interval = 1.0 / drive.sample_rate_hz
-    # With the interval as unit of time, the spline's knots are integers and therefore exact.
+    # With the interval as the unit of time, the spline's knots are integers, which are exact.
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 - harmonic drives do without scipy
 
     spline = CubicSpline(np.arange(len(drive.displacement_m), dtype=np.float64), drive.displacement_m)
@@ -74,7 +81,7 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
 LATEST_START_S = 1e8
 """Latest start time [s], about three years; double precision cannot resolve later times to 1e-8 s."""
 MOST_SAMPLES = 1e9
-"""Largest number of samples of a run; they need 48 GB of memory."""
+"""Largest number of samples of a run; this number of samples needs 48 GB of memory."""
 ROUNDING = 1e-9
 """Relative tolerance within which a duration counts as a whole number of samples or intervals."""
 
@@ -160,7 +167,7 @@ def integrate(
     else:
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
-    # Rounding may place the last sample time just after the end of the run.
+    # Because of rounding, the last sample time may lie just after the end of the run.
     states = record.all_samples(run.motion) if is_whole else record.samples
     return Trajectory(
         time_s=start_time_s + np.arange(len(states)) / rate_hz,
@@ -195,13 +202,13 @@ def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | 
         )
     if sample_rate_hz is not None and duration_s * sample_rate_hz > MOST_SAMPLES:
         raise ValueError(
-            f"{duration_s * sample_rate_hz:.3g} samples are not allowed: {MOST_SAMPLES:.1g} at most; "
+            f"{duration_s * sample_rate_hz:.3g} samples are not allowed: give at most {MOST_SAMPLES:.1g}; "
             "lower the sample rate or shorten the run."
         )
 
 
 def check_within(available_s: float, end_s: float) -> None:
-    """Raise ValueError if the run lasts longer than its sweep or sampled drive."""
+    """Raise ValueError if the run lasts longer than the sweep or sampled drive."""
     if end_s > available_s * (1.0 + ROUNDING):
         raise ValueError(
             f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
@@ -209,7 +216,7 @@ def check_within(available_s: float, end_s: float) -> None:
 
 
 BATCH = 1 << 16
-"""Number of sweep intervals computed at once; limits the memory for long sweeps."""
+"""Number of sweep intervals computed at once, limited to save memory in long sweeps."""
 
 
 def integrate_cubics(
@@ -218,7 +225,7 @@ def integrate_cubics(
     start_s: float,
     end_s: float,
     accuracy: Accuracy,
-    start: Vector,
+    start: Floats,
     record: RunRecord,
 ) -> tuple[CubicRun, Outcome]:
     """Integrate a motion as `integrate` does, from ``start_s`` to ``end_s``; return run and outcome.
@@ -230,12 +237,12 @@ def integrate_cubics(
         base = sampled_motion(drive)
         interval = base.interval
 
-        def cut(begin: int, stop: int) -> Table:
+        def cut(begin: int, stop: int) -> Floats:
             return base.pieces[begin:stop]
     else:
         interval = sweep_interval_s(drive, accuracy)
 
-        def cut(begin: int, stop: int) -> Table:
+        def cut(begin: int, stop: int) -> Floats:
             return sweep_motion(drive, interval, begin, stop - begin).pieces
 
     run = CubicRun(specimen, interval, start, accuracy.tolerance, start_time_s=start_s)
@@ -268,8 +275,8 @@ def _place(time_s: float, interval_s: float) -> tuple[int, float]:
 
 # Motion at each sample of a recorded base motion, to overlay a simulation on a recording. SI units.
 #
-# `integrate` offers more (impact times, any sample rate, any end) and takes several times longer. Here the
-# run covers whole sample intervals, the state at the end of each is stored, and impacts are only counted.
+# `integrate` offers more (impact times, any sample rate, any end) and takes several times longer. Here a run
+# covers whole sample intervals. The state at the end of each is stored; impacts are counted.
 
 
 @dataclass(frozen=True, eq=False)

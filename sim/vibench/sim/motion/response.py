@@ -5,12 +5,19 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from ..engine.run import MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, Watch, most_impacts, start_motion
-from ..specimen.accuracy import Accuracy, AccuracyWord
+from ..engine.run import (
+    MAX_IMPACT_RATE_HZ,
+    Accuracy,
+    AccuracyWord,
+    NativeRun,
+    Outcome,
+    RunRecord,
+    Watch,
+    most_impacts,
+    start_motion,
+)
 from ..specimen.drive import WHOLE, Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen
 from ..specimen.stops import member, require_positive
 from .integrate import check_impact_rate
 
@@ -78,8 +85,8 @@ def steady_response(
     """Integrate a motion and return its responses in the window at the end of the run.
 
     The defaults are those of Gong et al. 2025, section 2: 30 s from rest, of which the last 5 s are
-    evaluated. In a chaotic motion Response I scatters by a few per cent at every accuracy level. The final
-    motion may depend on ``initial_state``, shape (6,) [m, m/s]; state it together with the result.
+    evaluated. In a chaotic motion, Response I scatters by a few per cent at every accuracy level. The final
+    motion may depend on ``initial_state``, shape (6,) [m, m/s]; state this start with the result.
 
     Raises ValueError when the drive amplitude is zero, or the window is longer than the run or shorter than
     one drive period.

@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-assert sys.platform != "win32"  # lets the type checker skip this module for Windows
+assert sys.platform != "win32"  # on Windows, the type checker skips this module
 
 
 def open_to_write(path: Path) -> int:
@@ -27,12 +27,12 @@ def open_for_all(path: Path) -> int:
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     try:
         descriptor = os.open(path, os.O_RDWR | flags)
-    except PermissionError:  # a file that is open for reading can be locked
+    except PermissionError:  # a file open for reading can be locked too
         descriptor = os.open(path, os.O_RDONLY | flags)
     except FileNotFoundError:
         try:
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | flags, 0o666)
-        except FileExistsError:  # another process has created the file meanwhile
+        except FileExistsError:  # another process has created the file since
             return open_for_all(path)
         # The sticky bit protects a file from automatic deletion (systemd-tmpfiles, XDG base directories).
         for mode in (0o666, 0o1666):
@@ -139,8 +139,8 @@ def process_start(pid: int) -> str | None:
         return None if Path("/proc/self/stat").exists() else _start_by_ps(pid)
     except ProcessLookupError:
         return None
-    # Split at the last bracket, because a process name may contain brackets and spaces. In proc(5) the state
-    # is field 3 and the start time is field 22.
+    # Split at the last bracket, because a process name may contain brackets and spaces. In proc(5), the state
+    # is field 3, and the start time is field 22.
     state, *others = text.rpartition(")")[2].split()
     return None if state in "ZX" else f"{_here()}_{others[18]}"
 
@@ -151,7 +151,7 @@ def _here() -> str:
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
         return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"
-    except OSError:  # a sandbox may refuse the system call
+    except OSError:  # a sandbox may refuse this
         return "unknown"
 
 

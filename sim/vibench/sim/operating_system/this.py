@@ -34,7 +34,7 @@ Buffer = bytes | memoryview
 
 
 def write_all(descriptor: int, data: Buffer, offset: int) -> None:
-    """Write all bytes at an offset, in several calls if the system writes only part of them."""
+    """Write all bytes at an offset, in several calls if the system writes only part of the bytes."""
     rest = memoryview(data).cast("B")
     while len(rest):
         written = write_at(descriptor, rest, offset)
@@ -67,12 +67,12 @@ class OpenFile:
         write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
-        """Flush everything written so far to the disk, so that it survives a power cut."""
+        """Flush all written data to the disk, so that the data survive a power cut."""
         sync_data(self._descriptor)
 
     @property
     def has_a_name(self) -> bool:
-        """Whether the file still has a name in a folder; False after it was deleted."""
+        """Whether the file still has a name in a folder; False after the file was deleted."""
         return os.fstat(self._descriptor).st_nlink > 0
 
     def reserve(self, offset: int, size: int) -> None:
@@ -96,8 +96,8 @@ def sync_file(path: Path) -> None:
 
 @contextmanager
 def replace_file(path: Path) -> Iterator[Path]:
-    """Yield a path for a new file, which replaces ``path`` at the end; after an error the old file stays."""
-    target = path.resolve()  # replace the target of a link, not the link
+    """Yield a path for a new file, which finally replaces ``path``; after an error ``path`` is unchanged."""
+    target = path.resolve()  # if this is a link, replace its target
     if target.exists():
         target.open("r+b").close()  # raises OSError if the file is write-protected
     coming = target.with_name(f"{target.name}.{os.getpid()}.coming")
@@ -123,7 +123,7 @@ def rename(unfinished: Path, final: Path) -> None:
 
 
 UNKNOWN = ""
-"""Text for the start time of a living process if the operating system does not report it."""
+"""Text used as a process's start time if the process runs but the system does not report the time."""
 
 
 class Place(Enum):
@@ -155,7 +155,7 @@ LOCK_VARIABLE = "VIBENCH_LOCK_DIR"
 
 
 def state_place() -> Path:
-    """Return the path of the user's state folder; ``VIBENCH_STATE_DIR`` overrides it."""
+    """Return the path of the user's state folder; ``VIBENCH_STATE_DIR`` overrides this path."""
     given = os.environ.get(VARIABLE)
     return Path(given) if given else usual_state_folder()
 
@@ -173,5 +173,5 @@ def state_folder() -> Path:
 
 
 def shared_folder() -> Path:
-    """Return the folder in which every user may create files; ``VIBENCH_LOCK_DIR`` overrides it."""
+    """Return the folder in which every user may create files; ``VIBENCH_LOCK_DIR`` overrides this path."""
     return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

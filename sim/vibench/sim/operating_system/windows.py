@@ -7,7 +7,7 @@ import sys
 from ctypes import wintypes
 from pathlib import Path
 
-assert sys.platform == "win32"  # lets the type checker skip this module elsewhere
+assert sys.platform == "win32"  # on other systems, the type checker skips this module
 
 LOCK_BYTE = 2**62
 """Offset of the locked byte, beyond the end of every file."""
@@ -25,7 +25,7 @@ def open_for_all(path: Path) -> int:
     """Open a lock file for all users, or create it if missing; return its descriptor."""
     try:
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
-    except PermissionError:  # another user's file can be locked if it is open for reading
+    except PermissionError:  # another user's file can be locked if open for reading
         return os.open(path, os.O_RDONLY | os.O_BINARY)
 
 

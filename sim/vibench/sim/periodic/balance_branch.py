@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..specimen.drive import Harmonic
-from ..specimen.state import Complex, Table, Vector, Y, Z
+from ..specimen.specimen import Complex, Floats, Y, Z
 from ..specimen.stops import member
 from .branch import Branch, OrbitShape, OrbitSigns
 from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
@@ -175,11 +175,11 @@ class BalanceFamily:
         """Largest allowed error of p due to neglected harmonics, relative to the fundamental of p."""
         return self.options.tolerance
 
-    def drive(self, point: Vector) -> tuple[float, float]:
+    def drive(self, point: Floats) -> tuple[float, float]:
         """Return drive frequency [Hz] and amplitude [m] at a point of the curve."""
         return self.path.drive(float(point[-1]) * self.scale)
 
-    def linearise(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the residual of the balance, and its derivatives with respect to unknowns and parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
@@ -188,7 +188,7 @@ class BalanceFamily:
         along = (2.0 * math.pi * df * by_omega + da * by_amplitude) * self.scale
         return residual, np.column_stack([jacobian, along])
 
-    def report(self, point: Vector) -> OrbitReport:
+    def report(self, point: Floats) -> OrbitReport:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""
         frequency, amplitude = self.drive(point)
         found = balance_of_solution(self.problem, point[:-1], frequency, amplitude, self.tolerance)
@@ -202,7 +202,7 @@ class BalanceFamily:
             left_out=found.left_out,
         )
 
-    def refine(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
+    def refine(self, point: Floats, tangent: Floats) -> "tuple[BalanceFamily, Floats, Floats] | None":
         """Return the family with twice the harmonics (new harmonics are zero); None at the limit."""
         highest = int(self.problem.harmonics[-1])
         more = min(2 * highest + 1, self.options.most)
@@ -213,7 +213,7 @@ class BalanceFamily:
         finer = BalanceFamily(problem, self.path, self.scale, self.options)
         return finer, self._convert_point(point, problem), self._convert_point(tangent, problem)
 
-    def _convert_point(self, point: Vector, problem: BalanceProblem) -> Vector:
+    def _convert_point(self, point: Floats, problem: BalanceProblem) -> Floats:
         phasors = self.problem.phasors(point[:-1])
         padded = with_harmonics(phasors, self.problem.harmonics, problem.harmonics)
         return np.append(problem.pack(padded), point[-1])
@@ -222,7 +222,7 @@ class BalanceFamily:
 def orbit_signs(
     structure: LinearStructure, spring: RestoringForce, found: Balance, kept: HarmonicSet
 ) -> OrbitSigns:
-    """Return Floquet multipliers and contacts of a solution, from perturbations along its motion."""
+    """Return Floquet multipliers and contacts of a solution, from perturbations along the motion."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
     contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:

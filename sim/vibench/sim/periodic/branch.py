@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..specimen.state import Complex, Floats, Vector
+from ..specimen.specimen import Complex, Floats
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""Distance within which a multiplier counts as on the unit circle; without damping, many are."""
+"""Distance within which a multiplier counts as on the unit circle; without damping, many multipliers are."""
 
 
 class Parameter(StrEnum):
@@ -87,12 +87,12 @@ class Branch:
     end: ArcEnd
     """Reason why the branch ends at its last point."""
     begin: ArcEnd | None = None
-    """Reason why the branch ends at its first point; None if following began there."""
+    """Reason why the branch ends at its first point; None if the branch was followed from there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """Whether each motion is stable: no Floquet multiplier lies outside the unit circle, shape (m,)."""
-        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0 + NEUTRAL)
+        """Whether each motion is stable: all Floquet multipliers lie inside the unit circle, shape (m,)."""
+        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0 - NEUTRAL)
 
     @property
     def parameters(self) -> Floats:
@@ -120,7 +120,7 @@ POINTWISE = (
 # 34 (1997) 1). Grazing changes the number of contacts. The continuation itself detects folds.
 #
 # If a motion is its own mirror image half a period later, its monodromy matrix is the square of the matrix
-# for half a period. A multiplier -1 of the half-period map means symmetry breaking, +1 means a fold.
+# for half a period. For the half-period map, a multiplier -1 means symmetry breaking, and +1 means a fold.
 
 COMPLEX_PART = 1e-6
 """Smallest imaginary part of a multiplier at a Neimark-Sacker point; excludes real pairs with product 1."""
@@ -143,11 +143,11 @@ class OrbitSigns:
     """Data for the detection of bifurcations at one point of a branch."""
 
     multipliers: Complex
-    """Floquet multipliers over half the period if mirrored, otherwise over the period; shape (2 n,)."""
+    """Floquet multipliers over half a period if the motion is mirrored, else over a period; shape (2 n,)."""
     contacts: int
     """Number of contacts that begin in a period of the motion."""
     shape: OrbitShape
-    apart: Vector = field(default_factory=lambda: np.zeros(0))
+    apart: Floats = field(default_factory=lambda: np.zeros(0))
     """Closure error over half the period (zero for a simpler motion), shape (6,); empty if not defined."""
     joins: BifurcationKind | None = None
     """Bifurcation where this branch meets a branch whose motions are mirrored or have half the period."""
@@ -194,13 +194,13 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 
 NEAR_SIMPLER = 0.5
-"""Largest distance [gaps] of a simpler motion from the branch points before and after it."""
+"""Largest distance [gaps] of a simpler motion from the two neighbouring points of the branch."""
 IS_SIMPLER = 1e-7
 """Distance [gaps] from a simpler motion below which the two motions differ only by rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
-    """Return whether a branch has passed its end, at a motion that is mirrored or has half the period."""
+    """Return whether a branch has passed its end: a motion that is mirrored or has half the period."""
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from ..specimen.drive import Harmonic
-from ..specimen.state import Vector
+from ..specimen.specimen import Floats
 from .branch import (
     POINTWISE,
     BifurcationKind,
@@ -32,7 +32,7 @@ class FrequencyPath:
     amplitudes_m: tuple[float, ...]
     """Drive amplitude at each of the frequencies, or one constant amplitude [m]."""
     frequencies_hz: tuple[float, ...] = ()
-    """Ascending frequencies [Hz]; the amplitude is a monotone cubic between them, and constant outside."""
+    """Ascending frequencies [Hz]; the amplitude is a monotone cubic between these, and constant outside."""
     parameter: ClassVar = Parameter.FREQUENCY
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class FrequencyPath:
         if len(self.amplitudes_m) != given or given == 1 != len(self.amplitudes_m) or not ascending:
             raise ValueError(
                 f"{len(self.amplitudes_m)} amplitudes at {len(self.frequencies_hz)} frequencies are not "
-                "allowed: give one amplitude, or one for each of two or more ascending frequencies."
+                "allowed: give one amplitude, or one amplitude for each of two or more ascending frequencies."
             )
         for amplitude in self.amplitudes_m:
             _refuse_unless_positive("amplitude", amplitude, "m")
@@ -59,8 +59,8 @@ class FrequencyPath:
         return 1.0, float(self._curve(value, 1))
 
     @cached_property
-    def _curve(self) -> PchipInterpolator:
-        return PchipInterpolator(self.frequencies_hz, self.amplitudes_m)
+    def _curve(self) -> "scipy.interpolate.PchipInterpolator":
+        return scipy.interpolate.PchipInterpolator(self.frequencies_hz, self.amplitudes_m)
 
     def _clip(self, value: float) -> float:
         return min(max(value, self.frequencies_hz[0]), self.frequencies_hz[-1])
@@ -100,11 +100,11 @@ class OrbitReport:
 
     frequency_hz: float
     amplitude_m: float
-    response_i: Vector
+    response_i: Floats
     """Response I of every displacement and of p, shape (n + 1,)."""
-    response_ii: Vector
+    response_ii: Floats
     """Response II of every displacement and of p, shape (n + 1,)."""
-    state: Vector
+    state: Floats
     """Displacements and velocities at time zero of the drive, shape (2 n,)."""
     signs: OrbitSigns
     left_out: float
@@ -120,15 +120,15 @@ class Family(Curve, Protocol):
 
     @property
     def tolerance(self) -> float:
-        """Largest allowed error estimate of a point; above it, the resolution is increased."""
+        """Largest allowed error estimate of a point; above this error, the resolution is increased."""
         ...
 
-    def report(self, point: Vector) -> OrbitReport:
+    def report(self, point: Floats) -> OrbitReport:
         """Return the results (responses, stability) of the motion at a point of the curve."""
         ...
 
-    def refine(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
-        """Return the family at a higher resolution, with a point and a tangent converted to it.
+    def refine(self, point: Floats, tangent: Floats) -> "tuple[Family, Floats, Floats] | None":
+        """Return the family at a higher resolution, with a point and a tangent at this resolution.
 
         None if the family already has the highest resolution.
         """
@@ -154,7 +154,7 @@ def range_scale(low: float, high: float, value: float) -> float:
 
 
 def follow(
-    family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
+    family: Family, start: Floats, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Branch:
     """Follow a family from one of its points; increase the resolution where the error is too large.
 
@@ -188,7 +188,7 @@ NEARLY_GRAZING = 0.01
 """Distance from grazing [gaps] within which a failed continuation counts as ending at grazing."""
 
 
-def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
+def follow_both_ways(family: Family, start: Floats, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
     """Follow a family from a point in both directions, or once around if the branch is closed."""
     onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
@@ -198,7 +198,7 @@ def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float],
         whole = onward or back
         assert whole is not None
         return replace(whole, begin=ArcEnd.REACHED_BOUND)
-    # Reverse one branch and join the other to it; both start at the same point.
+    # Both branches start at the same point: reverse one branch, then append the other branch to it.
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
@@ -221,7 +221,7 @@ class _FollowedBranch:
     events: list[BranchEvent] = field(default_factory=list)
 
     def go_on(
-        self, start: Vector, toward: float, bounds: tuple[float, float]
+        self, start: Floats, toward: float, bounds: tuple[float, float]
     ) -> tuple[ArcEnd | None, ArcPoint]:
         """Follow at one resolution; return the reason for the end (None: refine) and the last point."""
         family = self.family
@@ -230,7 +230,7 @@ class _FollowedBranch:
         first = family.report(before.point)
         signs = first.signs
         if not self.reports:
-            # The first point was already reported at a lower resolution.
+            # In later calls, the first point has already been reported, at a lower resolution.
             self.reports.append(first)
         for here in points:
             if here.end in (ArcEnd.STEP_TOO_SHORT, ArcEnd.OUT_OF_TIME):

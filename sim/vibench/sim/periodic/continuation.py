@@ -15,13 +15,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ..specimen.state import Table, Vector
+from ..specimen.specimen import Floats
 
 
 class Curve(Protocol):
     """Equations r(u, lambda) = 0 whose solutions form the curve."""
 
-    def linearise(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Floats) -> tuple[Floats, Floats]:
         """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at a point (u, lambda), shape (n + 1,).
 
         Return NaN or infinite values where the equations cannot be evaluated.
@@ -64,9 +64,9 @@ class ArcEnd(StrEnum):
 class ArcPoint:
     """One point of a curve."""
 
-    point: Vector
+    point: Floats
     """Point (u, lambda), shape (n + 1,)."""
-    tangent: Vector
+    tangent: Floats
     """Unit tangent in the direction of travel, shape (n + 1,)."""
     arc: float = 0.0
     """Arc length from the first point of the curve."""
@@ -78,7 +78,7 @@ class ArcPoint:
 
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
-"""Number of Newton iterations that leaves the step length unchanged; after fewer, the next step is longer."""
+"""Number of Newton iterations that leaves the step length unchanged; after fewer iterations it grows."""
 FARTHEST_ASIDE = 0.5
 """Largest allowed Newton correction, relative to the step length; a larger one could reach another branch."""
 LEAP_GROWTH = 10.0
@@ -98,7 +98,7 @@ SHORTEST_BRACKET = 1e-12
 """Length of the bracketing interval at which the search for a zero ends."""
 
 
-def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
+def correct(curve: Curve, guess: Floats, normal: Floats, tolerance: float) -> tuple[Floats, int]:
     """Correct ``guess`` by Newton's method in the hyperplane perpendicular to ``normal``.
 
     Return the point and the number of iterations; the number is 0 if the method did not converge.
@@ -119,7 +119,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
     return point, 0
 
 
-def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
+def tangent_at(curve: Curve, point: Floats, along: Floats) -> Floats:
     """Return the unit tangent at a point, in the direction of ``along``, shape (n + 1,)."""
     _, jacobian = curve.linearise(point)
     system = np.vstack([jacobian, along])
@@ -134,7 +134,7 @@ def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
 
 
 def trace(
-    curve: Curve, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
+    curve: Curve, start: Floats, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Iterator[ArcPoint]:
     """Follow the curve from one of its points until the parameter leaves its range.
 
@@ -165,7 +165,7 @@ def trace(
         ahead, step = _advance(curve, here, step, steps)
         slow = slow + 1 if step < CRAWLING * steps.shortest else 0
         if ahead is None or slow > MOST_CRAWLED:
-            # No smooth curve exists between two kinks this close together, so end here.
+            # Two kinks are so close together that no smooth curve lies between them: end here.
             is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
             slow, leapt_at = 0, here.arc
             ahead = None if is_stuck else _leap_kink(curve, here, steps)
@@ -195,7 +195,7 @@ def trace(
 
 
 def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
-    """Take one step, shortened until it converges; return the new point and the next step length."""
+    """Take a step, shortened until Newton's method converges; return the new point and next step length."""
     while step >= steps.shortest:
         guess = here.point + step * here.tangent
         point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
@@ -224,7 +224,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
         return False
     if float(start.tangent @ ahead.tangent) < 0.0:
         return False
-    # Move along this curve to its first point: a point of another curve may be equally close.
+    # Points of other curves may be equally close, so follow this curve to its first point.
     guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
     point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
     return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
@@ -233,7 +233,7 @@ def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, step
 def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
     """Return a point beyond a kink, where a contact begins and the branch may turn back; None if not found.
 
-    At a kink the parameter may reverse while the unknowns continue. Steps of growing length are tried along
+    At a kink, the parameter may reverse while the unknowns continue. Steps of growing length are tried along
     the tangent, and along the tangent with reversed parameter; any rotation of the tangent is allowed.
     """
     mirrored = here.tangent.copy()
@@ -252,7 +252,7 @@ def _leap_kink(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None
 
 
 def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
-    """Return the fold between two points; None if there is no fold, or it cannot be located."""
+    """Return the fold between two points; None if there is no fold, or the fold cannot be located."""
     if before.tangent[-1] * after.tangent[-1] >= 0.0:
         return None
     found = locate(curve, before, after, lambda point: float(point.tangent[-1]), steps.tolerance)
@@ -281,7 +281,7 @@ def locate(
         value = measure(found)
         if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
-        # Illinois method: if one end stays in place twice, halve its function value, so that it moves.
+        # Illinois method: if one end stays in place twice, halve the function value at this end.
         if value * value_low < 0.0:
             high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
@@ -294,7 +294,7 @@ def locate(
 
 
 def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
-    """Return a point of the curve between two points, if possible at a given fraction of their chord."""
+    """Return a point of the curve between two points, if possible at a given fraction of the chord."""
     chord = high.point - low.point
     length = float(np.linalg.norm(chord))
     if length == 0.0:

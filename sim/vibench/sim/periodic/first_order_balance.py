@@ -5,8 +5,8 @@ With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs
 without the spring. Squared magnitudes give an equation in a few powers of |P|; all its zeros are found, so no
 branch is missed.
 
-`positive_zeros` finds all positive zeros of a sum of a few powers. Companion matrices would miss some, for
-example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: a sum of m powers,
+`positive_zeros` finds all positive zeros of a sum of a few powers. Companion matrices would miss some zeros,
+for example of a polynomial of degree 201 with four terms. Instead Rolle's theorem is used: a sum of m powers,
 divided by its lowest power, is monotone between the zeros of its derivative, which has m - 1 powers. The sum
 is evaluated in t = ln u, relative to its largest term, to avoid overflow.
 """
@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats
 from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
-"""Value of a sum of powers, relative to its largest term, below which an extremum is a double zero."""
+"""Value of a sum of powers, relative to the largest term, below which an extremum is a double zero."""
 ROOT_TOLERANCE = 1e-15
 """Absolute tolerance of ln u; the method `brentq` adds a relative tolerance of rounding size."""
 
@@ -112,7 +112,7 @@ class FirstOrderState:
     displacements: Complex
     """Phasors of every displacement of the structure, shape (n,) [m]."""
     is_stable_to_amplitude: bool
-    """Whether perturbations of the amplitude decay; False on the middle one of three branches.
+    """Whether perturbations of the amplitude decay; False on the middle branch of three.
 
         Floquet multipliers also show all other instabilities (`vibench.sim.periodic.floquet`).
     """
@@ -135,7 +135,7 @@ def first_order_states(
     if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
         raise ValueError(
             f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: "
-            "its frequency must be positive, its amplitude zero or positive, both finite."
+            "the frequency must be positive, the amplitude zero or positive, and both finite."
         )
     seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
     drive = -1j * amplitude_m

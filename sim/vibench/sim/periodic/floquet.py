@@ -1,11 +1,11 @@
 """Stability of a periodic motion: Floquet multipliers from the variational equation. SI units.
 
-Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
-e = dF/d(dp/dt) along the motion. The monodromy matrix maps them over one period, and its eigenvalues
+Small perturbations d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and e
+= dF/d(dp/dt) along the motion. The monodromy matrix maps perturbations over one period; its eigenvalues
 determine stability (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Motion
 without contact takes one matrix exponential. Contacts begin and end at the exact times at which p reaches a
-stop; each is integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253).
-Steps are shorter near both ends, where the stiffness of a Hertz contact varies like a square root.
+stop; each contact is integrated by fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq.
+253). Steps are shorter near both ends, where the stiffness of a Hertz contact varies like a square root.
 """
 
 import math
@@ -17,7 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..engine.run import check_time
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats
 from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_grid, waveform
 from .restoring_force import RestoringForce
 
@@ -30,7 +30,7 @@ STEPS_PER_HARMONIC = 16
 SMOOTH_STEPS = 128
 """Smallest number of Magnus steps per period, for a force that is smooth at every p."""
 BLOCK_STEPS = 4096
-"""Number of Magnus steps computed at once; limits memory and the time between checks of a time limit."""
+"""Number of Magnus steps computed at once, limited to save memory and to check time limits often."""
 GAUSS = math.sqrt(3.0) / 6.0
 """Distance of each of the two Gauss points from the middle of a step, relative to the step length."""
 
@@ -87,7 +87,7 @@ class _Departures:
         push = -np.linalg.solve(structure.mass, structure.direction)
         self._spring_in = np.concatenate([np.zeros(n), push])
         """Change of the state's time derivative per unit force of the spring, shape (2 n,)."""
-        # Sum of the fastest eigenvalue of the structure and the frequency on the stiffest spring [rad/s].
+        # Largest eigenvalue of the structure plus the frequency that the stiffest spring alone gives [rad/s].
         samples = grid_size(int(motion.harmonics[-1]))
         omega = 2.0 * math.pi * motion.frequency_hz
         p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
@@ -125,13 +125,13 @@ class _Departures:
         lengths = (widths / (2.0 * math.pi * self._motion.frequency_hz))[:, None, None]
         bracket = late @ early - early @ late
         exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
-        # Exponentials of matrices with eigenvalues below one, by the [3/3] Pade approximant.
+        # Take the exponentials by the [3/3] Pade approximant: all eigenvalues are below one.
         squared = exponents @ exponents
         even = np.eye(exponents.shape[-1]) + squared / 10.0
         odd = exponents / 2.0 + squared @ exponents / 120.0
         steps = np.linalg.solve(even - odd, even + odd).astype(np.float64)
         while len(steps) > 1:
-            # Multiply the matrices in pairs, so that numpy works on whole arrays.
+            # Multiply the matrices in pairs, so that numpy multiplies whole arrays of matrices.
             pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
             steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
         return np.asarray(steps[0])

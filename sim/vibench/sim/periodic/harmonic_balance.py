@@ -3,7 +3,7 @@
 The equations P_k + compliance_k F_k(P) = linear_k U, one for each harmonic in the solution, are solved by a
 damped Newton iteration with the exact Jacobian. The alternating frequency-time scheme gives the force F.
 Contact needs many harmonics (51 to 400); power laws need few. Harmonics are added until the estimated effect
-of the neglected ones is small enough.
+of the neglected harmonics is small enough.
 """
 
 import math
@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.run import check_time
-from ..specimen.specimen import Specimen
-from ..specimen.state import Complex, Floats, Table, Vector
+from ..specimen.specimen import Complex, Floats, Specimen
 from .restoring_force import RestoringForce
 
-# Condensation of a linear structure with one nonlinear spring to the spring's elongation p. SI units.
+# A linear structure with one nonlinear spring, condensed to the spring's elongation p. SI units.
 #
 # M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. For each harmonic k of the drive the equations
 # are linear in q and are solved for q, so that only the scalar p is unknown (Krack and Gross, Harmonic
@@ -27,7 +26,6 @@ from .restoring_force import RestoringForce
 #
 #     P_k = linear_k U - compliance_k F_k,   compliance_k = b.Z_k^-1 b,   Z_k = K - (k w)^2 M + i k w C
 
-Matrix = NDArray[np.float64]
 Harmonics = NDArray[np.int64]
 
 
@@ -35,17 +33,17 @@ Harmonics = NDArray[np.int64]
 class LinearStructure:
     """Linear structure, with the directions of the nonlinear spring and of the drive."""
 
-    mass: Matrix
+    mass: Floats
     """Mass matrix M, regular, shape (n, n) [kg]."""
-    damping: Matrix
+    damping: Floats
     """Damping matrix C, shape (n, n) [N s/m]."""
-    stiffness: Matrix
+    stiffness: Floats
     """Stiffness matrix K, regular, shape (n, n) [N/m]."""
-    direction: Vector
+    direction: Floats
     """Direction b of the spring, shape (n,): p = b.q, and the spring exerts the force -b F."""
-    entry_stiffness: Vector
+    entry_stiffness: Floats
     """Force on the structure per base displacement, e_k, shape (n,) [N/m]."""
-    entry_damping: Vector
+    entry_damping: Floats
     """Force on the structure per base velocity, e_c, shape (n,) [N s/m]."""
 
     def __post_init__(self) -> None:
@@ -136,7 +134,7 @@ def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
 # (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
 
 SAMPLES_PER_HARMONIC = 16
-"""Samples per period of the highest harmonic; components up to 15 times its frequency do not alias."""
+"""Samples per period of the highest harmonic; components up to 15 times this frequency do not alias."""
 FEWEST_SAMPLES = 1024
 
 
@@ -205,7 +203,7 @@ def _force_harmonics(
     turning = 1j * omega * harmonics[None, :]
     holomorphic = stiffness_lines[difference] + turning * damping_lines[difference]
     conjugate = stiffness_lines[total] - turning * damping_lines[total]
-    # The mean (harmonic 0) has no conjugate partner, so it counts once and not as half of a pair.
+    # The mean (harmonic 0) has no conjugate partner, so count the mean once, not as half of a pair.
     once = np.where(harmonics == 0, 0.5, 1.0)[:, None]
     return ForceHarmonics(
         force=phasors_of(spring.force(p, rate))[harmonics],
@@ -232,7 +230,7 @@ class HarmonicSet(StrEnum):
     """Choice of the harmonics that a solution contains."""
 
     ODD = "odd"
-    """Odd harmonics only: for motions that equal their mirror image half a period later (equal gaps)."""
+    """Odd harmonics only, for motions that equal the mirror image half a period later (equal gaps)."""
     ALL = "all"
     """All harmonics and the mean: any motion with the drive's period."""
 
@@ -254,7 +252,7 @@ def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
 
 @dataclass(frozen=True, eq=False)
 class BalanceProblem:
-    """Equations of harmonic balance; the unknowns are (Re P, Im P) / the spring's length scale."""
+    """Equations of harmonic balance; the unknowns are (Re P, Im P) divided by the spring's length scale."""
 
     structure: LinearStructure
     spring: RestoringForce
@@ -265,11 +263,11 @@ class BalanceProblem:
         """Number of real unknowns of the balance equations."""
         return 2 * len(self.harmonics) - int(self.harmonics[0] == 0)
 
-    def pack(self, phasors: Complex) -> Vector:
+    def pack(self, phasors: Complex) -> Floats:
         """Return the unknowns for the phasors P_k [m], shape (size,)."""
         return _real(phasors, self.harmonics) / self.spring.length
 
-    def phasors(self, unknowns: Vector) -> Complex:
+    def phasors(self, unknowns: Floats) -> Complex:
         """Return the phasors P_k for the unknowns, shape (m,) [m]."""
         scaled = unknowns * self.spring.length
         count = len(self.harmonics)
@@ -278,8 +276,8 @@ class BalanceProblem:
         return scaled[:count] + 1j * imaginary
 
     def linearise(
-        self, unknowns: Vector, omega: float, amplitude_m: float
-    ) -> tuple[Vector, Table, Vector, Vector]:
+        self, unknowns: Floats, omega: float, amplitude_m: float
+    ) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the residual and its derivatives: Jacobian, d/domega, and d/d(drive amplitude).
 
         Shapes (n,), (n, n), (n,), (n,). Values are not finite where the force overflows.
@@ -303,7 +301,7 @@ class BalanceProblem:
         by_amplitude = _real(-seen.linear * drive, self.harmonics) / scale
         return _real(residual, self.harmonics) / scale, jacobian, by_omega, by_amplitude
 
-    def _jacobian(self, seen: CondensedStructure, spring: ForceHarmonics) -> Table:
+    def _jacobian(self, seen: CondensedStructure, spring: ForceHarmonics) -> Floats:
         count = len(self.harmonics)
         direct = np.eye(count) + seen.compliance[:, None] * spring.holomorphic
         mirrored = seen.compliance[:, None] * spring.conjugate
@@ -314,8 +312,8 @@ class BalanceProblem:
         return np.vstack([top, bottom[dropped:]])
 
 
-def _real(phasors: Complex, harmonics: Harmonics) -> Vector:
-    """Return the real parts, then the imaginary parts; the mean (harmonic 0) has no imaginary part."""
+def _real(phasors: Complex, harmonics: Harmonics) -> Floats:
+    """Return all real parts, followed by the imaginary parts; the mean (harmonic 0) has no imaginary part."""
     return np.concatenate([phasors.real, phasors.imag[int(harmonics[0] == 0) :]])
 
 
@@ -335,21 +333,21 @@ class Balance:
     outcome: BalanceEnd
 
     @property
-    def state(self) -> Vector:
+    def state(self) -> Floats:
         """Displacements and velocities at time zero of the drive, shape (2 n,)."""
         turning = 2j * math.pi * self.frequency_hz * self.harmonics[:, None]
         velocities = turning * self.displacements
         return np.concatenate([self.displacements.real.sum(axis=0), velocities.real.sum(axis=0)])
 
     @property
-    def response_ii(self) -> Vector:
+    def response_ii(self) -> Floats:
         """Amplitude of every displacement and of p at the drive frequency, divided by A0, shape (n + 1,)."""
         first = int(np.searchsorted(self.harmonics, 1))
         lines = np.append(self.displacements[first], self.relative[first])
         return np.asarray(np.abs(lines) / self.amplitude_m)
 
     @property
-    def response_i(self) -> Vector:
+    def response_i(self) -> Floats:
         """Largest magnitude of every displacement and of p, divided by A0, shape (n + 1,)."""
         samples = grid_size(int(self.harmonics[-1]))
         each = np.column_stack([self.displacements, self.relative]).T
@@ -365,8 +363,8 @@ def _largest(phasors: Complex, harmonics: Harmonics, samples: int) -> float:
     return float(here - 0.125 * (before - after) ** 2 / bend) if bend < 0.0 else float(here)
 
 
-def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: float) -> tuple[Vector, bool]:
-    """Solve the balance by Newton's method with step halving; return unknowns, and whether it converged."""
+def newton(problem: BalanceProblem, start: Floats, omega: float, amplitude_m: float) -> tuple[Floats, bool]:
+    """Solve the balance by Newton's method with step halving; return unknowns, and whether they converged."""
     unknowns = start.copy()
     residual, jacobian, _, _ = problem.linearise(unknowns, omega, amplitude_m)
     error = size_of(residual)
@@ -384,13 +382,13 @@ def newton(problem: BalanceProblem, start: Vector, omega: float, amplitude_m: fl
             if trial_error < error:
                 break
         else:
-            # No step reduces the error. This means convergence if the error is at rounding level.
+            # No step reduces the error. If the error is at rounding level, the iteration has converged.
             return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
     return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
 
 
-def size_of(values: Vector) -> float:
+def size_of(values: Floats) -> float:
     """Return the largest magnitude of an array; infinite if any value is not finite."""
     size = float(np.max(np.abs(values)))
     return size if math.isfinite(size) else math.inf

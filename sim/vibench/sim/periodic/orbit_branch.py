@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..specimen.drive import Harmonic
-from ..specimen.specimen import state_scales
-from ..specimen.state import Table, Vector
+from ..specimen.specimen import Floats, state_scales
 from ..specimen.stops import member
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
@@ -41,20 +40,20 @@ class ExactFamily:
     """Error limit for refining: none, because shooting has no resolution that could be increased."""
 
     @property
-    def scales(self) -> Vector:
+    def scales(self) -> Floats:
         """Scales of the six state variables, shape (6,) [m, m/s]."""
         return state_scales(self.mapping.specimen, self.reference)
 
-    def closure(self, state: Vector, drive: Harmonic) -> tuple[Vector, Table, Vector]:
+    def closure(self, state: Floats, drive: Harmonic) -> tuple[Floats, Floats, Floats]:
         """Return the closure error after a period, its Jacobian, and the ratio of two sets of scales.
 
-        Velocities are scaled by the drive frequency in the map, but by the reference frequency in the family.
+        The map scales velocities by the drive frequency, the family by the reference frequency.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
         derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
         return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
 
-    def refine(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002
+    def refine(self, point: Floats, tangent: Floats) -> tuple[Family, Floats, Floats] | None:  # noqa: ARG002
         """Return None, because shooting has no finer resolution."""
         return None
 
@@ -67,15 +66,15 @@ class OrbitFamily(ExactFamily):
     scale: float
     """Change of the parameter that counts as one unit of arc length [Hz, or m]."""
 
-    def drive_at(self, point: Vector) -> Harmonic:
+    def drive_at(self, point: Floats) -> Harmonic:
         """Return the drive at a point of the curve."""
         return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
 
-    def state_at(self, point: Vector) -> Vector:
+    def state_at(self, point: Floats) -> Floats:
         """Return the state at time zero of the drive, for a point of the curve."""
         return point[:-1] * self.scales
 
-    def linearise(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the closure error after a period, and its derivatives d/d(state) and d/d(parameter)."""
         if point[-1] <= 0.0:
             return np.full(6, math.nan), np.full((6, 7), math.nan)
@@ -90,7 +89,7 @@ class OrbitFamily(ExactFamily):
         along = ratio * slope * self.scale
         return gone, np.column_stack([by_state, along])
 
-    def report(self, point: Vector) -> OrbitReport:
+    def report(self, point: Floats) -> OrbitReport:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""
         state, drive = self.state_at(point), self.drive_at(point)
         gone = (self.mapping.image(state, drive) - state) / state_scales(self.mapping.specimen, drive)
@@ -156,7 +155,7 @@ def periodic_branch_within(
 
 def _family_at(
     orbit: PeriodicOrbit, path: DrivePath, value: float, scale: float
-) -> tuple[OrbitFamily, Vector]:
+) -> tuple[OrbitFamily, Floats]:
     if orbit.outcome is not ShootingEnd.CONVERGED:
         raise ValueError(f"A branch cannot start at {orbit.drive}: {orbit.outcome}.")
     family = OrbitFamily(orbit.period_map, orbit.drive, path, scale)

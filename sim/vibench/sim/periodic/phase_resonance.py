@@ -1,10 +1,10 @@
 """Backbone of a mode: its phase resonance, stable or not, as a function of the drive level. SI units.
 
-At a phase resonance the fundamental of m0 lags the base by a given angle, usually a quarter of a period
+At a phase resonance, the fundamental of m0 lags the base by a given angle, usually a quarter of a period
 (Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base motion u exerts the inertia force m w^2 u
 on the motion relative to the base. This force is in phase with u, so the relative motion lags u by a quarter
 of a period. Shooting finds the phase resonance, with the phase as a seventh equation and the frequency as a
-seventh unknown. Pseudo-arclength continuation follows it along the drive level.
+seventh unknown. Pseudo-arclength continuation follows the phase resonance along the drive level.
 """
 
 import math
@@ -15,8 +15,7 @@ import scipy
 
 from ..specimen.drive import Harmonic
 from ..specimen.modes import base_transmissibility
-from ..specimen.specimen import Specimen
-from ..specimen.state import Table, Vector
+from ..specimen.specimen import Floats, Specimen
 from ..specimen.stops import member
 from .branch import Branch, OrbitShape
 from .branch_following import AmplitudePath, DrivePath, OrbitReport, follow
@@ -43,7 +42,7 @@ SCAN_POINTS = 400
 class PhaseResonanceFamily(ExactFamily):
     """Motions with a given phase of m0; the last two unknowns are scaled logarithms of frequency and level.
 
-    Both are relative to the reference drive.
+    Frequency and level are relative to the reference drive.
     """
 
     phase_rad: float
@@ -51,19 +50,19 @@ class PhaseResonanceFamily(ExactFamily):
 
     @property
     def path(self) -> DrivePath:
-        """Path along drive amplitude; its frequency is unused, because the phase determines the frequency."""
+        """Path along drive amplitude only, because the phase determines the frequency."""
         return AmplitudePath(self.reference.frequency_hz)
 
-    def amplitude_m(self, point: Vector) -> float:
+    def amplitude_m(self, point: Floats) -> float:
         """Return the drive amplitude at a point of the branch [m]."""
         return self.reference.amplitude_m * float(10.0 ** (point[7] / LENGTH_PER_DECADE))
 
-    def drive_at(self, point: Vector) -> Harmonic:
+    def drive_at(self, point: Floats) -> Harmonic:
         """Return the drive at a point of the branch."""
         frequency_hz = self.reference.frequency_hz * math.exp(FREQUENCY_SHARE * float(point[6]))
         return Harmonic(frequency_hz, self.amplitude_m(point))
 
-    def linearise(self, point: Vector) -> tuple[Vector, Table]:
+    def linearise(self, point: Floats) -> tuple[Floats, Floats]:
         """Return closure error and phase error, shape (7,), and their Jacobian, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
@@ -78,14 +77,14 @@ class PhaseResonanceFamily(ExactFamily):
             slopes[k] = (self._error(point + nudge) - self._error(point - nudge)) / (2.0 * DIFFERENCE)
         return np.append(gone, off), np.vstack([np.column_stack([by_state, by_frequency, by_level]), slopes])
 
-    def _error(self, point: Vector) -> float:
+    def _error(self, point: Floats) -> float:
         """Return the sine of the phase error of m0 relative to the base."""
         # The base A0 sin(w t) has the phasor -i A0.
         phasor = 1j * self.mapping.response(point[:6] * self.scales, self.drive_at(point)).line_x_m
         turned = self.of.motion(phasor / self.amplitude_m(point)) * np.exp(-1j * self.phase_rad)
         return float(turned.imag / abs(turned))
 
-    def report(self, point: Vector) -> OrbitReport:
+    def report(self, point: Floats) -> OrbitReport:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""
         drive = self.drive_at(point)
         family = OrbitFamily(self.mapping, drive, AmplitudePath(drive.frequency_hz), drive.amplitude_m)
@@ -102,10 +101,10 @@ def phase_resonance_branch(
 ) -> Branch:
     """Follow the phase resonance of a mode along the drive level, from a level without contact.
 
-    Return the branch along the amplitude (it may turn back), with frequency and multipliers of each motion.
-    Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1 reaches its
-    stops at this level, the linear motion does not have this phase exactly once in the band, or `of` is not a
-    value of `PhaseReference`.
+    Return the branch along the amplitude (the branch may turn back), with frequency and multipliers of each
+    motion. Raises ValueError when the specimen has no damping, no motion is found at the lower level, m1
+    reaches its stops at this level, the linear motion does not have this phase exactly once in the band, or
+    `of` is not a value of `PhaseReference`.
 
     Parameters
     ----------
@@ -123,15 +122,15 @@ def phase_resonance_branch(
     (low_m, high_m), of = levels_m, member(PhaseReference, of)
     if not any(specimen.dampings):
         raise ValueError(
-            "A specimen without damping has no phase resonance: at a resonance its motion without contacts "
-            "grows without end. Give a damping time above 0."
+            "A specimen without damping has no phase resonance: at a resonance, the motion without contacts "
+            "grows without bound. Give a damping time above 0."
         )
     frequency_hz = linear_phase_resonance_hz(specimen, band_hz, of, phase_rad)
     drive = Harmonic(frequency_hz, low_m)
     answer = base_transmissibility(specimen, frequency_hz)[0]
     if not 0.0 < low_m < high_m or low_m * abs(answer[3]) >= min(specimen.gaps_m):
         raise ValueError(
-            f"Levels {low_m:g} to {high_m:g} m are not allowed: give ascending levels, the lower below "
+            f"Levels {low_m:g} to {high_m:g} m are not allowed: give ascending levels, the lower one below "
             f"{min(specimen.gaps_m) / abs(answer[3]):.3g} m, where m1 reaches its stops."
         )
     phasors = -1j * low_m * answer[:3]
@@ -140,10 +139,10 @@ def phase_resonance_branch(
     guess = np.concatenate([state / family.scales, [0.0, 0.0]])
     start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
     if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
-        # A power law acts at every p, so even the motion at the lower level may be far from the linear one.
+        # A power law acts at every p, so even at the lower level the motion may not be close to linear.
         raise ValueError(
-            f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
-            "starting from the linear motion: give a lower first level, or a wider band."
+            f"From the linear motion at {low_m:g} m, no motion with this phase is found between "
+            f"{band_hz[0]:g} and {band_hz[1]:g} Hz: give a lower first level, or a wider band."
         )
     far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
     return follow(family, start, 1.0, (-1e-9, far), steps)
@@ -161,7 +160,7 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    # Use only zeros at which the function falls: through a mode, the lag increases with frequency.
+    # Use only zeros at which the function falls, because the lag increases through a mode.
     found_hz = [
         float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)
@@ -171,6 +170,6 @@ def linear_phase_resonance_hz(
         return found_hz[0]
     where = f"at {', '.join(f'{each:.4g}' for each in found_hz)} Hz" if found_hz else "nowhere"
     raise ValueError(
-        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 against the base is {where} "
-        f"{math.degrees(phase_rad):.3g} degrees: give a band around one mode."
+        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz, the phase of m0 against the base is "
+        f"{math.degrees(phase_rad):.3g} degrees {where}: give a band around one mode."
     )

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ class GapSpring:
         if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
             raise ValueError(
                 f"A stop of stiffness {self.stiffness_coefficient}, exponent {self.exponent} and loss "
-                f"{self.loss} s/m is not allowed: they must be positive, at least 1, and zero or more."
+                f"{self.loss} s/m is not allowed: give a positive stiffness, exponent >= 1 and loss >= 0."
             )
         if not (self.upper > 0.0 and self.lower > 0.0 and math.isfinite(min(self.upper, self.lower))):
             raise ValueError(

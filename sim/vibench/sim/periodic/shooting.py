@@ -13,16 +13,21 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..engine.run import start_motion
+from ..engine.run import (
+    DIRECTIONS,
+    MAX_IMPACT_RATE_HZ,
+    Accuracy,
+    NativeRun,
+    Outcome,
+    RunRecord,
+    most_impacts,
+    start_motion,
+)
 from ..motion.integrate import Trajectory, integrate
-from ..motion.poincare import flow_derivative
 from ..motion.response import Response, steady_response
-from ..specimen.accuracy import Accuracy
 from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, state_scales
-from ..specimen.state import Complex, Table, Vector, Y, Z
+from ..specimen.specimen import Complex, Floats, Specimen, Y, Z, state_scales
 from ..specimen.stops import member
 from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
@@ -32,13 +37,13 @@ from .harmonic_balance import phasors_of, size_of
 #
 # A mirrored motion has the opposite state half a drive period later. It is a fixed point of the half-period
 # map: integrate over half a period, then change all signs. The derivative with respect to the state is exact,
-# because tangent vectors are integrated with the motion; it tends to infinity if an impact on a rigid stop
-# approaches grazing. Derivatives by frequency and amplitude are fourth-order central differences at reference
-# accuracy, with steps far above the integration error (1e-10) and far below the gap. They are accurate to
-# five to seven digits, which is enough for Newton's iteration, their only use.
+# because tangent vectors are integrated with the motion. If an impact on a rigid stop approaches grazing, the
+# derivative tends to infinity. Derivatives with respect to frequency and amplitude are fourth-order central
+# differences at reference accuracy, with steps far above the integration error (1e-10) and far below the gap.
+# They are accurate to five to seven digits, which is enough for Newton's iteration, their only use.
 
 DIFFERENCE = 1e-5
-"""Finite-difference step for derivatives with respect to a drive parameter, relative to its value."""
+"""Finite-difference step for derivatives with respect to a drive parameter, relative to the parameter."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Offsets (in steps) and weights of the fourth-order central difference quotient."""
 
@@ -67,7 +72,7 @@ class PeriodMap:
 
     @property
     def simpler(self) -> "PeriodMap | None":
-        """Period map for motions that are mirrored or have half the period; None if there can be none."""
+        """Period map for motions that are mirrored or have half the period; None if these cannot exist."""
         if self.shape is OrbitShape.MIRRORED:
             return None
         if self.periods % 2 == 0:
@@ -75,7 +80,7 @@ class PeriodMap:
         lower, upper = self.specimen.gaps_m
         return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
-    def image(self, state: Vector, drive: Harmonic) -> Vector:
+    def image(self, state: Floats, drive: Harmonic) -> Floats:
         """Return the map's final state for a state at drive phase zero, (6,); NaN if the run fails."""
         if not self._may_start(state):
             return np.full(6, math.nan)
@@ -84,16 +89,16 @@ class PeriodMap:
             return np.full(6, math.nan)
         return -run.final_state if self.shape is OrbitShape.MIRRORED else run.final_state
 
-    def response(self, state: Vector, drive: Harmonic) -> Response:
+    def response(self, state: Floats, drive: Harmonic) -> Response:
         """Return the responses of the motion from a state for one period."""
         period_s = self.periods / drive.frequency_hz
         return steady_response(self.specimen, drive, Accuracy.REFERENCE, period_s, period_s, state)
 
-    def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
+    def orbit(self, state: Floats, drive: Harmonic, samples: int) -> Trajectory:
         """Return the motion from a state for one period, with ``samples`` samples per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
-    def derivative(self, state: Vector, drive: Harmonic) -> Table:
+    def derivative(self, state: Floats, drive: Harmonic) -> Floats:
         """Return d(final state) / d(initial state), both states divided by their scales, shape (6, 6)."""
         if not self._may_start(state):
             return np.full((6, 6), math.nan)
@@ -103,19 +108,19 @@ class PeriodMap:
         scaled = derivative * scales / scales[:, None]
         return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
-    def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
+    def frequency_slope(self, state: Floats, drive: Harmonic) -> Floats:
         """Return the scaled derivative d(final state) / d ln(frequency), shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, frequency_hz=part * drive.frequency_hz))
 
-    def amplitude_slope(self, state: Vector, drive: Harmonic) -> Vector:
+    def amplitude_slope(self, state: Floats, drive: Harmonic) -> Floats:
         """Return the scaled derivative d(final state) / d ln(amplitude), shape (6,)."""
         return self._slope(state, drive, lambda part: replace(drive, amplitude_m=part * drive.amplitude_m))
 
-    def _slope(self, state: Vector, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Vector:
+    def _slope(self, state: Floats, drive: Harmonic, scaled: Callable[[float], Harmonic]) -> Floats:
         images = [self.image(state, scaled(1.0 + offset * DIFFERENCE)) for offset in OFFSETS]
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * state_scales(self.specimen, drive)))
 
-    def _may_start(self, state: Vector) -> bool:
+    def _may_start(self, state: Floats) -> bool:
         """Return whether a run can start from a state; Newton's method may try states beyond a rigid stop."""
         match self.specimen.contact:
             case RigidStops():
@@ -125,7 +130,7 @@ class PeriodMap:
                 return bool(np.all(np.isfinite(state)))
 
     def _run(
-        self, state: Vector, drive: Harmonic, turns: float, sample_rate_hz: float | None = None
+        self, state: Floats, drive: Harmonic, turns: float, sample_rate_hz: float | None = None
     ) -> Trajectory:
         return integrate(
             self.specimen,
@@ -145,7 +150,7 @@ FLOW_ERROR = 1e-10
 """Assumed integration error in a period at reference accuracy, relative to the state's scale; ten times the
 measured error (docs/accuracy.md)."""
 SAMPLES = 4096
-"""Samples per drive period from which the responses of y and z are computed."""
+"""Number of samples per drive period from which the responses of y and z are computed."""
 SETTLING_PERIODS = 400
 """Length, in drive periods, of the run from rest whose end is the default initial guess."""
 
@@ -163,7 +168,7 @@ class PeriodicOrbit:
 
     drive: Harmonic
     period_map: PeriodMap
-    state: Vector
+    state: Floats
     """x, y, z, vx, vy, vz at time zero of the drive, shape (6,)."""
     signs: OrbitSigns
     defect: float
@@ -171,9 +176,9 @@ class PeriodicOrbit:
     error: float
     """Error bound of the motion, and of the responses of x and p, relative to the fundamental of p: closure
     and integration error times |(map - I)^-1|."""
-    response_i: Vector
+    response_i: Floats
     """Largest magnitude of x, y, z and p, relative to the drive amplitude, shape (4,)."""
-    response_ii: Vector
+    response_ii: Floats
     """Amplitude of x, y, z and p at the drive frequency, relative to the drive amplitude, shape (4,)."""
     outcome: ShootingEnd
 
@@ -184,8 +189,8 @@ class PeriodicOrbit:
 
     @property
     def is_stable(self) -> bool:
-        """Whether no Floquet multiplier lies outside the unit circle."""
-        return bool(abs(self.floquet_multipliers[0]) < 1.0 + NEUTRAL)
+        """Whether all Floquet multipliers lie inside the unit circle."""
+        return bool(abs(self.floquet_multipliers[0]) < 1.0 - NEUTRAL)
 
     @property
     def impacts(self) -> int:
@@ -237,8 +242,8 @@ def periodic_orbit(
 
 
 def _damped_step(
-    mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
-) -> tuple[Vector, Vector, bool]:
+    mapping: PeriodMap, drive: Harmonic, state: Floats, step: Floats, gone: Floats
+) -> tuple[Floats, Floats, bool]:
     """Halve a Newton step until the closure error falls; return state, closure error, and whether it fell."""
     scales = state_scales(mapping.specimen, drive)
     for halving in range(MOST_HALVINGS):
@@ -249,10 +254,10 @@ def _damped_step(
     return state, gone, False
 
 
-def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
+def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Floats, gone: Floats) -> PeriodicOrbit:
     """Return the periodic motion from ``state`` with its responses; ``gone`` is the scaled closure error."""
     run = mapping.orbit(state, drive, SAMPLES)
-    moved = np.full((mapping.periods * SAMPLES, 3), math.nan)  # the responses are NaN if the run failed
+    moved = np.full((mapping.periods * SAMPLES, 3), math.nan)  # NaN remains if the run has failed
     moved[: len(run.states)] = run.states[: len(moved), :3]
     seen = mapping.response(state, drive)
     derivative = mapping.derivative(state, drive)
@@ -276,7 +281,7 @@ def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vec
     )
 
 
-def _missing(derivative: Table, gone: Vector, size: float) -> float:
+def _missing(derivative: Floats, gone: Floats, size: float) -> float:
     """Return the error bound: closure plus integration error, times the norm of (map - identity)^-1.
 
     The integration error grows with ``size``, the state divided by its scale, if this ratio is above 1.
@@ -289,7 +294,7 @@ def _missing(derivative: Table, gone: Vector, size: float) -> float:
 
 
 def _signs(
-    mapping: PeriodMap, drive: Harmonic, state: Vector, derivative: Table, run: Trajectory
+    mapping: PeriodMap, drive: Harmonic, state: Floats, derivative: Floats, run: Trajectory
 ) -> OrbitSigns:
     simpler = mapping.simpler
     scales = state_scales(mapping.specimen, drive)
@@ -319,7 +324,7 @@ def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> f
     dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
     nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
     rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
-    # Take the approach speed at the last sample before each contact.
+    # The approach speed is the speed at the last sample before each contact.
     places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
     slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
     return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))
@@ -331,7 +336,7 @@ class PhaseReference(StrEnum):
     RELATIVE = "relative"
     """Motion relative to the base: for the lowest mode, or if contacts limit the relative motion."""
     ABSOLUTE = "absolute"
-    """Absolute motion: for a mode far above the others, where m0 hardly follows the base."""
+    """Absolute motion: for a mode far above the other modes, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
         """Return the ratio of this motion of m0 to the base motion; transmissibility - 1 if relative."""
@@ -339,3 +344,56 @@ class PhaseReference(StrEnum):
 
 
 PhaseReferenceWord = Literal["relative", "absolute"]
+
+
+def smallest_period(section: Floats, scales: Floats, tolerance: float = 1e-6, most: int = 32) -> int | None:
+    """Return the smallest number of drive periods after which a motion repeats; None if it does not repeat.
+
+    Parameters
+    ----------
+    section
+        States of the settled motion once per drive period, at least two periods long, shape (n, 6).
+    scales
+        Scales of a state from `state_scales`, shape (6,).
+    tolerance
+        Largest change of a state, relative to its scale, at which a motion counts as repeating.
+    most
+        Longest period to try.
+    """
+    points = section / scales
+    for period in range(1, min(most, len(points) // 2) + 1):
+        change = points[-period:] - points[-2 * period : len(points) - period]
+        if float(np.abs(change).max()) < tolerance:
+            return period
+    return None
+
+
+def flow_derivative(
+    specimen: Specimen,
+    drive: Harmonic,
+    state: ArrayLike,
+    duration_s: float,
+    accuracy: Accuracy = Accuracy.REFERENCE,
+) -> tuple[Floats, Floats]:
+    """Return the final state of a run from time zero of the drive, and d(final state) / d(initial state).
+
+    The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop, where
+    no derivative exists, very large numbers are returned.
+
+    Parameters
+    ----------
+    specimen, drive
+        Specimen, and motion of its base.
+    state
+        x, y, z, vx, vy, vz at time zero, shape (6,).
+    duration_s
+        Length of the run [s].
+    accuracy
+        Accuracy of the motion and of its derivative.
+    """
+    run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
+    run.carry(np.eye(DIRECTIONS))
+    outcome = run.advance(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))
+    if outcome is not Outcome.REACHED_END:
+        return np.full(6, np.nan), np.full((6, 6), np.nan)
+    return run.motion, (np.exp(run.growth)[:, None] * run.changes).T

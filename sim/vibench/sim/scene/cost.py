@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Self
 
@@ -28,11 +29,13 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 20
-"""Memory of the moving average: after this many further runs, a run keeps a third of its weight."""
+"""Memory of the moving average: after this number of later runs, a run keeps a third of its weight."""
 SURPRISE = math.log(2.5)
 """Limit of a run's logarithmic deviation from the mean of similar runs, in case of an unusual motion."""
 FEWEST = 3
 """Smallest number of runs of a kind from which the scatter of their computing times is estimated."""
+PRIOR = 4.0
+"""Weight of the more general kind in a kind's statistics [runs]; less if the general kind scatters more."""
 UNKNOWN_FACTOR = 10.0
 """Uncertainty factor of an expected computing time if no run of that kind is known."""
 LEAST_FACTOR = 1.5
@@ -50,9 +53,19 @@ class _Kind:
     variance: float = 0.0
 
     def off(self, ratio: float) -> float:
-        """Return a run's logarithmic deviation from the mean, limited once enough runs are known."""
+        """Return a run's logarithmic deviation from the mean, limited if enough runs are known."""
         off = math.log(ratio) - self.mean
         return off if self.runs < FEWEST else max(-SURPRISE, min(SURPRISE, off))
+
+    def near(self, general: Self) -> Self:
+        """Return the statistics combined with a more general kind's, which count as up to `PRIOR` runs."""
+        prior = PRIOR if general.runs else 0.0
+        if self.runs >= FEWEST and self.variance < general.variance:
+            prior *= self.variance / general.variance
+        share = self.runs / (self.runs + prior)
+        mean = general.mean + share * (self.mean - general.mean)
+        variance = general.variance + share * (self.variance - general.variance)
+        return type(self)(self.runs if self.runs >= FEWEST else general.runs, mean, variance)
 
     def after(self, ratio: float) -> Self:
         """Return the statistics with one more run; old runs lose weight (West, Comm. ACM 22 (1979) 532)."""
@@ -78,9 +91,9 @@ class ExpectedTime:
         time_s, factor = self.time_s, self.factor
         learnt = f"{self.runs} such runs" if self.runs >= FEWEST else "too few such runs"
         text = f"{time_s:.1g} s within a factor of {factor:.2g}"
-        if factor > 10.0:  # a central value would mislead if it is so uncertain
+        if factor > 10.0:  # such an uncertain value would mislead
             text = f"between {time_s / factor:.1g} and {time_s * factor:.1g} s"
-        return f"Estimated time on one core: {text}, from {learnt} on this machine."
+        return f"Estimated time on one core: {text}, based on {learnt} on this machine."
 
 
 class CostLedger:
@@ -101,7 +114,7 @@ class CostLedger:
             known, drift = self._statistics(kind), self._drift
         factor = UNKNOWN_FACTOR
         if known.runs >= FEWEST:
-            # Variance of the next run about the estimated mean: scatter of runs plus uncertainty of the mean.
+            # The next run's variance is the scatter of the runs plus the uncertainty of their mean.
             spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
             factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
         return ExpectedTime(planned_s * math.exp(known.mean + drift), factor, known.runs)
@@ -121,18 +134,20 @@ class CostLedger:
             self.save()
 
     def _statistics(self, kind: str) -> _Kind:
-        """Return the statistics of a kind of run or, with too few runs, of the next more general kind."""
-        enough = (self._kinds[name] for name in _names(kind) if name in self._kinds)
-        return next((each for each in enough if each.runs >= FEWEST), _Kind())
+        """Return the statistics of a kind of run and, if such runs are few, of more general kinds."""
+        known = _Kind()
+        for name in _names(kind):
+            known = self._kinds[name].near(known) if name in self._kinds else known
+        return known if known.runs >= FEWEST else _Kind()
 
     @property
     def _drift(self) -> float:
-        """Return the mean logarithmic deviation of the latest runs; 0 unless it is significant."""
-        if len(self._lately) < MEMORY:
+        """Return the mean logarithmic deviation of the latest runs; 0 unless the mean is significant."""
+        runs = len(self._lately)
+        if runs < MEMORY // 2:
             return 0.0
-        mean = math.fsum(self._lately) / MEMORY
-        variance = math.fsum((each - mean) ** 2 for each in self._lately) / (MEMORY - 1)
-        return mean if mean * mean * MEMORY > SURE * SURE * variance else 0.0
+        mean, scatter = float(np.mean(self._lately)), float(np.std(self._lately, ddof=1))
+        return mean if abs(mean) > SURE * scatter / math.sqrt(runs) else 0.0
 
     def save(self) -> None:
         """Write new computing time statistics to the ledger's file, if possible."""
@@ -149,18 +164,15 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Return a kind of run, ``a/b/c``, followed by the more general kinds ``a/b`` and ``a``."""
-    parts = kind.split("/")
-    return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
+    """Return the names of the more general kinds ``a``, ``a/b``, and of the kind ``a/b/c``."""
+    return list(accumulate(kind.split("/"), "{}/{}".format))
 
 
 def _read(path: Path) -> dict[str, _Kind]:
     """Return the computing time statistics from a file, by kind of run; empty without a valid file."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
-        known = {
-            kind: _Kind(int(each["runs"]), each["mean"], each["variance"]) for kind, each in kept.items()
-        }
+        known = {kind: _Kind(**each) for kind, each in kept.items()}
         is_sound = all(
             each.runs > 0 and math.isfinite(each.mean) and 0.0 <= each.variance < math.inf
             for each in known.values()
@@ -173,14 +185,9 @@ def _read(path: Path) -> dict[str, _Kind]:
 @cache
 def cost_ledger() -> CostLedger:
     """Return the ledger for this machine, Python version and engine source; it is saved at exit."""
-    about = (
-        platform.node(),
-        platform.machine(),
-        platform.python_version(),
-        physics_digest(),
-    )
+    about = platform.node(), platform.machine(), platform.python_version(), physics_digest()
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
-    with contextlib.suppress(OSError):  # without this folder, statistics are not saved
+    with contextlib.suppress(OSError):  # without a state folder, statistics are not saved
         state_folder()
     ledger = CostLedger(state_place() / "costs" / f"{name}.json")
     atexit.register(ledger.save)
@@ -202,7 +209,7 @@ LEARNT_AS: dict[Solver, str] = {
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Record the processor time of a scene [s], excluding the loading of modules and tables."""
+    """Record the processor time [s] of a scene, excluding the loading of modules and tables."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
@@ -219,7 +226,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene, *, may_repeat: b
 
 
 def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
-    """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some of them.
+    """Return the mean computing time of ``count`` scenes with a target [s], from pilot runs of some scenes.
 
     Pilot runs are needed because the time depends on the motion's sensitivity to its start, which is not
     known beforehand. An invalid scene counts as zero time.
@@ -237,7 +244,7 @@ def pilot_cost_s(scene: Callable[[int], Scene], count: int) -> float:
 
 
 def _target_cost_s(scene: Scene, most_s: float) -> float:
-    """Solve a scene for at most ``most_s``; return the estimated time of its complete solution [s]."""
+    """Solve a scene for at most ``most_s``; return the estimated time of the complete solution [s]."""
     assert scene.target is not None
     limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
     tried_s, began_s = min(most_s, limit_s), time.monotonic()
@@ -250,7 +257,7 @@ def _target_cost_s(scene: Scene, most_s: float) -> float:
         return HOPELESS_S
     if report.needed_s is not None:
         return min(limit_s, report.needed_s[0])
-    # Without a requested error, a scene uses its whole time limit.
+    # A scene without a target error uses its whole time limit.
     return limit_s if scene.target.error is None else min(limit_s, UNDECIDED * taken_s)
 
 

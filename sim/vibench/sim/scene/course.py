@@ -2,7 +2,8 @@
 
 Both have three steps, so that many scenes can be batched. `way` returns the motion to integrate first.
 `watch` classifies the motion, and returns it if it must go on. `observe` observes the end of the motion.
-Between these steps the caller integrates one motion (`StatesAlone.follow`) or many (`in_batches`). SI units.
+The caller integrates these motions alone or in batches (`one_by_one`, `in_batches`, `take_steps_of_all`).
+SI units.
 """
 
 import math
@@ -11,14 +12,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..engine.run import Watch
-from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
-from .fixed_point import stable_motion
+from ..engine.run import Outcome, Watch
+from ..periodic.branch import NEUTRAL
+from ..specimen.specimen import Floats
 from .followed_run import (
     Block,
     FollowedRun,
     ObservedWindow,
+    Steps,
     Stretch,
     blocks_of,
     follow_with_section,
@@ -27,11 +28,64 @@ from .followed_run import (
     states_of,
     whole_periods,
     window_of,
+    window_steps,
 )
 from .prediction import MotionKind
 from .repetition import EXACTLY, Pace, Repetition, first_repetition, growth_of, kind_of
 from .scene import FixedDuration
 from .states_alone import StatesAlone
+
+TOLERANCE, STRICTER = 1e-10, 0.01
+"""Largest integration tolerance of the period map [-, tolerances of the run]."""
+RETURNED = 1e-10
+"""Largest change of state over one period of a periodic motion, relative to the motion's size."""
+ITERATIONS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPoint:
+    """Stable periodic motion found near a run."""
+
+    run: FollowedRun
+    """Run whose current state is on the periodic motion."""
+    away: Floats
+    """Inverse of (identity - Jacobian of the period map), scaled, shape (6, 6)."""
+    distance: float
+    """Distance of the given run from the periodic motion, relative to the size of the motion."""
+    period: int
+    """Period of the motion [drive periods]."""
+    exponents_per_s: Floats
+    """Largest Lyapunov exponent, from the multipliers in the last two iterations, shape (2,) [1/s]."""
+
+
+def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
+    """Return the stable periodic motion of this period (in drive periods) near a run, or None."""
+    try:
+        return _fixed_point(near, period)
+    except (ValueError, np.linalg.LinAlgError):
+        # The iteration left the range of allowed states, or a Floquet multiplier equals 1.
+        return None
+
+
+def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
+    run, gone, scales = near.copy(min(TOLERANCE, STRICTER * near.tolerance)), np.inf, near.scales
+    start = run.state / scales
+    size, exponents = float(np.abs(start).max(initial=1e-300)), np.empty(0)
+    for _ in range(ITERATIONS):
+        image, slope = run.image(period)
+        off = (image - run.state) / scales
+        if not np.all(np.isfinite(slope)) or not np.abs(off).max() < max(gone, RETURNED * size):
+            return None
+        gone = float(np.abs(off).max())
+        scaled = slope * scales / scales[:, None]
+        away = np.linalg.inv(np.eye(6) - scaled)
+        largest = max(float(np.abs(np.linalg.eigvals(scaled)).max()), 1e-300)
+        exponents = np.append(exponents, math.log(largest) * run.drive.frequency_hz / period)[-2:]
+        if gone < RETURNED * size and len(exponents) == 2:
+            distance = float(np.abs(run.state / scales - start).max()) / size
+            return FixedPoint(run, away, distance, period, exponents) if largest < 1.0 - NEUTRAL else None
+        run = run.with_push(away @ off * scales)
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +100,7 @@ class SceneRun:
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
-    """Time at which the motion was found to have settled [s]; None if this was not checked or not found."""
+    """Time at which the motion was found to have settled [s]; None if not checked, or not found."""
     ended: str
     """Reason for the end of the run."""
     path: tuple[Stretch, ...]
@@ -55,9 +109,8 @@ class SceneRun:
     """Whether a small perturbation grew enough to prove chaos."""
     wandered_until_s: float
     """Last time at which successive periods of the motion still differed [s]."""
-    steady_m: Floats | None = None
-    """Responses of the periodic motion that the run approaches, shape (4,) [m]; None if the motion does not
-    repeat."""
+    steady: FixedPoint | None = None
+    """Periodic motion that the run approaches; None if the motion does not repeat."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
     """Relative change of the responses by leakage if spectral lines are computed over the whole window, shape
     (4,). Zero unless the motion was found to repeat only within the window."""
@@ -83,20 +136,20 @@ class FixedCourse:
     def watch(self) -> None:
         """Return None: with a fixed duration the motion is not integrated further."""
 
-    def observe(self) -> SceneRun:
+    def observe(self) -> Steps[SceneRun]:
         """Observe the motion in the window at the end of the run, and classify the motion."""
         run, pace, duration = self._run, self._pace, self._duration
         lead = self._lead.end()
-        last = follow_with_section(run, duration.duration_s - duration.window_s)
+        last = yield duration.duration_s - duration.window_s, Watch.NOTHING
         before = pace.repeats([last])
         if before is None:
             run.follow_tangent()
         is_chaos = pace.is_chaos if before is None else None
-        window = observe_window(run, duration.window_s, pace.cycle([last]), is_chaos)
+        window = yield from window_steps(run, duration.window_s, pace.cycle([last]), is_chaos)
         seen = classify(run, window, [last], pace, f"the {duration.duration_s:g} s requested have passed")
         cycle = pace.cycle([last, *window.stretches])
         if window.line_periods % cycle != 0:
-            # The period became known only in the window: observe again, over whole periods (no leakage).
+            # The period became known only in the window: to avoid leakage, observe whole periods again.
             begins = window.begins.copy()
             begins.drop_tangent()
             whole = observe_window(begins, duration.window_s, cycle)
@@ -124,7 +177,7 @@ def classify(
     """
     stretches = [*before, *window.stretches]
     repeats, growth = repeats or pace.repeats(stretches), growth_of(stretches)
-    motion, steady_m = kind_of(repeats, growth, pace.fading_s), None
+    motion, found = kind_of(repeats, growth, pace.fading_s), None
     if run.outcome is not Outcome.REACHED_END:
         motion, repeats, ended = MotionKind.UNDECIDED, None, run.outcome.text
     elif repeats is not None:
@@ -134,9 +187,6 @@ def classify(
             motion, repeats = MotionKind.UNDECIDED, None
         else:
             repeats = replace(repeats, distance=found.distance)
-            end_s = found.run.time_s + repeats.period / pace.frequency_hz
-            one = found.run.copy().follow(end_s, Watch.PEAKS_AND_LINES)
-            steady_m = window_of(found.run, [one]).responses_m
     elif motion is MotionKind.QUASI_PERIODIC and any(map(pace.drifts, (stretches, window.stretches))):
         motion, ended = MotionKind.UNDECIDED, f"after {run.time_s:.3g} s it still drifts"
     return SceneRun(
@@ -150,7 +200,7 @@ def classify(
         path=tuple(stretches),
         grew=growth.is_certain and repeats is None,
         wandered_until_s=run.time_s if repeats is None else stretches[0].start_s,
-        steady_m=steady_m,
+        steady=found,
     )
 
 
@@ -159,14 +209,14 @@ MOST_LOOKS = 4096
 LOOKS = 16
 """Smallest number of checks for repetition before the window."""
 LONGEST_SLICE = 1 << 16
-"""Largest number of drive periods between two checks for repetition; limits the memory for states."""
+"""Largest number of drive periods between two checks for repetition, limited to save memory for states."""
 
 
 class Lead:
     """Part of a run before its window, with some of its states.
 
-    Once the motion repeats to rounding error, the remaining whole periods are skipped. This is impossible
-    for contacts that are integrated in time steps.
+    Once the motion repeats to rounding error, the remaining whole periods are skipped. Periods cannot be
+    skipped if contacts are integrated in time steps.
     """
 
     def __init__(self, run: FollowedRun, until_s: float, pace: Pace) -> None:
@@ -204,7 +254,7 @@ DRIFT_SHARE = 0.25
 
 
 class SettlingCourse:
-    """A run that lasts until the motion repeats or certainly never will; then the motion is observed.
+    """A run until the motion repeats or is certain never to repeat; then the motion is observed.
 
     A repeating motion is observed over one of its periods, any other motion over a window. Because chaos may
     end, a chaotic motion is integrated further, without a tangent vector, as far as a budget allows.
@@ -285,41 +335,39 @@ class SettlingCourse:
         return None
 
     def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
-        """Return the motion to integrate further; its last ``watched`` stretches have a tangent vector."""
+        """Return the motion to integrate further; the last ``watched`` stretches have a tangent vector."""
         run, frequency_hz = self._run, self._pace.frequency_hz
         self._path, self._watched = path, watched
         until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
         self._on = StatesAlone(run, self._pace, states_of(path)).aim(until_s, run.cost_s + alone_s)
         return self._on
 
-    def observe(self) -> SceneRun:
-        """Return window and kind of the motion; if it was integrated further, observe a new window."""
+    def observe(self) -> Steps[SceneRun]:
+        """Return window and kind of the motion; after further integration, observe a new window."""
         if self._on is not None:
-            return self._observe_end(self._on)
+            return (yield from self._observe_end(self._on))
         assert self._seen is not None
         return self._seen
 
-    def _observe_end(self, states: StatesAlone) -> SceneRun:
+    def _observe_end(self, states: StatesAlone) -> Steps[SceneRun]:
         run, pace, path, watched = self._run, self._pace, self._path, self._watched
         if states.repeats is not None:
             seen = _observe_period(run, states.repeats, path, pace)
             return replace(seen, wandered_until_s=states.wandered_until_s)
-        # Chaos may have become quasi-periodic: such a motion does not repeat either, but its growth is zero.
+        # Chaos may have become quasi-periodic motion, which does not repeat either, but has zero growth.
         run.follow_tangent()
         begins, made = run.copy(), round(run.time_s * pace.frequency_hz)
-        last = [
-            follow_with_section(
-                run, (made + number * self._slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES
-            )
-            for number in range(1, self._in_window + 1)
-        ]
+        last: list[Stretch] = []
+        for number in range(1, self._in_window + 1):
+            end_s = (made + number * self._slice_periods) / pace.frequency_hz
+            last.append((yield end_s, Watch.PEAKS_AND_LINES))
         window = window_of(begins, last)
         kind = kind_of(None, growth_of(last), pace.fading_s)
         if kind is not MotionKind.CHAOTIC:
             before = () if growth_of(path).is_certain else path[-watched:]
             seen = classify(run, window, before, pace, f"after {run.time_s:.3g} s it is {kind}")
             return replace(seen, grew=growth_of(path).is_certain, wandered_until_s=last[0].start_s)
-        seen = classify(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
+        seen = classify(run, window, path[-watched:], pace, f"it is chaotic, for at least {run.time_s:.3g} s")
         if run.outcome is not Outcome.REACHED_END:
             return seen
         settled_s = path[-watched].start_s
@@ -327,7 +375,7 @@ class SettlingCourse:
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Return the number of drive periods between two checks (a slice), and of slices in a window."""
+    """Return the number of drive periods in a slice (between two checks), and of slices in a window."""
     in_window = max(1, whole_periods(window_s, frequency_hz))
     periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
     return periods, max(1, round(in_window / periods))

@@ -2,60 +2,62 @@
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..engine.batch import BatchedMotion, follow_batch
+from ..engine.batch import BatchedMotion, follow_batch, is_batchable
 from ..engine.run import (
     DIRECTIONS,
     MAX_IMPACT_RATE_HZ,
     MOST_STEPS,
     NativeRun,
+    Outcome,
     RunRecord,
     Watch,
     most_impacts,
     start_motion,
 )
-from ..specimen.contact_laws import ContactLaw, LinearGap, PowerLaw
+from ..specimen.contact_laws import ContactLaw, PowerLaw
 from ..specimen.drive import WHOLE, Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen, energy_metric, state_scales
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen, energy_metric
 
-# Nominal cost of integrating a motion: its processor time on the machine of docs/accuracy.md [s]. Budgets use
-# this instead of measured time, so that a scene with a budget has the same result on every machine.
+# Nominal cost of integrating a motion: the processor time on the machine of docs/accuracy.md [s]. Budgets use
+# this cost instead of measured time: a scene with a budget then has the same result on every machine.
 
-FLIGHT, STEPS = 5e-5, 3.5e-4
-"""Computing cost of one second of motion: without contact, and with a force that acts at every p [s]."""
-HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
-"""Computing cost of an impact on a Hertz or rigid stop, and on a linear stop [s]."""
-HERTZ_TANGENT, TANGENT = 4.0, 1.6
-"""Cost factors of contacts (Hertz, others) with a tangent vector, which needs time steps in collisions."""
-STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Tolerance below which contacts take more computing time, and the factor of this increase."""
+FLIGHT = 5e-5
+"""Computing cost of one second of motion without contact [s]."""
+CONTACTS: dict[str, tuple[float, float, float]] = {
+    "hertz": (1.8e-6, 2.2, 5.0),
+    "hunt_crossley": (4.5e-6, 2.0, 2.0),
+    "linear_gap": (2e-6, 1.25, 1.0),
+    "rigid": (9e-7, 1.3, 1.0),
+    "power": (7e-9, 2.5, 1.0),
+    "linear": (0.0, 1.0, 1.0),
+}
+"""Computing cost of an impact [s], or of a step of power laws; its factors with a tangent vector, and for
+tolerances below `STRICT_TOLERANCE`."""
+STRICT_TOLERANCE = 1e-8
 STEP = 1e-9
 """Smallest computing cost of a step without contact [s]; matters for modes far faster than the paper's."""
+SAMPLE_STEPS = 700
+"""A stored state under a power law costs as much as this number of steps."""
 TANGENT_STEPS = 4
 """A step with a tangent vector counts as this many steps toward the largest number of steps."""
 
 
 def nominal_cost_s(
-    contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
+    run: NativeRun, contact: ContactLaw, length_s: float, impacts: int, steps: int = 0, samples: int = 0
 ) -> float:
-    """Return the nominal computing cost of a stretch [s], from its impacts, tangent vectors and steps."""
-    strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
-    match contact:
-        case PowerLaw():
-            contacts_s, tangent = (STEPS - FLIGHT) * length_s, TANGENT
-        case LinearGap():
-            contacts_s, tangent = LINEAR_IMPACT * impacts, TANGENT
-        case _:
-            contacts_s, tangent = HERTZ_IMPACT * impacts, HERTZ_TANGENT
-    by_motion_s = FLIGHT * length_s + contacts_s * strict * (tangent if changes else 1.0)
+    """Return the nominal computing cost of a stretch [s], from its numbers of events and tangent vectors."""
+    each_s, tangent, strict = CONTACTS[contact.kind]
+    count = steps + SAMPLE_STEPS * samples if isinstance(contact, PowerLaw) else impacts
+    factor = (tangent if len(run.growth) else 1.0) * (strict if run.tolerance < STRICT_TOLERANCE else 1.0)
+    by_motion_s = FLIGHT * length_s + each_s * count * factor
     return max(by_motion_s, STEP * steps)
 
 
@@ -116,7 +118,8 @@ class FollowedRun:
         self.outcome = Outcome.REACHED_END
         """Outcome of the last integrated stretch."""
         self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
-        self._scales = state_scales(specimen, drive)
+        self.scales = np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
+        """Scale of each coordinate, shape (6,): 1 for displacements, 2 pi f for velocities."""
         self._metric = energy_metric(specimen)
         self.cost_s = 0.0
         """Nominal computing cost since the start of the run [s]; see `nominal_cost_s`."""
@@ -141,7 +144,7 @@ class FollowedRun:
 
     def copy(self, tolerance: float | None = None) -> Self:
         """Return an independent copy, optionally with another tolerance."""
-        twin = object.__new__(type(self))  # faster than copy.copy
+        twin = object.__new__(type(self))  # this is faster than copy.copy
         twin.__dict__.update(self.__dict__, _run=self._run.copy(tolerance))
         return twin
 
@@ -160,19 +163,28 @@ class FollowedRun:
         """Whether m1 touches no stop at present."""
         return self._run.is_in_flight
 
-    def _batch_stretch(self, start_s: float, motion: BatchedMotion) -> Stretch:
-        """Return the stretch, from ``start_s`` until now, that was integrated in a batch."""
+    def batch_periods(self, until_s: float) -> int:
+        """Return the number of drive periods until a time [s]; 0 or less if no batch can integrate them."""
+        end = until_s * self.drive.frequency_hz
+        is_ready = self.outcome is Outcome.REACHED_END and self.is_in_flight and self.periods is not None
+        is_ready = is_ready and abs(end - round(end)) <= WHOLE * end
+        is_ready = is_ready and is_batchable(self.specimen, self.tolerance)
+        return round(end) - (self.periods or 0) if is_ready else 0
+
+    def _batch_stretch(self, start_s: float, before: float, motion: BatchedMotion) -> Stretch:
+        """Return the stretch that a batch integrated from ``start_s``, when `_size` was ``before``."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
-        self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
+        self.cost_s += nominal_cost_s(self._run, self.specimen.contact, length_s, motion.impacts)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
         return Stretch(
             *(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states),
-            *(motion.peak_x_m, motion.peak_p_m, motion.area_x, motion.area_p),
+            *(motion.peak_x_m, motion.peak_p_m, motion.area_x, motion.area_p, self._size() - before),
         )
 
     def follow_tangent(self) -> None:
         """Propagate a tangent vector, in a direction without symmetry, from now on."""
-        self._run.carry((self._scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
+        scales = min(self.specimen.gaps_m) * self.scales
+        self._run.carry((scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
         """Propagate no tangent vector from now on."""
@@ -208,12 +220,7 @@ class FollowedRun:
         made = steps - record.steps_left
         self._steps_left -= counts_as * made
         self.cost_s += nominal_cost_s(
-            self.specimen.contact,
-            self.tolerance,
-            self.time_s - start_s,
-            record.impacts,
-            len(self._run.growth),
-            made,
+            self._run, self.specimen.contact, self.time_s - start_s, record.impacts, made, kept.count
         )
         return Stretch(
             start_s=start_s,
@@ -225,7 +232,7 @@ class FollowedRun:
             area_x=record.area_x,
             area_p=record.area_p,
             samples=kept,
-            # Rounding may place the last samples just after the end of the stretch.
+            # Because of rounding, the last samples may lie just after the end of the stretch.
             states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
@@ -253,7 +260,7 @@ class FollowedRun:
         if len(self._run.growth) == 0:
             return math.nan
         change = self._run.changes[0]
-        # Strong damping may reduce the energy below the smallest float.
+        # With strong damping, the energy may be below the smallest float.
         energy = max(change @ self._metric @ change, sys.float_info.min)
         return 0.5 * math.log(energy) + float(self._run.growth[0])
 
@@ -271,15 +278,13 @@ def follow_together(
     integrated alone for a period. After `TRIES` contacts, or if the batch fails, it is integrated alone.
     """
     flying = [place for place, run in enumerate(runs) if run.is_in_flight and run.tries < TRIES]
-    starts_s = [runs[place].time_s for place in flying]
-    motions = [runs[place]._run for place in flying]  # noqa: SLF001 - of the same file
-    batched = follow_batch(motions, [periods[place] for place in flying], observe) if flying else []
+    batched = _batch([runs[place] for place in flying], [periods[place] for place in flying], observe)
     found: dict[int, Stretch] = {}
-    for place, start_s, motion in zip(flying, starts_s, batched, strict=True):
-        if motion is None:
+    for place, stretch in zip(flying, batched, strict=True):
+        if stretch is None:
             runs[place].tries = TRIES
         else:
-            found[place] = runs[place]._batch_stretch(start_s, motion)  # noqa: SLF001
+            found[place] = stretch
     for place, run in enumerate(runs):
         if place not in found:
             count = 1 if run.tries < TRIES else periods[place]
@@ -287,6 +292,54 @@ def follow_together(
             found[place] = follow_with_section(run, end_s, observe)
         if run.tries < TRIES:
             run.tries = 0 if run.is_in_flight else run.tries + 1
+    return [found[place] for place in range(len(runs))]
+
+
+def _batch(runs: Sequence[FollowedRun], periods: Sequence[int], observe: Watch) -> list[Stretch | None]:
+    """Integrate motions of one specimen in flight in a batch; None for a failed motion."""
+    begun = [(run.time_s, run._size()) for run in runs]  # noqa: SLF001 - of the same file
+    motions = follow_batch([run._run for run in runs], periods, observe) if runs else []  # noqa: SLF001
+    return [
+        None if motion is None else run._batch_stretch(*start, motion)  # noqa: SLF001
+        for run, start, motion in zip(runs, begun, motions, strict=True)
+    ]
+
+
+Found = TypeVar("Found")
+Steps = Generator[tuple[float, Watch], Stretch, Found]
+"""Evaluation of a motion that asks for stretches, by end time [s] and observed quantities, one at a time."""
+
+
+def take_steps(run: FollowedRun, steps: Steps[Found]) -> Found:
+    """Return the result of an evaluation whose stretches are integrated alone."""
+    return take_steps_of_all([run], [steps], are_batched=False)[0]
+
+
+def take_steps_of_all(
+    runs: Sequence[FollowedRun], steps: Sequence[Steps[Found]], *, are_batched: bool
+) -> list[Found]:
+    """Return the results of evaluations whose stretches are integrated alone, or in batches if possible."""
+    found: dict[int, Found] = {}
+    stretches: dict[int, Stretch | None] = dict.fromkeys(range(len(runs)))
+    while stretches:
+        asked: dict[int, tuple[float, Watch]] = {}
+        for place, stretch in stretches.items():
+            try:
+                asked[place] = steps[place].send(stretch)  # type: ignore[arg-type]
+            except StopIteration as end:
+                found[place] = end.value
+        alike = defaultdict[tuple[Specimen, float, Watch], dict[int, int]](dict)
+        for place, (until_s, watch) in asked.items():
+            run = runs[place]
+            if are_batched and (periods := run.batch_periods(until_s)) > 0:
+                alike[run.specimen, run.tolerance, watch][place] = periods
+        stretches = {}
+        for (_, _, watch), group in alike.items():
+            batched = _batch([runs[place] for place in group], [*group.values()], watch)
+            stretches |= zip(group, batched, strict=True)
+        for place, (until_s, watch) in asked.items():
+            if stretches.get(place) is None:
+                stretches[place] = follow_with_section(runs[place], until_s, watch)
     return [found[place] for place in range(len(runs))]
 
 
@@ -369,12 +422,17 @@ def follow_with_section(run: FollowedRun, until_s: float, observe: Watch = Watch
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
 
-def observe_window(
+def observe_window(run: FollowedRun, window_s: float, cycle: int = 1) -> ObservedWindow:
+    """Observe a motion alone in a window that begins now; see `window_steps`."""
+    return take_steps(run, window_steps(run, window_s, cycle))
+
+
+def window_steps(
     run: FollowedRun,
     window_s: float,
     cycle: int = 1,
     is_chaos: Callable[[Sequence[Stretch]], bool] | None = None,
-) -> ObservedWindow:
+) -> Steps[ObservedWindow]:
     """Observe a motion in a window that begins now and contains at least one drive period.
 
     If the motion repeats after ``cycle`` drive periods and the window is long enough, lines are computed over
@@ -388,7 +446,7 @@ def observe_window(
     line_s = max(end_s - periods / frequency, start_s)
     count = min(BLOCKS, periods)
     edges = [end_s - (periods * (count - k) // count) / frequency for k in range(1, count)] + [end_s]
-    head = [follow_with_section(run, line_s, Watch.PEAKS)] if run.time_s < line_s else []
+    head = [(yield line_s, Watch.PEAKS)] if run.time_s < line_s else []
     parts: list[Stretch] = []
     for edge in edges:
         if is_chaos is not None and count == BLOCKS:
@@ -396,7 +454,7 @@ def observe_window(
                 run.drop_tangent()
             elif len(parts) == BLOCKS - LAST and math.isnan(parts[-1].growth):
                 run.follow_tangent()
-        parts.append(follow_with_section(run, edge, Watch.PEAKS_AND_LINES))
+        parts.append((yield edge, Watch.PEAKS_AND_LINES))
     return window_of(begins, parts, head)
 
 

@@ -1,4 +1,4 @@
-"""Mean responses over several nearly equal starts (initial states), and its error. SI units."""
+"""Mean responses over several nearly equal starts (initial states), and error of the mean. SI units."""
 
 import math
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats
 from .followed_run import FollowedRun
 from .repetition import Repetition
 from .scatter import COVERED
@@ -14,7 +14,7 @@ from .shares import student_quantile, wilson_share
 from .stated_error import ROUNDING
 
 ALIKE = 1e-2
-"""Largest relative difference between responses of one motion, due to runs that are still settling."""
+"""Largest relative difference between responses of the same motion if some runs are still settling."""
 OTHER_DIFFERS = 1.0
 """Assumed relative deviation of the response of a motion that no start has reached, such as chaos."""
 FEWEST_STARTS = 16
@@ -33,7 +33,7 @@ class Start:
     windows: list[Floats]
     """Responses in each window, shape (4,); a periodic motion needs only one window."""
     repeats: Repetition | None
-    """Period of a nearly periodic motion, whose windows are alike; None for other motions."""
+    """Period of a nearly periodic motion, all windows of which are alike; None for other motions."""
     impacts: int
     """Number of impacts in the start's first response window."""
 
@@ -45,10 +45,10 @@ class Start:
 def mean_error(seen: Sequence[Floats], others: int | None) -> Floats:
     """Return the relative error of the mean responses over starts, shape (4,).
 
-    It is the larger of two estimates. The first is Student's 95 % interval with the smallest and the largest
-    value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which allows for a rare motion. The
-    second applies if most starts reached one repeating motion and ``others`` starts did not. It assumes that
-    the share of other motions is at the upper end of Wilson's interval. Motions that some starts reached
+    The error is the larger of two estimates. The first is Student's 95 % interval with the smallest and the
+    largest value counted twice (Agresti and Coull, Am. Stat. 52 (1998) 119), which allows for a rare motion.
+    The second applies if most starts reached one repeating motion and ``others`` starts did not. It assumes
+    that the share of other motions is at the upper end of Wilson's interval. Motions that some starts reached
     differ by at most the range of the responses; motions that no start reached may differ more.
     """
     responses = np.array(seen)
@@ -90,7 +90,7 @@ def next_size(
     """Return the next numbers of starts and of windows per start, which need the least simulated time.
     More windows save the time ``lead`` before a start's first window (in window lengths). More starts reduce
     the part of the variance that differs between starts, and the weight of the smallest and largest start.
-    The variance is reduced at most by a factor of ``most`` at once, because it is not known well.
+    The variance is reduced at most by a factor of ``most`` at once, because its value is uncertain.
     """
     count, windows = len(starts), windows_of(starts)
     if count < FEWEST_STARTS:
@@ -100,7 +100,7 @@ def next_size(
 
     def size(more: int) -> tuple[int, int]:
         wanted = factor * (1.0 - within + within * windows / more) * count**2 / (count + PADDING)
-        # Solve n^2 / (n + PADDING) = wanted.
+        # Solve n^2 / (n + PADDING) = wanted for n.
         return max(count, math.ceil(0.5 * (wanted + math.sqrt(wanted * (wanted + 4.0 * PADDING))))), more
 
     sizes = [size(more) for more in range(windows, 2 * windows + 1 if within > 0.0 else windows + 1)]
@@ -125,11 +125,11 @@ def _share_within(starts: Sequence[Start]) -> float:
 
 
 def time_factor(starts: Sequence[Start], error: float) -> float:
-    """Return the factor by which the simulated time must grow to reach the requested error."""
+    """Return the factor by which the simulated time must grow to reach the target error."""
     worst = float(error_of(starts).max())
-    # The share of motions that no start reached falls like 1 / starts, other errors like 1 / sqrt(starts).
+    # The share of unreached motions falls like 1 / starts; other errors fall like 1 / sqrt(starts).
     is_unseen = others_of(starts) is not None and worst <= 1.01 * _unseen(len(starts))
-    return 1.05 * math.pow(worst / error, 1.0 if is_unseen else 2.0)
+    return 1.05 * math.pow(worst / max(error, ROUNDING), 1.0 if is_unseen else 2.0)
 
 
 def _unseen(count: int) -> float:

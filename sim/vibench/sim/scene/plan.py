@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 from ..specimen.contact_laws import NoContact, PowerLaw
 from ..specimen.drive import Harmonic
 from ..specimen.modes import harmonic_motion, modal_form
-from ..specimen.specimen import Specimen
-from ..specimen.state import Complex, Floats, X, Y, Z
-from .followed_run import whole_periods
+from ..specimen.specimen import Complex, Floats, Specimen, X, Y, Z
+from .followed_run import CONTACTS, FLIGHT, whole_periods
 from .prediction import Method
 from .repetition import MOST_STATES
 from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
@@ -21,8 +20,8 @@ from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observ
 if TYPE_CHECKING:
     from .cost import ExpectedTime
 
-# Without contact a displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0. Its
-# magnitude is at most abs(S) + sum abs(m_j). If this bound on abs(p) is below the gap, no stop is touched.
+# Without contact a displacement is Re(S exp(i omega t)) + Re sum m_j exp(l_j t) with Re l_j <= 0. The
+# magnitude is at most abs(S) + sum abs(m_j). If this bound for p is below the gap, no stop is touched.
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +58,14 @@ class LinearMotion:
 
     def state(self, time_s: float) -> Floats:
         """Return x, y, z, vx, vy, vz at a time [s], shape (6,) [m, m/s]."""
-        # Subtract whole cycles exactly; their rounding error would shift the phase at late times.
+        # Subtract whole cycles exactly: at late times, a rounding error would shift the phase.
         part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
         turn = 2.0 * math.pi * part + self.drive.phase_rad
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 
     def transient_share(self, time_s: float) -> float:
-        """Return the larger ratio, for x or p, of transient to steady motion at a time [s]."""
+        """Return the ratio of transient to steady motion at a time [s], for x or p, whichever is larger."""
         fading = np.exp(self.rates.real * time_s)
         return max(
             float(np.abs(part) @ fading) / abs(whole) if np.any(part) else 0.0 for part, whole in self._parts
@@ -102,7 +101,7 @@ def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> Line
     if not (np.all(np.isfinite(modes)) and np.all(np.isfinite(steady))):
         msg = (
             f"The motion of this specimen under {drive.amplitude_m:g} m at {drive.frequency_hz:g} Hz cannot "
-            "be computed: its numbers are too far apart. Correct masses, springs, dampings, drive or start."
+            "be computed: the numbers are too far apart. Correct masses, springs, dampings, drive or start."
         )
         raise ValueError(msg)
     return LinearMotion(drive, form.rates, modes, steady)
@@ -125,22 +124,22 @@ DECAYED_SHARE = 1e-9
 CLOSED_FORM_S = 5e-4
 """Planned computing time for a closed form [s]. Measured run times correct the planned times for each machine
 (`vibench.sim.scene.cost`)."""
-FLIGHT_S, PERIOD_S, IMPACT_S, PRESSED_S = 5e-5, 1e-7, 1e-6, 1.2e-2
-"""Planned computing time [s] per second and per drive period without contact, per impact, and per second of
-contact."""
-STEPS_S, STEPS_PERIOD_S = 5e-4, 2.5e-6
+PERIOD_S, PRESSED_S = 2e-7, 1.2e-2
+"""Planned computing time [s] of a drive period without contact, and of one second of contact."""
+STEPS_S, STEPS_PERIOD_S = 4e-4, 5e-6
 """Planned computing time [s] per second and per drive period of motion, for a force that acts at every p."""
+STIFF, STIFFENING = 0.2, 0.35
+"""Ratio of p without stops to the gap, above which a force of degree n needs shorter steps; the exponent of
+this ratio is `STIFFENING` (n - 1) / (n + 1), as an oscillator's frequency suggests."""
 TANGENT = 1.5
-"""Additional computing time for a tangent vector, relative to the time without one."""
+"""Additional computing time for a tangent vector, relative to the time without a tangent vector."""
 SETTLING_S = 10.0
 """Planned simulated time of a run with an automatic duration [s]."""
 TOUCHING = 0.6
 """Ratio of the steady p without stops to the gap, above which most motions depend sensitively on the start:
-84 of 93 random scenes above this ratio, but 3 of 49 below it (`benchmarks/planned_costs.py`)."""
-SLOW = 0.9
-"""Ratio of drive frequency to lowest natural frequency, below which a motion counts as slow."""
+135 of 166 random scenes above this ratio, but 15 of 118 below it (`benchmarks/planned_costs.py`)."""
 MOST_SHARE = 1e6
-IMPACTS_PER_PERIOD = 0.4
+IMPACTS_PER_PERIOD = 2.4
 """Number of impacts per drive period if p without stops equals the gap; grows as the cube root of p / gap."""
 HALF_PRESSED = 150.0
 """Ratio of p without stops to the gap, at which m1 touches a stop during half of the time."""
@@ -220,12 +219,11 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     )
     longest_s = scene.duration.longest_s
     length_s = longest_s if isinstance(scene.duration, FixedDuration) else min(SETTLING_S, longest_s)
-    per_s = _planned_per_s(scene, motion, method)
     return ScenePlan(
         method,
         sentences,
-        CLOSED_FORM_S + per_s * length_s + _starts_s(scene, motion, per_s * length_s),
-        CLOSED_FORM_S + per_s * longest_s + _starts_s(scene, motion, per_s * longest_s),
+        _planned_s(scene, motion, length_s),
+        _planned_s(scene, motion, longest_s),
         _kind(scene, method, motion),
         motion.largest_p_m,
     )
@@ -248,8 +246,8 @@ def _reason_of_closed_form(specimen: Specimen, motion: LinearMotion) -> str:
     if specimen.contact.kind == "linear":
         return f"There are no stops. {steady}"
     return (
-        f"No stop is touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, "
-        f"transient included, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
+        f"No stop is touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, including the "
+        f"transient, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
     )
 
 
@@ -273,12 +271,12 @@ def _observable_texts(observe: tuple[Observable, ...]) -> list[str]:
     sentences = [
         "A tangent vector is computed for the exponent."
         if Observable.LYAPUNOV in observe
-        else "A tangent vector is computed only if the motion does not repeat, to classify it."
+        else "If the motion does not repeat, a tangent vector is computed to classify the motion."
     ]
     if Observable.SPECTRUM in observe:
         sentences.append("Samples are stored over the window for the spectrum.")
     else:
-        sentences.append("Only the states once per drive period are stored.")
+        sentences.append("Only one state per drive period is stored.")
     if Observable.SCATTER in observe:
         sentences.append(
             f"{FEWEST - 1} more runs, whose starts differ by a millionth of the gap, show the scatter."
@@ -291,8 +289,8 @@ def _refinement_texts(duration: FixedDuration | AutomaticDuration) -> tuple[str,
         "A second run, whose start differs by a millionth of the gap, has a smaller tolerance.",
         "If the motion approaches a stable periodic motion, Newton's iteration finds that motion exactly.",
         f"Otherwise, both runs are observed over {duration.window_s:g} s and compared.",
-        "If they separate, the motion depends sensitively on its start; the result is a mean over starts.",
-        "Starts are added until the requested error or time is reached.",
+        "If the runs separate, the motion is sensitive to its start; the result is a mean over starts.",
+        "Starts are added until the target error or time is reached.",
     )
 
 
@@ -300,9 +298,9 @@ def _other_starts(budget_s: float) -> str:
     if budget_s == 0.0:
         return "Runs from other starts are not computed, because there is no budget."
     return (
-        "A second run starts a millionth of the gap away. If the two runs separate, or the motion is "
-        f"chaotic, the final motion is random. Then {CLEAR} to {MOST} starts are computed and chaos is "
-        f"integrated further, for at most {budget_s:g} s of processor time."
+        "The start of a second run differs by a millionth of the gap. If the two runs separate, or the "
+        f"motion is chaotic, the final motion is random. Then {CLEAR} to {MOST} starts are computed and "
+        f"chaos is integrated further, for at most {budget_s:g} s of processor time."
     )
 
 
@@ -321,47 +319,42 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
 
 def _kind(scene: Scene, method: Method, motion: LinearMotion) -> str:
     """Return the kind of a run; runs of one kind have a similar ratio of actual to planned time."""
-    contact = "free"
-    if _share(scene, motion) > TOUCHING:
-        contact = "slow" if _is_slow(scene, motion) else "touching"
+    contact = "touching" if _share(scene, motion) > TOUCHING else "free"
     contact += ", undamped" if motion.slowest_rate >= 0.0 else ""
     duration = "fixed" if isinstance(scene.duration, FixedDuration) else "automatic"
     observed = "+".join(sorted(each.value for each in scene.observe))
-    return "/".join(
-        (
-            *(method.value, scene.specimen.contact.kind, contact, scene.accuracy.value, duration, observed),
-            # The kind of run includes the budget, because in chaos, runs from other starts use all of it.
-            f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target),
-        )
-    )
+    # The kind of run includes the budget, because in chaos, runs from other starts use all of it.
+    limit = f"{scene.budget_s:.0e} s" if scene.target is None else str(scene.target)
+    law, accuracy = scene.specimen.contact.kind, scene.accuracy.value
+    return "/".join((method.value, law, contact, accuracy, duration, observed, limit))
 
 
-def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
-    """Return the planned computing time for one second of motion [s]."""
-    share, frequency_hz = _share(scene, motion), scene.drive.frequency_hz
-    per_s = FLIGHT_S + PERIOD_S * frequency_hz
-    if share > TOUCHING:
-        per_s += IMPACT_S * IMPACTS_PER_PERIOD * math.cbrt(share) * frequency_hz
-        per_s += PRESSED_S * share / (share + HALF_PRESSED)
-    if method is Method.POLYNOMIAL:
-        per_s = STEPS_S + STEPS_PERIOD_S * frequency_hz
+def _planned_s(scene: Scene, motion: LinearMotion, length_s: float) -> float:
+    """Return the planned computing time of a motion of this length [s]."""
+    run_s = length_s * _planned_per_s(scene, motion)
     runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
-    runs += (FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0) + float(scene.budget_s > 0.0)
-    return per_s * runs
+    runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
+    if scene.budget_s == 0.0 or _share(scene, motion) <= TOUCHING:
+        return CLOSED_FORM_S + run_s * (runs + float(scene.budget_s > 0.0))
+    return CLOSED_FORM_S + run_s * runs + min(scene.budget_s, (FEWEST - 1) * run_s)
+
+
+def _planned_per_s(scene: Scene, motion: LinearMotion) -> float:
+    """Return the planned computing time of one run for one second of motion [s]."""
+    share, frequency_hz, contact = _share(scene, motion), scene.drive.frequency_hz, scene.specimen.contact
+    if isinstance(contact, PowerLaw):
+        degree = max(exponent for exponent, _ in contact.terms)
+        stiffening = max(1.0, share / STIFF) ** (STIFFENING * (degree - 1) / (degree + 1))
+        return (STEPS_S + STEPS_PERIOD_S * frequency_hz) * float(stiffening)
+    per_s = FLIGHT + PERIOD_S * frequency_hz
+    if share > TOUCHING:
+        impact_s, _, _ = CONTACTS[contact.kind]
+        per_s += impact_s * IMPACTS_PER_PERIOD * math.cbrt(share) * frequency_hz
+        per_s += PRESSED_S * share / (share + HALF_PRESSED)
+    return per_s
 
 
 def _share(scene: Scene, motion: LinearMotion) -> float:
     """Return the ratio of the steady p without stops to the smaller gap, at most `MOST_SHARE`."""
     size_m = abs(motion.steady_p)
     return size_m / max(min(scene.specimen.gaps_m), size_m / MOST_SHARE) if size_m > 0.0 else 0.0
-
-
-def _starts_s(scene: Scene, motion: LinearMotion, run_s: float) -> float:
-    """Return the planned computing time for runs from other starts [s]; zero if they are hardly needed."""
-    is_forgotten = _share(scene, motion) > TOUCHING and not _is_slow(scene, motion)
-    return min(scene.budget_s, (FEWEST - 1) * run_s) if is_forgotten else 0.0
-
-
-def _is_slow(scene: Scene, motion: LinearMotion) -> bool:
-    """Return whether the drive is below all natural frequencies, so that a run from one start suffices."""
-    return 2.0 * math.pi * scene.drive.frequency_hz < SLOW * float(np.abs(motion.rates).min(initial=math.inf))

@@ -5,8 +5,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
+from ..engine.run import Outcome
+from ..specimen.specimen import Floats
 from .shares import UNSURE, EscapeRate, Share
 
 State = tuple[float, float, float, float, float, float]
@@ -44,7 +44,7 @@ class StartMemory(StrEnum):
     """A small perturbation of the start grew to the size of the motion. A repeated run, on another machine or
     at another accuracy, may therefore reach another motion."""
     UNKNOWN = "unknown"
-    """Not determined, because no computing time was allowed for it, or the run failed."""
+    """Not determined, because no computing time was allowed for this test, or the run failed."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class FoundMotion:
     """One of the motions reached from nearly equal starts.
 
     Two motions count as the same if kind and period are equal and responses agree to 0.1 % or, in chaos,
-    within the scatter. A motion and its mirror image have the same responses and count as one.
+    within the scatter. A motion and its mirror image have the same responses and count as one motion.
     """
 
     motion: MotionKind
@@ -69,7 +69,7 @@ class FoundMotion:
     starts: int
     """Number of starts (initial states) that led to this motion."""
     share: Share
-    """Share of all starts; the 95 % intervals of all motions hold jointly. They allow for longer runs, where
+    """Share of all starts; the 95 % intervals of all motions hold jointly, and allow for longer runs, where
     starts that are undecided, chaotic so far, or on one of several chaotic motions may end elsewhere."""
 
 
@@ -99,7 +99,7 @@ class TargetReport:
     """Requested and reached error and computing time."""
 
     wanted_error: float | None
-    """Requested relative error; None if not requested. The same holds for ``wanted_time_s``."""
+    """Target relative error; None if not requested. The same holds for ``wanted_time_s``."""
     wanted_time_s: float | None
     error: float | None
     """Largest of the stated errors of the four responses; None if unknown."""
@@ -110,12 +110,12 @@ class TargetReport:
     windows: int
     """Number of consecutive windows per start that are averaged."""
     is_met: bool
-    """Whether the reached error is at most the requested one."""
+    """Whether the reached error is at most the requested error."""
     needed_s: tuple[float, float, float] | None
-    """Computing time for the requested error [s]: estimate, lower and upper limit. None if unknown, or if
+    """Computing time for the target error [s]: estimate, lower and upper limit. None if unknown, or if
     more time does not reduce the error."""
     is_reachable: bool = True
-    """Whether the requested error can be reached with more time; False if that takes over ten days."""
+    """Whether the target error can be reached with more time; False if this would take over ten days."""
 
     @property
     def unseen_share(self) -> float:
@@ -236,7 +236,7 @@ class ScenePrediction:
     ensemble: Ensemble | None = None
     """Motions reached from other starts; None if the start determines the motion, or no time was allowed."""
     target: TargetReport | None = None
-    """Requested and reached error and computing time; None if neither of them was requested."""
+    """Requested and reached error and computing time; None if neither error nor time was requested."""
 
     @property
     def is_one_of_several(self) -> bool:

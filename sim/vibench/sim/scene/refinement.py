@@ -1,4 +1,4 @@
-"""Solve a scene to a requested error or within a requested time. SI units.
+"""Solve a scene to a target error or within a requested time. SI units.
 
 Results with ever smaller error estimates are computed until the target is met. Methods, in order of rising
 cost: a closed form; Newton's iteration for a periodic motion that the run approaches; responses in a stated
@@ -13,12 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..engine.batch import batches_pay, is_batchable
-from ..engine.run import Watch
-from ..specimen.accuracy import Accuracy
+from ..engine.run import Accuracy, Outcome, Watch
 from ..specimen.modes import modal_form
-from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
-from .fixed_point import TOLERANCE as TIGHT, stable_motion
+from ..specimen.specimen import Floats
+from .course import TOLERANCE as TIGHT, stable_motion
 from .followed_run import (
     FollowedRun,
     ObservedWindow,
@@ -52,7 +50,7 @@ from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, wi
 LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
 """Default limit of the computing time, and expected time above which an error is out of reach [s]."""
 HOPELESS_S = 2.0
-"""Computing time if no time is requested and the requested error takes longer than the default limit [s]."""
+"""Computing time if no time is requested and the target error takes longer than the default limit [s]."""
 FIRST_S, GRACE_S = 0.1, 0.05
 """Time until a first result is due, and nominal cost that this result may use after the time limit [s]."""
 PART_S, MOST_PART_S = 4e-3, 30e-3
@@ -72,8 +70,8 @@ KNOWN = 0.03
 MOST_PUSH = 1000.0
 """Changes of the start are proportional to the gap, or to this many drive amplitudes if that is less."""
 LOOK_S, LOOK_PERIODS, LOOK_SHARE = 0.1, 4, 0.2
-"""Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first it is the time so far,
-up to LOOK_S [s]; later it is LOOK_SHARE of the time so far."""
+"""Interval between checks of the motion: at least LOOK_PERIODS drive periods. At first, the interval is the
+time so far, up to LOOK_S [s]; later, LOOK_SHARE of the time so far."""
 LOOKS = 8
 """Number of checks of a run from another start, before its window begins."""
 LOOSE, TIGHTEST = Accuracy.QUICK.tolerance, 1e-12
@@ -86,7 +84,7 @@ that the iteration may use."""
 
 
 class _Clock:
-    """Clock with the computing time limit; it adds requested and reached error and time to a prediction."""
+    """Clock that checks the time limit, and adds requested and reached error and time to a prediction."""
 
     def __init__(self, target: Target) -> None:
         self._target = target
@@ -110,7 +108,7 @@ class _Clock:
         *,
         is_final: bool = False,
     ) -> ScenePrediction:
-        """Return the prediction, with its requested and reached error and time.
+        """Return the prediction, with requested and reached error and time.
 
         ``is_final`` is True if more time does not reduce the error.
         """
@@ -149,7 +147,7 @@ class _Path:
     is_settled: bool = False
     """Whether the run certainly approaches the periodic motion."""
     distance: float = math.inf
-    """Relative distance of the run from the periodic motion it may approach, at the last check."""
+    """Relative distance of the run, at the last check, from the periodic motion that it may approach."""
     closest: float = CLOSE
     """Relative change of the state per period below which Newton's iteration is tried next."""
 
@@ -157,7 +155,7 @@ class _Path:
 def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
     """Yield results of a scene with a target, each better than the one before.
 
-    Without a requested time, it ends after a minute, or after two seconds if the requested error certainly
+    Without a requested time, refining ends after a minute, or after two seconds if the target error certainly
     takes longer than a minute. Raises ValueError when the scene has no target, the specimen cannot be
     simulated, or the requested time is too short for one drive period.
     """
@@ -173,8 +171,8 @@ def refine_scene(scene: Scene) -> Iterator[ScenePrediction]:
 
 
 def uncertainty_of_time(samples: int) -> float:
-    """Return the relative uncertainty (two standard deviations) of a time that the error of a mean needs."""
-    # The standard deviation of n samples has a relative uncertainty of 1 / sqrt(2 n); the time is its square.
+    """Return the relative uncertainty (two standard deviations) of the time for a mean's target error."""
+    # A standard deviation from n samples is uncertain by 1 / sqrt(2 n). The time grows with the square.
     return min(0.9, 2.0 * 2.0 / math.sqrt(2.0 * samples))
 
 
@@ -205,14 +203,14 @@ class _Refinement:
         self._part_s = min(1.0 / frequency_hz, FIRST_CYCLES / max(fastest, frequency_hz))
         self._begin = FollowedRun(scene.specimen, scene.drive, LOOSE, scene.start.state)
         self._pushes = self._random_changes(1)
-        # Only a motion that does not settle needs a strict twin; an undamped motion never settles.
+        # Only an undamped motion never settles; it needs a twin with a strict tolerance.
         strict = TIGHT if motion.slowest_rate >= 0.0 else Accuracy.STANDARD.tolerance
         self._main, self._twin = self._begin.copy(), self._begin.copy(strict).with_push(self._pushes[0])
         self._scales = np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
         self._window_periods = max(1, whole_periods(scene.duration.window_s, frequency_hz))
         self._due_s = min(FIRST_S, clock.limit_s)
         self._pair = self._main.copy(), self._twin.copy()
-        """Copies of the run and of its stricter companion run, made at the last check of both."""
+        """Copies of the run and of the stricter companion run, made at the last check of the two runs."""
         self._nearly = replace(self._pace, sharpness=Sharpness(ALIKE, self._pace.sharpness.noise))
         self._orbits: list[_Orbit] = []
         """All periodic motions found in this scene so far."""
@@ -226,7 +224,7 @@ class _Refinement:
         self._kept = max(4 * MOST_PERIODS, 2 * math.ceil(self._pace.forgetting_periods) + MOST_PERIODS)
         """Number of latest states, one per drive period, that are stored."""
         self._first_section = np.empty((0, 6))
-        """States of the first of several starts, once per drive period of its first window."""
+        """States of the first of several starts, once per drive period of this start's first window."""
         self._is_batched = False
         """Whether further starts are integrated in SIMD batches."""
 
@@ -298,7 +296,7 @@ class _Refinement:
     def _follow_all(
         self, runs: Sequence[FollowedRun], until_s: float, watch: Watch = Watch.NOTHING
     ) -> list[list[Stretch]] | None:
-        """Integrate several motions to the same time, in batches; otherwise like `_follow_parts`."""
+        """Integrate several motions to the same time in batches, as `_follow_parts` does for one motion."""
         parts: list[list[Stretch]] = [[] for _ in runs]
         at_once = 1 if len(runs) == 1 else BATCH_PARTS
         while under_way := [place for place, run in enumerate(runs) if run.time_s < until_s]:
@@ -319,7 +317,7 @@ class _Refinement:
             spent_s = max(sum(run.cost_s for run in runs) - cost_s, 1e-9)
             taken_s = time.thread_time() - began_s
             self._spent_s += max(spent_s, taken_s)
-            # The nominal cost, equal on every machine, sets the length unless it is far too low.
+            # Set the length by the nominal cost (equal on every machine), unless this is far too low.
             self._part_s *= min(4.0, at_once * PART_S / spent_s, MOST_PART_S / max(taken_s, 1e-9))
         return parts
 
@@ -360,7 +358,7 @@ class _Refinement:
         elif len(near) > 0 and not now < path.distance:
             path.closest = 0.3 * float(changes[near[0]])
             known = self._nearest(recent[-1], KNOWN * size)
-            # A run that stops approaching a known motion may be near another one, such as a mirror image.
+            # If a run stops approaching a motion, the run may be near another, such as a mirror image.
             is_new = known is not None and known is not path.orbit
             path.orbit = (known if is_new else self._newton(path.run, int(near[0]) + 1)) or path.orbit
             now = self._away_from(path.orbit, recent[-1], size)
@@ -404,7 +402,7 @@ class _Refinement:
             if period % shorter == 0 and np.ptp(states[shorter - 1 :: shorter], axis=0).max() < same:
                 return self._newton(near, shorter)
         first, second = windows[0].responses_m, windows[1].responses_m
-        # Rounding error at the end of a period, amplified by the inverse matrix of Newton's iteration.
+        # The rounding error at the end of a period is amplified by the inverse matrix of Newton's iteration.
         grown = max(1.0, 1e-3 * float(np.abs(away).sum(axis=1).max()))
         rounding = grown * ROUNDING * np.repeat(second[::2], 2) / second
         errors = SAFETY * np.abs(first - second) / second + rounding
@@ -562,7 +560,7 @@ class _Refinement:
     def _observe_starts(self, starts: list[Start], count: int, begins_s: float) -> bool:
         """Add the next ``count`` starts, with one window each; return False after the time limit."""
         paths = [self._new_path(len(starts) + k) for k in range(count)]
-        # In a batch, simulating a settled run further takes less time than a check.
+        # In a batch, continuing a settled run takes less time than checking whether it has settled.
         looks = 1 if self._is_batched else LOOKS
         for look in range(1, looks + 1):
             look_s = math.ceil(begins_s * look / looks * self._frequency_hz) / self._frequency_hz
@@ -594,7 +592,7 @@ class _Refinement:
         return True
 
     def _new_path(self, number: int) -> _Path:
-        """Return the run from start ``number``; start 0 is the requested one."""
+        """Return the run from start ``number``; start 0 is the requested start."""
         if number == 0:
             return self._path
         if number > len(self._pushes):
@@ -666,7 +664,7 @@ class _Refinement:
     def _prediction(
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
     ) -> ScenePrediction:
-        """Return a prediction with responses and errors; the caller sets its other fields."""
+        """Return a prediction with responses and errors; the caller sets the other fields."""
         amplitude_m = self._scene.drive.amplitude_m
         is_free = never_touches(self._scene.specimen, self._motion)
         response_i, response_ii, relative_i, relative_ii = (

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..specimen.accuracy import Accuracy
+from ..engine.run import Accuracy
 from ..specimen.contact_laws import ContactLaw, PowerLaw
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats, Specimen
 from .followed_run import Stretch, states_of
 from .prediction import MotionKind
 
@@ -43,7 +42,7 @@ FEWEST_NEUTRAL = 8.0
 
 @dataclass(frozen=True)
 class Repetition:
-    """Period of a repeating motion, in drive periods, and its distance from the exact periodic motion."""
+    """Period of a repeating motion in drive periods, and distance from the exact periodic motion."""
 
     period: int
     distance: float
@@ -99,7 +98,7 @@ def repetition(
     section
         States once per drive period, shape (n, 6); a longer period requires more states.
     omega
-        Angular frequency of the drive [rad/s]; velocities are divided by it.
+        Angular frequency of the drive [rad/s]; velocities are divided by this frequency.
     forgetting_periods
         Drive periods in which the slowest mode without contact decays by a factor of e.
     sharpness
@@ -124,7 +123,7 @@ def repetition(
 
 
 def _returns_nowhere(points: Floats, tolerance: float) -> bool:
-    """Return whether the last state alone excludes repetition; a fast test that detects most chaos."""
+    """Return whether the last state alone excludes repetition; this fast test detects most chaos."""
     changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
     return bool(np.all(changes >= tolerance))
 
@@ -177,7 +176,7 @@ def longest_section(forgetting_periods: float) -> int:
 
 
 def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
-    """Return the kind of a motion; undecided if the growth is unclear or not observed for long enough."""
+    """Return the kind of a motion; undecided if growth is unclear or was not observed for long enough."""
     if repeats is not None:
         return MotionKind.PERIODIC
     times = growth.duration_s / fading_s
@@ -195,13 +194,13 @@ def _change(after: Floats, before: Floats) -> float:
 
 
 FORGETTING = 8.0
-"""Decay times of the slowest mode after which a non-repeating motion counts as on its attractor."""
+"""Decay times of the slowest mode after which a non-repeating motion is assumed to be on its attractor."""
 FEWEST_TIMES = 40.0
 """Ratio of the longest run to the longest decay time used; longer decay times are cut to this limit."""
 MOST_STATES = 2_000_000
 """Largest number of drive periods in a window; the states of two windows, with a copy, take 300 MB."""
 FEWEST_PERIODS = 32
-"""Smallest number of drive periods after which a non-repeating motion counts as on its attractor."""
+"""Smallest number of drive periods until a non-repeating motion is assumed to be on its attractor."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
 """Relative distance from the periodic motion below which a motion counts as settled."""
 ROUNDING = 1e-10
@@ -222,7 +221,7 @@ class Pace:
     forgetting_s: float
     """Decay time of the slowest mode without contact (factor e) [s], at most 1/40 of the longest run."""
     fading_s: float
-    """Decay time without the limit of ``forgetting_s`` [s]; for an undamped mode it is the limit."""
+    """Decay time without the limit of ``forgetting_s`` [s]; equal to this limit for an undamped mode."""
     sharpness: Sharpness
     nearly: Sharpness
     """Tolerances of the least accurate level, for motions that are nearly settled."""
@@ -256,7 +255,7 @@ class Pace:
         return is_drifting(states_of(stretches), 2.0 * np.pi * self.frequency_hz)
 
     def cycle(self, stretches: Sequence[Stretch]) -> int:
-        """Return the period of a nearly settled motion, in drive periods; 1 if there is none.
+        """Return the period of a nearly settled motion, in drive periods; 1 if no period is found.
 
         Spectral lines are computed over this period. "Nearly settled" does not depend on the accuracy.
         """

@@ -1,8 +1,8 @@
 """Scatter of Response I between windows of a motion that never repeats. SI units.
 
-Response I is the largest value in a window and therefore has an extreme-value distribution. In chaos it
-scatters by a few per cent at any accuracy. The scatter is estimated from the largest values in blocks of one
-run, or from several runs with slightly different starts.
+Response I is the largest value in a window and therefore has an extreme-value distribution. In chaos,
+Response I scatters by a few per cent at any accuracy. The scatter is estimated from the largest values in
+blocks of one run, or from several runs with slightly different starts.
 """
 
 import math
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..specimen.state import Complex, Floats
+from ..specimen.specimen import Complex, Floats
 from .followed_run import Block
 from .shares import student_quantile
 
@@ -45,7 +45,7 @@ def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatt
 
     The scatter is the geometric mean of two estimates. The scatter of block peaks is too large, because peaks
     of longer windows scatter less (Coles, Statistical Modeling of Extreme Values (2001), section 3.1).
-    The bootstrap estimate is too small, because it never exceeds the largest observed peak.
+    The bootstrap estimate is too small, because this estimate never exceeds the largest observed peak.
     """
     peaks = np.sort(np.asarray(block_peaks, dtype=np.float64))
     if len(peaks) < FEWEST_BLOCKS:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
-from ..specimen.accuracy import Accuracy
+from ..engine.run import Accuracy
 from ..specimen.drive import WHOLE, Harmonic
 from ..specimen.specimen import Specimen
 from ..specimen.stops import Strict, member, require_positive
@@ -17,7 +17,7 @@ BUDGET_S = 1.0
 """Default budget of computing time for runs from other starts and for continued chaos [s]."""
 CLEAR, FEWEST, MOST = 8, 16, 64
 """Numbers of starts, including the requested one. `CLEAR` if all starts reach one motion, or chaos certainly
-lasts. `MOST` if they reach several motions and the budget allows it. `FEWEST` in all other cases."""
+lasts. `MOST` if starts reach several motions and the budget suffices. `FEWEST` in all other cases."""
 
 
 class Observable(StrEnum):
@@ -78,16 +78,16 @@ class AutomaticDuration(Strict):
 
 @dataclass(frozen=True)
 class Target(Strict):
-    """Requested error or computing time, or both."""
+    """Target error, computing time, or both."""
 
     error: float | None = None
     """Largest relative error of each response; None for the smallest error that the time allows."""
     time_s: float | None = None
-    """Limit of the computing time [s]; None for one minute."""
+    """Limit of the computing time [s]; None means 60 s."""
 
     def __post_init__(self) -> None:
         if self.error is None and self.time_s is None:
-            msg = "A target without error and time is not allowed: give one of them, or both."
+            msg = "A target without an error or a time is not allowed: give one of them, or both."
             raise ValueError(msg)
         if self.error is not None and not 0.0 < self.error < 1.0:
             msg = f"Error {self.error} is not allowed: it must be above 0 and below 1, which is 100 %."
@@ -141,10 +141,10 @@ class Scene(Strict):
     start: Rest | Given = Rest()
     budget_s: float = BUDGET_S
     """Processor time [s] for finding whether chaos lasts and, with sensitive dependence on the start, which
-    motions other starts reach; zero to find neither. It is a nominal time, on the machine of
+    motions other starts reach; zero to find neither. The budget is a nominal time, on the machine of
     docs/accuracy.md, so that results are the same on every machine."""
     target: Target | None = None
-    """Requested error and computing time; with these, accuracy, duration and budget must not be given."""
+    """Target error and computing time; with these, accuracy, duration and budget must not be given."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.budget_s < math.inf:
@@ -163,8 +163,8 @@ class Scene(Strict):
         for length_s in (self.duration.longest_s, self.duration.window_s):
             if length_s * self.drive.frequency_hz > MOST_PERIODS:
                 msg = (
-                    f"Duration {length_s:g} s is not allowed at {self.drive.frequency_hz} Hz: it must be "
-                    f"{MOST_PERIODS:g} drive periods at most, {MOST_PERIODS / self.drive.frequency_hz:g} s."
+                    f"Duration {length_s:g} s is not allowed at {self.drive.frequency_hz} Hz: it must be at "
+                    f"most {MOST_PERIODS:g} drive periods, {MOST_PERIODS / self.drive.frequency_hz:g} s."
                 )
                 raise ValueError(msg)
         if self.duration.window_s * self.drive.frequency_hz < 1.0 - WHOLE:

@@ -1,22 +1,21 @@
 """Motions of a scene from several nearly equal starts (initial states). SI units.
 
-After transient chaos, it is a matter of chance which motion is reached, and when. Starts that differ by a
-millionth of the gap then give random samples. They are integrated in rounds until all motions have settled,
-chaos is known to last, or the budget is used up.
+After transient chaos, chance determines which motion is reached, and when. Starts that differ by a
+millionth of the gap then give random samples. These starts are integrated in rounds until all motions have
+settled, chaos is known to last, or the budget is used up.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine.run import Watch
+from ..engine.run import Outcome, Watch
 from ..specimen.drive import Harmonic
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats, Y, Z
+from ..specimen.specimen import Floats, Specimen, Y, Z
 from .course import SceneRun
 from .followed_run import FollowedRun, Stretch, follow_with_section, observe_window, window_of
 from .plan import LinearMotion, never_touches
@@ -31,7 +30,7 @@ PUSH = 1e-6
 """Largest change of the initial state: displacements / gap, velocities / (gap * 2 pi f)."""
 SEED = 2025
 PARTED = 0.01
-"""Relative difference of displacements above which the motions from two starts have separated; it is ten
+"""Relative difference of displacements above which the motions from two starts have separated; this is ten
 thousand times the initial difference."""
 TOUCHING = 0.999
 """Ratio of abs(p) to the gap above which m1 may be in contact."""
@@ -122,7 +121,7 @@ MORE_S = 1.0
 
 
 class SeveralStarts:
-    """Additional starts of a scene, and the motions that they reach.
+    """Additional starts of a scene, and the motions reached from these starts.
 
     Each start is integrated at most as long as the scene's duration allows.
     """
@@ -138,14 +137,14 @@ class SeveralStarts:
     ) -> None:
         self._pace, self._draw, self._follow_all = pace, draw, follow
         self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
-        # Duration of the final run with a tangent vector, which classifies a non-repeating motion.
+        # Duration of the final run with a tangent vector; this run classifies a non-repeating motion.
         self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
         self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
-        first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
+        self._least_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
         # Simulated time at the end of the first round; the time doubles with each round.
-        self._first_s = min(first_s, self._last_s)
+        self._first_s = min(self._least_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive, draw.most - 1, draw.seed)
-        self._waiting = [begin.with_push(change) for change in changes]
+        self._waiting = map(begin.with_push, changes)
         self._under_way: list[StatesAlone] = []
         self._reached = [requested]
 
@@ -185,7 +184,7 @@ class SeveralStarts:
     def follow(self) -> None:
         """Integrate and observe runs from as many starts as are needed, within the budget."""
         run, budget_s = self._reached[0].run, self._draw.budget_s
-        each_s = run.cost_s * min(1.0, self._first_s / run.time_s)
+        each_s = run.cost_s * min(1.0, self._least_s / run.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
         spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
@@ -205,10 +204,9 @@ class SeveralStarts:
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
-        """Integrate and observe up to ``wanted`` further starts within a budget; return their cost [s]."""
+        """Integrate and observe up to ``wanted`` more starts within a budget; return the total cost [s]."""
         count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
-        self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
-        self._waiting = self._waiting[count:]
+        self._under_way = [StatesAlone(run, self._pace) for run in islice(self._waiting, count)]
         self._follow_rounds(budget_s)
         found = [self._observe(each) for each in self._under_way]
         self._under_way = []
@@ -241,7 +239,7 @@ class SeveralStarts:
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
             if any(each.run.time_s < reach_s for each in left):
-                continue  # Distribute the budget that finished starts did not use.
+                continue  # use the budget that finished starts have left over
             if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
@@ -283,7 +281,7 @@ CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Return the starts grouped by motion; the first start of a group is the clearest, and represents it."""
+    """Return the starts grouped by motion; a group's first start is the clearest and represents the group."""
     groups: list[list[ReachedMotion]] = []
     order = {kind: place for place, kind in enumerate(CLEAREST)}
     for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
@@ -317,8 +315,8 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 
     Periodic motions are compared by period and all four responses; by responses alone if one start settled
     too late to be classified. Other motions are compared by Response I only, within its scatter between
-    windows; chaotic motions closer than that count as one. Weak chaos may appear undecided or quasi-periodic
-    from some starts: if the kinds of two motions differ, the smaller scatter is used.
+    windows; chaotic motions that differ by less count as one. Weak chaos may appear undecided or
+    quasi-periodic from some starts: if the kinds of two motions differ, the smaller scatter is used.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
@@ -391,7 +389,7 @@ def ensemble_of(
 
 
 def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
-    """Return the number of starts that reached each motion, and whether it is their final motion.
+    """Return the number of starts that reached each motion, and whether the motion is final.
 
     With several chaotic motions even lasting chaos is not final: one chaotic motion may change to another,
     and the escape rate counts only changes to periodic motions.
@@ -412,7 +410,7 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    """Return the responses of the first start if the motion repeats, otherwise the mean over the starts."""
+    """Return the responses of the first start if the motion repeats, otherwise their mean over the group."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
@@ -421,11 +419,11 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Return the 95 % limit of the relative difference between a run's responses and the group's mean."""
+    """Return the 95 % limit of the relative difference between a run's responses and their group mean."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
-        # Use the largest error, because with bursting chaos the runs from some starts contain no burst.
+        # If chaos has bursts, runs from some starts contain no burst: use the largest error.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
@@ -438,7 +436,7 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 ALONE = 0.5
-"""Share of the budget for integrating chaos further; runs from other starts use the rest."""
+"""Share of the budget for integrating chaos further; runs from other starts use the rest of the budget."""
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:

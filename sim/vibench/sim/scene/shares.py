@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 # Quantiles of Student's t, the normal and the Poisson distribution, in closed form. They equal those of
 # scipy.special, which is not used because importing it (0.2 s) takes longer than most scenes.
 
 
+@cache
 def student_quantile(freedom: int, probability: float) -> float:
     """Return a quantile of Student's t above its median, for a whole number of degrees of freedom.
 
@@ -55,7 +57,7 @@ UNSURE = 0.05
 
 @dataclass(frozen=True)
 class Share:
-    """Estimated share, such as a share of starts, with the limits of its confidence interval."""
+    """Estimated share, such as a share of starts, with the limits of the confidence interval."""
 
     share: float
     low: float
@@ -86,7 +88,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
     half = math.sqrt(weight * (share * (1.0 - share) + 0.25 * weight)) / (1.0 + weight)
-    # Set limits of exactly 0 and 1, without rounding errors.
+    # Set the limits 0 and 1 exactly, without rounding errors.
     return Share(
         share=share,
         low=0.0 if count == 0 else middle - half,
@@ -107,9 +109,9 @@ class Count:
 def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     """Return the shares of several outcomes with simultaneous 95 % confidence intervals.
 
-    With two outcomes the intervals are ordinary ones. With more outcomes each interval is widened so that all
-    hold jointly (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final outcome
-    of the trials that have not ended.
+    With two outcomes the intervals are ordinary intervals. With more outcomes, each interval is widened so
+    that all hold jointly (Goodman, Technometrics 7 (1965) 247). The intervals allow for every possible final
+    outcome of the trials that have not ended.
     """
     trials = sum(each.trials for each in counts)
     pending = sum(each.trials for each in counts if not each.is_final)
@@ -125,7 +127,7 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
 
 @dataclass(frozen=True)
 class EscapeRate:
-    """Rate at which chaos ends, estimated from several starts; its inverse is the mean lifetime."""
+    """Rate at which chaos ends, estimated from several starts; the inverse rate is the mean lifetime."""
 
     rate_per_s: float
     """Number of escapes from chaos divided by the total time in chaos [1/s]."""
@@ -143,18 +145,13 @@ class EscapeRate:
         """Lower bound on the mean lifetime of chaos [s]."""
         return 1.0 / self.high_per_s
 
-    @property
-    def lifetime_below_s(self) -> float:
-        """Upper bound on the mean lifetime of chaos [s]; infinite without escapes."""
-        return 1.0 / self.low_per_s if self.low_per_s > 0.0 else math.inf
-
 
 def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
     """Return the rate at which chaos ends, from the number of escapes and the total time in chaos [s].
 
     Lifetimes of transient chaos are exponentially distributed (Grebogi, Ott and Yorke, Physica D 7 (1983)
     181). Chaos that has not ended contributes the time up to the end of its run. The confidence interval is
-    that of a Poisson process (Garwood, Biometrika 28 (1936) 437).
+    Garwood's for a Poisson process (Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
     low = 0.0 if escapes == 0 else poisson_mean(escapes, 1.0 - tail) / chaotic_s

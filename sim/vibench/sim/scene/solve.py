@@ -10,10 +10,17 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..specimen.outcome import Outcome
+from ..engine.run import Outcome
 from ..specimen.stops import member
-from .course import FixedCourse, SceneRun, SettlingCourse
-from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
+from .course import FixedCourse, SceneRun, SettlingCourse, stable_motion
+from .followed_run import (
+    FollowedRun,
+    spectrum_of,
+    states_of,
+    take_steps,
+    take_steps_of_all,
+    whole_periods,
+)
 from .plan import DECAYED_SHARE, LinearMotion, linear_motion, plan_of
 from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, state_of
 from .repetition import FEWEST_TIMES, MOST_STATES, growth_of, pace_of
@@ -43,7 +50,7 @@ from .stated_error import (
 from .states_alone import REMEMBERED, Follow, batches_are_worth_it, in_batches, one_by_one
 
 if TYPE_CHECKING:
-    from ..exponents.lyapunov import LyapunovEstimate
+    from ..exponents.lyapunov import ExponentRun, LyapunovEstimate
 
 EXPONENT_S = 25.0
 """Longest averaging time of a Lyapunov exponent [s]."""
@@ -79,7 +86,7 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
 
     Each of the four responses has a relative error; ``error_estimate`` is the largest. An error is twice the
     measured difference from a run with a far smaller tolerance (docs/accuracy.md). For a settled motion, the
-    stricter run continues from the end until the transient has decayed; otherwise it begins at the start. If
+    stricter run is the periodic motion that Newton's iteration finds; otherwise it begins at the start. If
     the two runs separate, any repeated run is a new random sample. The error is then the difference that two
     samples do not exceed in 95 % of cases.
 
@@ -99,14 +106,18 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
     chaos = begun.course.watch()
     if chaos is not None:
         chaos.follow()
-    return begun.answer(one_by_one)
+    seen = take_steps(begun.run, begun.course.observe())
+    exponent = begun.exponent(seen)
+    if exponent is not None:
+        exponent.course.follow()
+    return begun.answer(seen, exponent, one_by_one)
 
 
 def settle_scene(scene: Scene) -> ScenePrediction:
     """Solve a scene as planned, without error estimates and without other starts.
 
-    The motion equals that of `solve_scene`, at a third of the computing time or less. Chaos is integrated as
-    long as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
+    The motion is the same as in `solve_scene`, at a third of the computing time or less. Chaos is integrated
+    as long as the scene's duration allows. With an automatic duration the run ends after whole drive periods.
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """
@@ -128,10 +139,10 @@ class SolvedScene:
 
 
 def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[SolvedScene]:
-    """Solve several scenes as `solve_scene` does, in batches where no tangent vector is needed.
+    """Solve several scenes as `solve_scene` does, in batches.
 
-    The result of a scene does not depend on the other scenes. In chaos it is a different random sample from
-    the result of `solve_scene`. Raises ValueError when a scene cannot be simulated from its start.
+    The result of a scene does not depend on the other scenes. In chaos, `solve_scene` gives a different
+    random sample. Raises ValueError when a scene cannot be simulated from its start.
     """
     found: list[SolvedScene] = []
     together: list[Scene] = []
@@ -168,9 +179,22 @@ def _solve_together(scenes: Sequence[Scene], question: Question) -> list[SolvedS
             chaos[place] = followed_on
     with _count_time(taken_s, chaos):
         in_batches([*chaos.values()])
-    for place, each in begun.items():
+    with _count_time(taken_s, begun):
+        steps = [each.course.observe() for each in begun.values()]
+        found = take_steps_of_all([each.run for each in begun.values()], steps, are_batched=True)
+    exponents = {
+        place: exponent
+        for (place, each), seen in zip(begun.items(), found, strict=True)
+        if (exponent := each.exponent(seen)) is not None
+    }
+    if exponents:
+        from ..exponents.tangent_run import follow_courses  # noqa: PLC0415 - as above
+
+        with _count_time(taken_s, exponents):
+            follow_courses([each.course for each in exponents.values()])
+    for (place, each), seen in zip(begun.items(), found, strict=True):
         with _count_time(taken_s, [place]):
-            answers[place] = each.answer(in_batches)
+            answers[place] = each.answer(seen, exponents.get(place), in_batches)
     return [SolvedScene(answers[place], taken_s[place]) for place in range(len(scenes))]
 
 
@@ -218,7 +242,7 @@ def solve_ensemble(
     one_by_one([begun.course.way] if begun.course.way is not None else [])
     chaos = begun.course.watch()
     one_by_one([chaos] if chaos is not None else [])
-    seen = begun.course.observe()
+    seen = take_steps(begun.run, begun.course.observe())
     if begun.run.outcome is not Outcome.REACHED_END:
         return None
     errors = begun.errors(seen, one_by_one)
@@ -278,7 +302,7 @@ def solve_closed_form(scene: Scene, motion: LinearMotion, question: Question) ->
     if Observable.SPECTRUM in scene.observe:
         found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
-        # End after a whole number of drive periods, as integrated motions do.
+        # Like an integrated motion, end after a whole number of drive periods.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         found = replace(found, duration_s=duration_s, final_state=state_of(motion.state(duration_s)))
     return found
@@ -317,23 +341,39 @@ class _StartedScene:
                     pace,
                     window_s,
                     min(longest_s, MOST_STATES / scene.drive.frequency_hz),
-                    # Chaos is continued for a part of the budget; other starts use the rest.
+                    # In chaos, this start uses only a part of the budget; other starts use the rest.
                     alone_s=ALONE * scene.budget_s if is_answer else math.inf,
                     by_itself_s=math.inf if is_answer else 0.0,
                 )
 
-    def answer(self, follow: Follow) -> ScenePrediction:
-        """Return the prediction for the scene; ``follow`` integrates other starts."""
-        scene, seen = self._scene, self.course.observe()
+    def exponent(self, seen: SceneRun) -> "ExponentRun | None":
+        """Return the run for the largest Lyapunov exponent; None if not requested or if no run is needed."""
+        run, drive, scene = self.run, self._scene.drive, self._scene
+        is_over = seen.steady is not None or run.outcome is not Outcome.REACHED_END
+        if is_over or Observable.LYAPUNOV not in scene.observe:
+            return None
+        from ..exponents.lyapunov import ExponentRun, Precision  # noqa: PLC0415 - most scenes ask for none
+
+        turns = math.fmod(drive.frequency_hz * run.time_s, 1.0)
+        phase = math.fmod(2.0 * math.pi * turns + drive.phase_rad, 2.0 * math.pi)
+        return ExponentRun(
+            *(scene.specimen, replace(drive, phase_rad=phase), scene.accuracy, EXPONENT_S, 0.0, run.state),
+            precision=Precision(*EXPONENT_PRECISION),
+        )
+
+    def answer(self, seen: SceneRun, exponent: "ExponentRun | None", follow: Follow) -> ScenePrediction:
+        """Return the prediction for the observed and integrated runs; ``follow`` integrates other starts."""
+        scene = self._scene
+        found = None if exponent is None else exponent.estimate()
         if self._question is Question.MOTION:
-            return self._prediction(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
+            return self._prediction(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None, found)
         is_whole = self.run.outcome is Outcome.REACHED_END
         errors = self.errors(seen, follow) if is_whole else UNKNOWN_ERRORS
         memory = memory_of(scene, self._begin, seen, self._motion)
         ensemble: Ensemble | None = None
         if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
             ensemble = self.ensemble(seen, errors, follow)
-        return self._prediction(seen, errors, memory, ensemble)
+        return self._prediction(seen, errors, memory, ensemble, found)
 
     def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
         """Return the errors of the scene's responses; the run must have reached its end."""
@@ -366,8 +406,8 @@ class _StartedScene:
                 return finite_or_none(float(np.max(errors.stated)))
             if reached.period is None:
                 return None if reached.scatter is None else reached.scatter.between_runs
-            answer, period = reached.responses_m, reached.period
-            off = settled_errors(reached.run, answer, scene.accuracy, period, pace.forgetting_s)
+            steady = stable_motion(reached.run, reached.period)
+            off = settled_errors(reached.run, reached.responses_m, scene.accuracy, steady)
             return finite_or_none(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
 
         if len(several.motions) == 1:
@@ -375,14 +415,24 @@ class _StartedScene:
         return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
 
     def _prediction(
-        self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
+        self,
+        seen: SceneRun,
+        errors: StatedErrors,
+        memory: StartMemory,
+        ensemble: Ensemble | None,
+        exponent: "LyapunovEstimate | None",
     ) -> ScenePrediction:
         """Return the prediction from the motion observed in the window."""
         scene, run, window, amplitude = self._scene, self.run, seen.window, self._scene.drive.amplitude_m
         is_whole = run.outcome is Outcome.REACHED_END
-        exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
         drawn = _between_windows(seen) if is_whole and self._question is Question.ANSWER else None
         scatter = None if drawn is None else drawn.relative
+        rate = rate_error = None
+        if exponent is not None:
+            rate, rate_error = map(finite_or_none, (exponent.exponent_per_s, exponent.standard_error_per_s))
+        elif seen.steady is not None and Observable.LYAPUNOV in scene.observe:
+            rates = seen.steady.exponents_per_s
+            rate, rate_error = float(rates.mean()), float(0.5 * np.ptp(rates))
         if Observable.SCATTER in scene.observe:
             scatter = None if ensemble is None else ensemble.scatter
         found = ScenePrediction(
@@ -402,10 +452,8 @@ class _StartedScene:
             ended=_ending(seen, ensemble),
             integration_error=finite_or_none(errors.integration),
             scatter=scatter,
-            lyapunov_per_s=finite_or_none(exponent.exponent_per_s) if exponent is not None else None,
-            lyapunov_error_per_s=finite_or_none(exponent.standard_error_per_s)
-            if exponent is not None
-            else None,
+            lyapunov_per_s=rate,
+            lyapunov_error_per_s=rate_error,
             start=scene.start.name,
             final_state=state_of(run.state),
             outcome=run.outcome,
@@ -467,22 +515,3 @@ def _ending(seen: SceneRun, ensemble: Ensemble | None) -> str:
     if seen.motion is MotionKind.CHAOTIC and ensemble is not None and ensemble.escape is not None:
         return f"{seen.ended} (mean lifetime above {ensemble.escape.lifetime_above_s:.3g} s)"
     return seen.ended
-
-
-def _exponent(scene: Scene, run: FollowedRun) -> "LyapunovEstimate":
-    """Return the largest Lyapunov exponent of the motion at the end of a run."""
-    from ..exponents.lyapunov import Precision, lyapunov_exponent  # noqa: PLC0415 - most scenes ask for none
-
-    drive = scene.drive
-    phase = math.fmod(
-        2.0 * math.pi * math.fmod(drive.frequency_hz * run.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
-    )
-    return lyapunov_exponent(
-        scene.specimen,
-        replace(drive, phase_rad=phase),
-        scene.accuracy,
-        EXPONENT_S,
-        0.0,
-        run.state,
-        precision=Precision(*EXPONENT_PRECISION),
-    )

@@ -1,10 +1,10 @@
 """Measured errors of the responses of a scene. SI units.
 
-In a settled motion, integration errors decay. The motion is continued from its end with a far smaller
-tolerance until the errors have decayed, and the responses are compared. A motion that has not settled
-accumulates errors: it is repeated from its start with the smaller tolerance and compared in the same window.
-If the two runs diverge, a repeated run is a new random sample. The difference of two samples is estimated
-from the blocks of the window if the motion is stationary, otherwise from a few nearly equal starts.
+In a settled motion, integration errors decay. The responses are compared with those of the periodic motion
+that Newton's iteration finds with a far smaller tolerance. A motion that has not settled accumulates errors:
+it is repeated from its start with the smaller tolerance and compared in the same window. If the two runs
+diverge, a repeated run is a new random sample. The difference of two samples is estimated from the blocks of
+the window if the motion is stationary, otherwise from a few nearly equal starts.
 """
 
 import math
@@ -12,11 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..engine.run import Watch
-from ..specimen.accuracy import Accuracy
-from ..specimen.outcome import Outcome
-from ..specimen.state import Floats
-from .course import Lead, SceneRun
+from ..engine.run import Accuracy, Outcome, Watch
+from ..specimen.specimen import Floats
+from .course import FixedPoint, Lead, SceneRun
 from .followed_run import FollowedRun, ObservedWindow, observe_window
 from .prediction import MotionKind, ScenePrediction
 from .repetition import Pace
@@ -26,27 +24,23 @@ from .several_starts import SEED, pushes
 from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
-"""Tolerance of the stricter run. It must be far below the error of closed-form collisions, which is itself
-below a hundredth of the tolerance of *quick*."""
-FORGETTING = 4.0
-"""Decay times of the slowest mode after which a repeating motion is compared with the stricter run."""
+"""Tolerance of the stricter run. The tolerance must be far below the error of closed-form collisions, which
+is itself below a hundredth of the tolerance of *quick*."""
 SHORTER = 4
-"""Number of parts of a window that are compared with the whole; leakage in a part is that much larger."""
+"""Number of parts of a window; each is compared with the window. Leakage in a part is this factor larger."""
 LOOKS = 8
-"""Number of periods that are compared: periods of the motion, or of the drive if it does not repeat."""
+"""Number of periods that are compared: periods of a repeating motion, otherwise of the drive."""
 SAFETY = 2.0
 """Safety factor: stated error / measured error."""
 ROUNDING = 1e-11
 """Relative rounding error of an exact result."""
 ROUNDED = 1e-13
-"""Offset of the start of the stricter run, relative to the drive amplitude. It is several times the
+"""Offset of the start of the stricter run, relative to the drive amplitude. The offset is several times the
 accumulated rounding error of a run, because one offset is only one sample of rounding errors."""
 SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
 """Sign of the offset of each coordinate; y and z have the same sign, so that p does not change."""
-SLOWEST_RATIO = 0.9
-"""Largest assumed ratio of successive changes of state, which corresponds to the slowest settling."""
 FIRST_LOOK = 16
-"""Drive periods until two runs are first compared; each later comparison comes after twice as many."""
+"""Drive periods until two runs are first compared; the number doubles before each later comparison."""
 PARTED = 0.05
 """Difference [gaps], or relative difference of responses, above which two runs have separated."""
 MEMORIES = 8.0
@@ -94,15 +88,16 @@ def stated_errors(
         Function that integrates other starts.
     """
     answer = seen.window.responses_m
-    # If the stricter run does not repeat yet, its spectral lines cover another length: add the leakage.
+    # If the stricter run does not repeat yet, its spectral lines span another time: add the leakage.
     sure = _rounding(answer) + seen.leaked
     if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
         sure += _by_window(seen)
     if seen.repeats is not None and seen.was_settled:
-        off = settled_errors(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
+        off = settled_errors(run, answer, scene.accuracy, seen.steady)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
-    if seen.steady_m is not None:
-        sure += SAFETY * np.abs(answer - seen.steady_m) / answer
+    if seen.steady is not None:
+        steady_m = _responses(seen.steady.run.copy(), seen.steady.period / scene.drive.frequency_hz)
+        sure += SAFETY * np.abs(answer - steady_m) / answer
     strict = _strict_run(scene, begin, seen, run)
     if strict.responses_m is not None and strict.is_together:
         off = np.abs(answer - strict.responses_m) / np.abs(answer)
@@ -120,8 +115,8 @@ def stated_errors(
 def _by_window(seen: SceneRun) -> Floats:
     """Estimate the relative errors due to the position of the window in time, shape (4,).
 
-    They are the largest differences from the responses in shorter windows at other positions. Early windows
-    are included, because a slowly settling motion may settle further.
+    The errors are the largest differences from the responses in shorter windows at other positions. Early
+    windows are included, because a slowly settling motion may settle further.
     """
     answer = seen.window.responses_m
     lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
@@ -141,7 +136,7 @@ def _rounding(answer: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _StrictRun:
-    """Stricter run: the motion, integrated from its start with a smaller tolerance."""
+    """Stricter run: the motion, integrated from the start with a smaller tolerance."""
 
     run: FollowedRun
     """Stricter run at the time when it separated from the original run, or at the window's end."""
@@ -174,29 +169,18 @@ def _more_starts(
     return found
 
 
-def settled_errors(
-    run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
-) -> Floats:
-    """Return the relative errors of the responses of a repeating motion; NaN if a run fails.
+def settled_errors(run: FollowedRun, answer: Floats, accuracy: Accuracy, steady: FixedPoint | None) -> Floats:
+    """Return the relative errors of the responses of a repeating motion; NaN if they cannot be computed.
 
-    The responses in this and the next periods, whose time steps differ, are compared with a stricter run.
-    That run is observed again later, because the motion may settle more slowly than its modes decay.
+    The responses in this and the next periods, whose time steps differ, are compared with those of the
+    periodic motion near the run, computed with a smaller tolerance.
     """
-    cycle_s = period / run.drive.frequency_hz
-    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
-    strict = run.copy(STRICTER[accuracy])
-    looks = []
-    for _ in range(2):
-        strict.follow(strict.time_s + wait_s)
-        looks.append(_responses(strict, LOOKS * cycle_s))
-    on = run.copy(accuracy.tolerance)
+    if steady is None:
+        return np.full(4, np.nan)
+    cycle_s, on = steady.period / run.drive.frequency_hz, run.copy(accuracy.tolerance)
+    exact = _responses(steady.run.copy(), LOOKS * cycle_s)
     seen = [answer, *(_responses(on, cycle_s) for _ in range(LOOKS))]
-    off = np.max(np.abs(np.array(seen) - looks[1]), axis=0)
-    moved = np.abs(looks[1] - looks[0])
-    ratio = np.minimum(
-        moved / np.maximum(np.abs(answer - looks[0]), np.finfo(np.float64).tiny), SLOWEST_RATIO
-    )
-    return np.asarray((off + moved * ratio / (1.0 - ratio)) / np.abs(looks[1]))
+    return np.asarray(np.max(np.abs(np.array(seen) - exact), axis=0) / np.abs(exact))
 
 
 def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
@@ -218,7 +202,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
     itself. A motion that amplifies rounding errors would then appear exact.
     """
     loose, strict = begin.copy(scene.accuracy.tolerance), begin.copy(STRICTER[scene.accuracy])
-    strict = strict.with_push(ROUNDED * scene.drive.amplitude_m * SIDES * _places_and_speeds(scene))
+    strict = strict.with_push(ROUNDED * scene.drive.amplitude_m * SIDES * strict.scales)
     begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
     while strict.time_s < begin_s:
         until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))
@@ -226,7 +210,7 @@ def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedR
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return _StrictRun(strict, None, is_together=False)
-    # Take the spectral lines over as many drive periods as in the original run.
+    # Take the spectral lines over the same number of drive periods as in the original run.
     window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
     return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
 
@@ -240,13 +224,8 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
     """Return whether the states of two runs agree within `PARTED` times the gap; False if a run failed."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
-    apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
+    apart = np.abs(one.state - other.state) / one.scales
     return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
-
-
-def _places_and_speeds(scene: Scene) -> Floats:
-    """Return the scale of each coordinate, shape (6,): 1 for displacements, 2 pi f for velocities."""
-    return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
@@ -259,7 +238,7 @@ def _responses(run: FollowedRun, length_s: float) -> Floats:
 
 
 def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
-    """Return the prediction with the errors of its four responses, and the largest of them."""
+    """Return the prediction with the errors of its four responses, and the largest of these errors."""
     response_i, response_ii, relative_i, relative_ii = (finite_or_none(float(error)) for error in stated)
     return replace(
         found,

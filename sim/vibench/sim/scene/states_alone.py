@@ -1,7 +1,7 @@
 """Motions integrated without a tangent vector until they repeat: transients, lasting chaos, other starts.
 
 A motion is integrated alone (`StatesAlone.follow`), or with others in SIMD batches of the native engine
-(`in_batches`). Its states do not depend on the other motions in a batch. SI units.
+(`in_batches`). The states of a motion do not depend on the other motions in a batch. SI units.
 """
 
 import math
@@ -12,9 +12,8 @@ from typing import Self
 import numpy as np
 
 from ..engine.batch import batches_pay, is_batchable
-from ..specimen.outcome import Outcome
-from ..specimen.specimen import Specimen
-from ..specimen.state import Floats
+from ..engine.run import Outcome
+from ..specimen.specimen import Floats, Specimen
 from .followed_run import (
     FollowedRun,
     Stretch,
@@ -31,7 +30,7 @@ SLICE_S = 0.5
 PARTS = 4
 """Number of parts of a stretch in which growth is measured, to see if a perturbation keeps growing."""
 REMEMBERED = 16.0
-"""Time for which states are stored [decay times of the slowest mode]; settling at *standard* takes ten."""
+"""Time for which states are stored, in decay times of the slowest mode; settling at *standard* takes ten."""
 
 
 class StatesAlone:
@@ -48,8 +47,8 @@ class StatesAlone:
     every
         Every n-th state is stored in `path`; None for no states.
     by_itself_s
-        Time [s] before which the motion may not join a batch, because errors made in a transient persist. It
-        is a whole number of drive periods, because batches begin at the end of a period.
+        Time [s] before which the motion may not join a batch, because errors made in a transient persist.
+        This time is a whole number of drive periods, because batches begin at the end of a period.
     """
 
     def __init__(
@@ -90,7 +89,7 @@ class StatesAlone:
         return self.run.time_s if self._settled_s is None else self._settled_s
 
     def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
-        """Set the time and the nominal computing cost [s] at which the run ends, counted from its start."""
+        """Set the time and the nominal computing cost [s], from the run's start, at which the run ends."""
         self.until_s, self.cost_s = until_s, cost_s
         return self
 
@@ -100,7 +99,7 @@ class StatesAlone:
         while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
             made = round(run.time_s * frequency_hz)
             goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
-            # The last part of the run, shorter than a period, is integrated without a check for repetition.
+            # If the last part of the run is shorter than a period, this part is not checked for repetition.
             end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
             stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self.note(stretch)
@@ -160,7 +159,7 @@ def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDurati
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
-ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
+ROUND_S, ROUND_PERIODS = 4.0, 1 << 16
 """Largest time [s] and number of drive periods between two checks of a batch, to limit memory."""
 HELD_STATES, FULL = 1 << 20, 16
 """Largest number of states stored for a batch, and number of motions that fill the SIMD registers."""
@@ -187,12 +186,10 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
         ready = [(each, periods) for each in under_way if (periods := each.batch_periods) > 0]
         longest = max((periods for _, periods in ready), default=1)
         size = max(FULL, HELD_STATES // longest)
-        under_way = [
-            each for first in range(0, len(ready), size) for each in _round(ready[first : first + size])
-        ]
-
-
-def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Integrate each motion in a batch for its number of periods; return motions that need more periods."""
-    found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
-    return [each for (each, _), stretch in zip(ready, found, strict=True) if each.note(stretch) is None]
+        under_way = []
+        for first in range(0, len(ready), size):
+            part = ready[first : first + size]
+            found = follow_together([each.run for each, _ in part], [periods for _, periods in part])
+            under_way += [
+                each for (each, _), seen in zip(part, found, strict=True) if each.note(seen) is None
+            ]

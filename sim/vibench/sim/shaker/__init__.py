@@ -3,8 +3,8 @@
 The specimen exerts a force on the table, so table and specimen are simulated together. A `LoadedShaker` is
 built from an `Amplifier`, a `Shaker` and a specimen. Its input is the mean voltage in each time step, and its
 outputs are means over the same steps (docs/decisions/0006-virtual-rig.md). The default amplifier does not
-change the voltage; use it for voltages recorded at the coil. `linear_motion` returns the motion under sine
-voltages in closed form, with impacts to first order. SI units.
+change the voltage; use this amplifier for voltages recorded at the coil. `linear_motion` returns the motion
+under sine voltages in closed form, with impacts to first order. SI units.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025

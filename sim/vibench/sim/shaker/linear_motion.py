@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..specimen.specimen import Specimen
-from .loaded_shaker import Amplifier, FloatArray, Shaker
+from ..specimen.specimen import Complex, Floats, Specimen
+from .loaded_shaker import Amplifier, Shaker
 
-ComplexArray = NDArray[np.complex128]
 SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")
 """Voltage and current at the coil [V, A], displacements [m] (absolute, except p): phasors for exp(+i w t)."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
@@ -25,22 +24,22 @@ _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 class LinearMotion:
     """Responses to a voltage and to a stop force at n frequencies, with the columns of `SINE_COLUMNS`."""
 
-    per_volt: ComplexArray
+    per_volt: Complex
     """Motion without contact, per volt at the amplifier's input, shape (n, 5)."""
-    per_newton: ComplexArray
+    per_newton: Complex
     """Motion per newton of stop force, which acts on m1 and in the opposite direction on m2, shape (n, 5)."""
 
     @cached_property
-    def lever(self) -> ComplexArray:
+    def lever(self) -> Complex:
         """Motion per metre of p, if the stops impose p, shape (n, 5)."""
         return self.per_newton / self.per_newton[:, [_P]]
 
     @cached_property
-    def stuck_motion(self) -> ComplexArray:
+    def stuck_motion(self) -> Complex:
         """Motion per volt while m1 sticks to m2, shape (n, 5)."""
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
-    def response(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
+    def response(self, volts: ArrayLike, gap_m: float) -> Complex:
         """Return the motion under sine voltages of given amplitudes, shape (n, 5).
 
         Parameters
@@ -54,11 +53,11 @@ class LinearMotion:
         push = _push(free[:, _P], self.per_newton[:, _P], gap_m)
         return np.asarray(free + self.per_newton * push[:, None])
 
-    def volts_for(self, base_m: ArrayLike, gap_m: float) -> FloatArray:
+    def volts_for(self, base_m: ArrayLike, gap_m: float) -> Floats:
         """Return the amplitudes at the amplifier's input that give base amplitudes ``base_m``, (n,) [V]."""
         free, by_push = self.per_volt, self.per_newton
         per_base = free[:, _P] / free[:, _BASE]
-        # Response of p to the stop force while the voltage keeps the base motion constant.
+        # The response of p to the stop force if the voltage keeps the base motion unchanged.
         on_held_base = by_push[:, _P] - per_base * by_push[:, _BASE]
         held_m = np.asarray(base_m, dtype=np.float64)
         push = _push(per_base * held_m, on_held_base, gap_m)
@@ -83,18 +82,18 @@ def linear_motion(
         Frequencies, zero or positive, shape (n,) [Hz].
     """
     s = np.asarray(2j * np.pi * np.atleast_1d(frequency_hz), dtype=np.complex128)
-    impedance: ComplexArray = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
+    impedance: Complex = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
     per_volt_n = shaker.force_constant_n_per_a / impedance
-    table: ComplexArray = (
+    table: Complex = (
         shaker.moving_mass_kg * s**2
         + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
         + shaker.suspension_stiffness_n_per_m
     )
-    # Ratio of output to input voltage of the amplifier, shape of ``s``.
+    # Ratio of the amplifier's output voltage to its input voltage, in the shape of ``s``.
     low_cut = 2 * np.pi * amplifier.low_cut_hz
     below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
     voltage = np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))
-    forces: ComplexArray = np.zeros((s.size, 4, 2), dtype=np.complex128)
+    forces: Complex = np.zeros((s.size, 4, 2), dtype=np.complex128)
     forces[:, 0, 0], forces[:, 2, 1], forces[:, 3, 1] = per_volt_n * voltage, 1.0, -1.0
     if specimen is None:
         moved = np.zeros_like(forces)
@@ -103,7 +102,7 @@ def linear_motion(
         solved = np.linalg.solve(_dynamic_stiffness(table, specimen, s), forces)
         moved = np.asarray(solved, dtype=np.complex128)
 
-    def columns(displacement: ComplexArray, volts: ComplexArray) -> ComplexArray:
+    def columns(displacement: Complex, volts: Complex) -> Complex:
         base, m0, m1, m2 = displacement.T
         current = (volts - s * shaker.force_constant_n_per_a * base) / impedance
         return np.stack([volts, current, base, m0, m1 - m2], axis=1)
@@ -111,7 +110,7 @@ def linear_motion(
     return LinearMotion(columns(moved[:, :, 0], voltage), columns(moved[:, :, 1], np.zeros_like(voltage)))
 
 
-def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray) -> ComplexArray:
+def _dynamic_stiffness(table: Complex, specimen: Specimen, s: Complex) -> Complex:
     """Return the dynamic stiffness matrix of table, m0, m1 and m2, shape (n, 4, 4) [N/m]."""
     s_of = s[:, None, None]
     stiffness = np.zeros((s.size, 4, 4), dtype=np.complex128)
@@ -124,7 +123,7 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
     return stiffness
 
 
-def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
+def _push(p: Complex, receptance: Complex, gap_m: float) -> Complex:
     """Return the force of a spring between m1 and m2 that reduces abs(p) to the gap, shape (n,) [N].
 
     The stiffness K is the positive root of the quadratic equation abs(p / (1 + K H)) = gap.

@@ -1,8 +1,8 @@
 """Amplifier, coil, table and specimen under a voltage, with the specimen's force on the table.
 
-All results are means over a time step. They are exact, because the voltage is constant in a step and the
-integrals of base acceleration and m0 velocity are known at both ends. Impacts do not alias in such means. The
-means refer to the centre of the step, so that all channels agree in phase.
+All results are means over a time step. These means are exact, because the voltage is constant in a step and
+the integrals of base acceleration and m0 velocity are known at both ends. Impacts do not alias in such means.
+The means refer to the centre of the step, so that all channels agree in phase.
 """
 
 import math
@@ -10,27 +10,24 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
+import scipy
+from numpy.typing import ArrayLike
 
-from ..engine.run import cubic_tables, native_engine, start_at
-from ..specimen.accuracy import Accuracy
-from ..specimen.specimen import Specimen
-
-FloatArray = NDArray[np.float64]
+from ..engine.run import Accuracy, cubic_tables, native_engine, start_at
+from ..specimen.specimen import Floats, Specimen
 
 STOP_STIFFNESS_N_PER_M = 2e5
 """Assumed stiffness of the rubber stops at the ends of the table's stroke: 45 N compress them by 0.23 mm."""
 STOP_DAMPING_NS_PER_M = 50.0
-"""Assumed damping of the rubber stops at the stroke's ends: the table rebounds with half its energy."""
+"""Assumed damping of the rubber stops at the stroke's ends: a rebound halves the table's energy."""
 
 
 @dataclass(frozen=True)
 class Amplifier:
     """Amplifier: gain, two first-order band limits, and limits of voltage and current.
 
-    The default amplifier does not change the voltage; use it for a voltage recorded at the coil. Raises
-    ValueError when a number is not allowed.
+    The default amplifier does not change the voltage; use this amplifier for a voltage recorded at the coil.
+    Raises ValueError when a number is not allowed.
     """
 
     gain: float = 1.0
@@ -42,7 +39,7 @@ class Amplifier:
     clip_v: float = math.inf
     """Largest output voltage of the amplifier, peak [V]."""
     current_limit_a: float = math.inf
-    """Largest current, peak [A]; the amplifier reduces its voltage to keep the current below it."""
+    """Largest current, peak [A]; the amplifier reduces its voltage to stay below this limit."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.gain) and self.gain):
@@ -63,9 +60,9 @@ class Amplifier:
 class StateSpace:
     """Linear system s' = A s + B u; for a shaker s = (displacement, velocity, current) in SI units."""
 
-    A: FloatArray
+    A: Floats
     """State matrix A, shape (3, 3)."""
-    B: FloatArray
+    B: Floats
     """Input matrix, for the voltage at the coil [V] and an external force on the table [N], shape (3, 2)."""
 
 
@@ -86,7 +83,7 @@ class Shaker:
     """Resistance of coil and cable in series [ohm]."""
     coil_inductance_h: float
     stroke_m: float = math.inf
-    """Displacement of the table from rest at which it touches its rubber stops [m]."""
+    """Displacement from rest at which the table touches the rubber stops [m]."""
     stop_stiffness_n_per_m: float = STOP_STIFFNESS_N_PER_M
     stop_damping_ns_per_m: float = STOP_DAMPING_NS_PER_M
 
@@ -128,15 +125,15 @@ _CONTACT_TOLERANCE = Accuracy.STANDARD.tolerance
 class ShakenMotion:
     """Motion in consecutive time steps; values are means over a step, shape (steps,)."""
 
-    amplifier_voltage: FloatArray
+    amplifier_voltage: Floats
     """Voltage at the coil [V]."""
-    base_acceleration: FloatArray
+    base_acceleration: Floats
     """Acceleration of the table [m/s2]."""
-    m0_velocity: FloatArray
+    m0_velocity: Floats
     """Absolute velocity of m0 [m/s]."""
-    ends: FloatArray
+    ends: Floats
     """States at the ends of the first ``rows`` steps, columns MOTION_COLUMNS, shape (rows, 9)."""
-    contacts: FloatArray
+    contacts: Floats
     """Number of contacts up to the end of each block of steps, shape (blocks,); may be empty."""
 
     @classmethod
@@ -209,7 +206,7 @@ class LoadedShaker:
             stop_stiffness=shaker.stop_stiffness_n_per_m,
             stop_damping=shaker.stop_damping_ns_per_m,
         )
-        self.structure["transition"] = expm(joint * step_s)[:_SHAKER_SIZE]
+        self.structure["transition"] = scipy.linalg.expm(joint * step_s)[:_SHAKER_SIZE]
 
     @property
     def impacts(self) -> int:
@@ -239,7 +236,7 @@ class LoadedShaker:
         engine.fill(self.structure, tables=tables, specimen=state)
 
     def move(
-        self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0, block: int = 0
+        self, drive_v: Floats, noise_v: Floats | None = None, end_rows: int = 0, block: int = 0
     ) -> ShakenMotion:
         """Advance by one step for each value of ``drive_v``, and return the motion.
 
@@ -263,12 +260,12 @@ class LoadedShaker:
         self.move_into(motion, drive, noise)
         return motion
 
-    def move_into(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
+    def move_into(self, motion: ShakenMotion, drive_v: Floats, noise_v: Floats) -> None:
         """Advance as `move` does, but write the motion into given arrays."""
         self.prepare(motion, drive_v, noise_v)
         self.account(native_engine().call("move_shaker", self.structure), len(drive_v))
 
-    def prepare(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
+    def prepare(self, motion: ShakenMotion, drive_v: Floats, noise_v: Floats) -> None:
         """Set the arrays that the engine reads and writes in the next steps."""
         native_engine().fill(
             self.structure,
@@ -286,7 +283,7 @@ class LoadedShaker:
         if good < count:
             raise MotionFailed(
                 f"The specimen's motion was lost after {good} of {count} steps: it is not finite, or a "
-                "contact made no progress. Lower the drive, or check that all its values are numbers"
+                "contact made no progress. Lower the drive, or check that all values of the drive are numbers"
             )
 
 

@@ -13,27 +13,26 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-from ..specimen.specimen import Specimen
-from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
+from ..specimen.specimen import Complex, Floats, Specimen
+from .loaded_shaker import Amplifier, LoadedShaker, Shaker
 
-ComplexArray = NDArray[np.complex128]
 Singles = NDArray[np.float32]
-Gain = Callable[[FloatArray], ComplexArray]
-"""Function that returns a sensor's complex gain at frequencies [Hz], shape of its argument."""
+Gain = Callable[[Floats], Complex]
+"""Function that returns a sensor's complex gain at frequencies [Hz], with the shape of the argument."""
 
 FINEST_STEP_HZ = 5e4
 """Lowest rate of steps [Hz]; the specimen's force on the table has a relative error of 5e-4 at 600 Hz."""
 _PASS_PART = 0.45
 """Ratio of the pass band's end to the sample rate; a cosine edge follows, up to half the sample rate."""
 _MARGIN = 2048
-"""Number of samples filtered on each side of a piece; beyond them, impulse responses are below 1e-8."""
+"""Number of samples filtered on each side of a piece; impulse responses farther away are below 1e-8."""
 _PIECE = 1 << 15
 """Number of samples in a piece of the recording; each piece is filtered in one call."""
 _BLOCK_S = 0.02
 """Length of the blocks at whose ends impacts are counted [s]."""
 
 
-def identity(frequency_hz: FloatArray) -> ComplexArray:
+def identity(frequency_hz: Floats) -> Complex:
     """Return a gain of 1 at each frequency, shape of ``frequency_hz``."""
     return np.ones(frequency_hz.shape, dtype=np.complex128)
 
@@ -43,7 +42,7 @@ class DrivenTable:
     """Model of a test bench: amplifier, shaker, specimen and sensors."""
 
     amplifier: Amplifier
-    """Amplifier; use the default one for a voltage measured at the coil."""
+    """Amplifier; use the default amplifier for a voltage measured at the coil."""
     shaker: Shaker
     specimen: Specimen
     base_sensor: Gain = identity
@@ -62,15 +61,15 @@ class SampledMotion:
     """Measured base acceleration [m/s2]."""
     m0_velocity: Singles
     """Measured velocity of m0 [m/s]."""
-    impact_times_s: FloatArray
+    impact_times_s: Floats
     """Time zero and the ends of blocks of 20 ms, shape (blocks + 1,)."""
-    impacts: FloatArray
-    """Number of contacts up to each of these times, shape (blocks + 1,)."""
+    impacts: Floats
+    """Number of contacts up to each time in ``impact_times_s``, shape (blocks + 1,)."""
 
 
 def follow_voltage(
     table: DrivenTable,
-    volts: FloatArray | Singles,
+    volts: Floats | Singles,
     sample_rate_hz: float,
     *,
     start: ArrayLike = (0.0,) * 6,
@@ -106,7 +105,7 @@ def follow_voltage(
         motion = shaken.move(fine, block=block)
         impacts.append(motion.contacts)
         tail = np.concatenate([tail, [motion.base_acceleration, motion.m0_velocity]], axis=1)
-        # Filtering the last samples requires the motion after them, except at the end of the record.
+        # The filter needs the motion after the last samples, except at the end of the record.
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         seen = resampling.samples(tail, gains)[:, done - held : upto - held]
@@ -130,11 +129,11 @@ class _Resampling:
         self._sample_rate_hz = sample_rate_hz
         self._ratio = ratio
         self._shaker = shaker
-        # Filter weights are stored, because all pieces of a record except the last have the same length.
-        self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
+        # Store the filter weights: all pieces of a record except the last piece have the same length.
+        self._weights: dict[tuple[int, Gain | None], Floats | Complex] = {}
 
-    def stretches(self, volts: FloatArray | Singles) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the end sample of each piece of the recording, and the mean voltages of its time steps."""
+    def stretches(self, volts: Floats | Singles) -> Iterator[tuple[int, Floats]]:
+        """Yield the end sample of each piece of the recording, and the mean voltages of the piece's steps."""
         ratio = self._ratio
         block = max(1, round(_BLOCK_S * self._sample_rate_hz))
         length = ceil(_PIECE / block) * block
@@ -147,7 +146,7 @@ class _Resampling:
             fine = fft.irfft(spectrum, padded.size * ratio, overwrite_x=True)
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
-    def samples(self, means: FloatArray, gains: Sequence[Gain]) -> FloatArray:
+    def samples(self, means: Floats, gains: Sequence[Gain]) -> Floats:
         """Return the samples of each sensor from the mean inputs in each step, shape (sensors, steps)."""
         count = means.shape[1] // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
@@ -158,7 +157,7 @@ class _Resampling:
             spectrum[place] *= self._weights_of(size, gain)
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[:, _MARGIN : _MARGIN + count])
 
-    def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
+    def _weights_of(self, size: int, gain: Gain | None) -> Floats | Complex:
         """Return the factors of spectral lines for resampling to time steps or, with ``gain``, to samples."""
         known = self._weights.get((size, gain))
         if known is None:
@@ -174,7 +173,7 @@ class _Resampling:
             self._weights[size, gain] = known
         return known
 
-    def _hold_gain(self, frequency_hz: FloatArray) -> ComplexArray:
+    def _hold_gain(self, frequency_hz: Floats) -> Complex:
         """Return the ratio of coil currents under a stepped and a continuous voltage: 1 - (w h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from .stops import (
-    HERTZ_EXPONENT,
     PAPER_INDENTATION_M,
     LawWord,
     Reference,
@@ -222,16 +221,16 @@ def fit_power_law(
     contact_stiffness, gap_m, indentation_m
         k_contact of the Hertz contact [N/m^1.5]; gap and indentation at which both forces are equal [m].
     shares
-        Share of each power in the force; the shares must add up to 1. The paper does not state them; by
-        default they are equal.
+        Share of each power in the force; the shares must add up to 1. The paper does not state the shares; by
+        default all are equal.
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
     if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
         raise ValueError(
-            f"Shares {parts} of exponents {list(exponents)}: give one for each exponent, adding up to 1."
+            f"Shares {parts} of exponents {list(exponents)}: give a share for each exponent, with the sum 1."
         )
     require_positive("Indentation of the fit", indentation_m, "m")
-    force = contact_stiffness * indentation_m**HERTZ_EXPONENT
+    force = contact_stiffness * indentation_m * math.sqrt(indentation_m)
     terms = sorted((n, part * force) for n, part in zip(exponents, parts, strict=True))
     return PowerLaw(gap_m + indentation_m, tuple(terms))
 
@@ -294,7 +293,7 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = {
         _parse_power_law,
     ),
 }
-"""Contact laws, keyed by their names on the command line and in files."""
+"""Contact laws, keyed by the names used on the command line and in files."""
 
 
 def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:

@@ -13,7 +13,7 @@ FEWEST_SAMPLES = 4
 SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
 """Allowed base amplitudes [m]. Squares of smaller values underflow; larger values must be typing errors."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
-"""Allowed frequencies [Hz]. At higher ones, powers of the frequency and numbers of periods overflow."""
+"""Allowed frequencies [Hz]. At higher frequencies, powers of frequency and numbers of periods overflow."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class LogarithmicSweep(_Sweep):
 class Sampled:
     """Measured or computed base displacement, interpolated by a cubic spline (C2, not-a-knot).
 
-    The first sample is at time zero; the drive ends at its last sample.
+    The first sample is at time zero; the drive ends at the last sample.
     """
 
     displacement_m: NDArray[np.float64]

@@ -54,7 +54,7 @@ def _number(given: object) -> object:
 
 
 def _time(given: object) -> object:
-    # pydantic would read 1 and "1" as seconds since 1970.
+    # Refuse 1 and "1", which pydantic would read as seconds since 1970.
     if isinstance(given, int | float) or (isinstance(given, str) and not re.match(r"\d{4}-\d", given)):
         raise PydanticCustomError("datetime_type", "give a date, time and time zone")
     return given
@@ -71,7 +71,7 @@ def _check_of(schema: Any) -> Callable[[object], object] | None:
         case {"type": "datetime"}:
             return _time
         case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
-            # pydantic's strict mode is not used: it refuses 1e3 for an integer, and numpy's numbers.
+            # Do not use pydantic's strict mode, which refuses numpy's numbers, and 1e3 for an integer.
             return _number
         case {"type": "tuple", "items_schema": items} if "variadic_item_index" not in schema:
             return partial(_entries, len(items))
@@ -85,7 +85,7 @@ def _with_checks(schema: Any) -> Any:
         case {"type": "bool"}:
             return {**schema, "strict": True}
         case {"type": "dict", "values_schema": values}:
-            # In TOML and JSON all keys of a table are text, even those of type int.
+            # All keys of a table in TOML and JSON are text, even if their type is int.
             return {**schema, "values_schema": _with_checks(values)}
         case dict():
             inner, check = {key: _with_checks(value) for key, value in schema.items()}, _check_of(schema)
@@ -99,11 +99,11 @@ def _with_checks(schema: Any) -> Any:
 class FrozenModel(BaseModel):
     """Immutable model that refuses unknown keys, and text or booleans where a number is required.
 
-    pydantic alone would read ``true`` as 1 and ``"45e-6"`` as a number. In a file both are mistakes: ``true``
-    would become a mass of 1 kg. The check applies to every field at any depth.
+    pydantic alone would read ``true`` as 1 and ``"45e-6"`` as a number. In a file both values are mistakes:
+    ``true`` would become a mass of 1 kg. The check applies to every field at any depth.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

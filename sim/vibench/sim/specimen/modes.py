@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .specimen import JOIN, Specimen, bound_matrices
-from .state import VX, VZ, Complex, Floats, Table, Vector, X, Z
+from .specimen import JOIN, VX, VZ, Complex, Floats, Specimen, X, Z, bound_matrices
 
 
-def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
+def state_matrix(specimen: Specimen) -> tuple[Floats, Floats]:
     """Return A, shape (6, 6), and b, shape (6,), of the motion without contact, d/dt s = A s + b f.
 
     The state is s = (x, y, z, vx, vy, vz). The base force is f = k0 U + c0 dU/dt.
@@ -23,7 +22,7 @@ def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
     return system, entry
 
 
-def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
+def _first_order(mass: Floats, stiffness: Floats, damping: Floats) -> Floats:
     """Return the state matrix for displacements followed by velocities, shape (2n, 2n)."""
     inverse, size = np.linalg.inv(mass), len(mass)
     system = np.zeros((2 * size, 2 * size))
@@ -62,7 +61,7 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     (m0, m1, m2), squared = specimen.masses, omega**2
     springs, dampers = specimen.stiffnesses, specimen.dampings
     k0, k1, k2 = (k + 1j * omega * c for k, c in zip(springs, dampers, strict=True))
-    # This elimination of m1 and m2 avoids differences of nearly equal stiffnesses, which would lose digits.
+    # Differences of nearly equal stiffnesses would lose digits; eliminating m1 and m2 this way avoids them.
     pair = k1 * (k2 - squared * m2) - squared * m1 * (k1 + k2 - squared * m2)
     carried = (m1 + m2) * k1 - squared * m1 * m2
     per_force = k0 / ((k0 - squared * m0) * pair - k2 * squared * carried)
@@ -94,18 +93,18 @@ REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per ce
 
 @lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Return the modal form of the specimen without contact, for any damping; treat its arrays as read-only.
+    """Return the modal form of the specimen without contact, for any damping; do not change the arrays.
 
     Raises ValueError in the same cases as `diagonal_form`.
     """
     return diagonal_form(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
 
 
-def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
+def diagonal_form(mass: Floats, stiffness: Floats, damping: Floats) -> ModalForm:
     """Return the modal form of M s'' + C s' + K s = 0 with a diagonal M.
 
-    The undamped modes solve a symmetric eigenproblem, so they are orthogonal even if two frequencies nearly
-    coincide. If the damping is zero or proportional to the stiffness, they are also the damped modes.
+    The undamped modes solve a symmetric eigenproblem and are therefore orthogonal even if two frequencies
+    nearly coincide. If the damping is zero or proportional to the stiffness, these are also the damped modes.
 
     Raises ValueError when two modes coincide (critical damping), so that modes do not span all states, or
     when the natural frequencies are too far apart.
@@ -115,7 +114,7 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
         factor = np.linalg.cholesky(stiffness / np.outer(root, root))
     except np.linalg.LinAlgError:
         factor = np.zeros_like(stiffness)
-    # Use singular values: eigenvalues of K would lose twice as many digits of the lowest mode.
+    # Use singular values: the eigenvalues of K would lose twice as many digits of the lowest mode.
     modes, omega, _ = np.linalg.svd(factor)
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
@@ -131,14 +130,14 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     return _coupled_shapes(omega, losses, shapes, rows)
 
 
-def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table) -> ModalForm:
+def _undamped_shapes(omega: Floats, damping: Floats, shapes: Floats, rows: Floats) -> ModalForm:
     """Return the modal form for uncoupled modes, q'' + damping q' + omega^2 q = 0."""
     parts = [part for mode in zip(omega, 0.5 * damping, shapes.T, rows, strict=True) for part in _mode(*mode)]
     rates, moved, read = zip(*parts, strict=True)
     return ModalForm(np.asarray(rates, np.complex128), np.array(moved), np.array(read))
 
 
-def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
+def _mode(omega: float, decay: float, shape: Floats, row: Floats) -> list[tuple[complex, Complex, Complex]]:
     """Return the terms (rate, shape, row) of one mode: one term if the mode oscillates, two if overdamped."""
     turn = (omega - decay) * (omega + decay)
     if abs(turn) <= CRITICAL * omega**2:
@@ -161,9 +160,9 @@ def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> 
     return np.concatenate([displacement, velocity]).astype(np.complex128)
 
 
-def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
+def _coupled_shapes(omega: Floats, losses: Floats, shapes: Floats, rows: Floats) -> ModalForm:
     """Return the modal form for undamped modes that are coupled by damping."""
-    # In the coordinates q and q' / omega, slow and fast modes together do not raise the condition number.
+    # With the coordinates q and q' / omega, very slow and fast modes do not raise the condition number.
     values, vectors = np.linalg.eig(
         np.block(
             [
@@ -180,7 +179,7 @@ def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) ->
     size = len(omega)
     moved = np.hstack([vectors.T[:, :size] @ shapes.T, vectors.T[:, size:] @ (shapes * omega).T])
     read = np.hstack([left[:, :size] @ rows, left[:, size:] @ (rows / omega[:, None])])
-    # Free motion of a passive structure cannot grow: a positive real part is a rounding error.
+    # The free motion of a passive structure cannot grow, so a positive real part is a rounding error.
     rates = np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]
     return ModalForm(
         rates=rates.astype(np.complex128),
@@ -239,8 +238,8 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
 # Exact solution of the specimen while m1 sticks to a rigid stop on m2: a system of two bodies. SI units.
 #
 # While m1 sticks to a stop, m1 and m2 are one rigid body with y = z + side * gap, and the spring and damper
-# between them have no effect. The motion of x and z is linear as long as the stop force is compressive. The
-# native engine computes this motion and finds the time at which the force would become tensile.
+# between them have no effect. As long as the stop force is compressive, the motion of x and z is linear. The
+# native engine computes this motion, and the time at which the force would become tensile.
 
 PLACES = [X, Z, VX, VZ]
 """Indices, in the six-element state, of the four unknowns while m1 sticks to m2."""

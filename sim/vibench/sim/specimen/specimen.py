@@ -14,13 +14,19 @@ from numpy.typing import NDArray
 
 from .contact_laws import ContactLaw, Elasticity, hertz_stiffness, law_by_name
 from .drive import Harmonic
-from .state import Floats
 from .stops import Strict
 
+X, Y, Z, VX, VY, VZ = range(6)
+"""Indices of displacements and velocities in a state; the same with and without contact."""
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
-"""Clearances of the stops at negative and at positive p = y - z [m]; one may be infinite."""
-Matrix = NDArray[np.float64]
+"""Clearances of the stops at negative and at positive p = y - z [m]; one of them may be infinite."""
+
+
+GAPS_M = 1e-15, 1e15
+"""Smallest and largest clearance [m]; the results of much smaller or larger ones are only rounding errors."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +63,11 @@ class Specimen(Strict):
                 raise ValueError(
                     f"Damping c{index} = {damping} N s/m is not allowed: it must be zero or positive."
                 )
-        lower, upper = self.gaps_m
-        if not (lower > 0.0 and upper > 0.0 and min(lower, upper) < math.inf):
+        (least, most), finite = GAPS_M, [each for each in self.gaps_m if each != math.inf]
+        if not (finite and all(least <= each <= most for each in finite)):
             raise ValueError(
                 f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
-                "it must be positive, and finite at one stop or both; "
+                f"it must be from {least:g} to {most:g}, and finite at one stop or both; "
                 'without stops, give the contact "linear".'
             )
 
@@ -71,19 +77,19 @@ class Specimen(Strict):
         return (self.gap_m if self.lower_gap_m is None else self.lower_gap_m), self.gap_m
 
     @property
-    def mass_matrix(self) -> Matrix:
+    def mass_matrix(self) -> Floats:
         """Mass matrix M, shape (3, 3) [kg]."""
         return np.diag(np.asarray(self.masses, dtype=np.float64))
 
     @property
-    def stiffness_matrix(self) -> Matrix:
+    def stiffness_matrix(self) -> Floats:
         """Stiffness matrix K without contact, shape (3, 3) [N/m]."""
-        return _chain_matrix(self.stiffnesses)
+        return links_matrix(self.stiffnesses)
 
     @property
-    def damping_matrix(self) -> Matrix:
+    def damping_matrix(self) -> Floats:
         """Damping matrix C, shape (3, 3) [N s/m]."""
-        return _chain_matrix(self.dampings)
+        return links_matrix(self.dampings)
 
     @property
     def natural_frequencies_hz(self) -> NDArray[np.float64]:
@@ -100,7 +106,7 @@ class Specimen(Strict):
     def damping_ratios(self) -> NDArray[np.float64]:
         """Damping ratio of each mode without contact, ordered by frequency, shape (3,).
 
-        It is ``-Re(s) / abs(s)`` for a complex pair of poles. Above 1 the mode does not oscillate.
+        The ratio is ``-Re(s) / abs(s)`` for a complex pair of poles. Above 1 the mode does not oscillate.
         """
         root = np.sqrt(np.asarray(self.masses))
         values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
@@ -114,12 +120,12 @@ class Specimen(Strict):
 _ROUNDING = 1e-12
 
 
-def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
+def _ratios_of_coupled_modes(own: Floats, damping: Floats) -> NDArray[np.float64]:
     """Return damping ratios of modes coupled by damping, from frequencies [rad/s] and modal damping [1/s]."""
     poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
-    # Overdamped modes: pair the slowest pole with the fastest. Their product is the squared frequency of the
-    # mode, and their sum is its damping.
+    # In overdamped modes, pair the slowest pole with the fastest pole. The product of both poles is the
+    # mode's squared frequency, and their sum is its damping.
     pairs = list(zip(still[: still.size // 2], still[: still.size // 2 - 1 : -1], strict=True))
     found = [(math.sqrt(slow * fast), 0.5 * (slow + fast) / math.sqrt(slow * fast)) for slow, fast in pairs]
     found += [(abs(pole), -pole.real / abs(pole)) for pole in poles if pole.imag > 0.0]
@@ -130,7 +136,7 @@ JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
 """Matrix, shape (3, 2), that maps (x, z) to (x, y, z) while m1 sticks to m2, without the constant gap."""
 
 
-def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
+def bound_matrices(specimen: Specimen) -> tuple[Floats, Floats, Floats]:
     """Return M, C and K of the specimen while m1 sticks to m2, for the coordinates x and z.
 
     Returns
@@ -203,13 +209,13 @@ def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
             )
 
 
-def _chain_matrix(links: Triple) -> Matrix:
+def links_matrix(links: Triple) -> Floats:
     """Return the matrix for (x, y, z) of three links: base to m0, m2 to m1, and m0 to m2."""
     c0, c1, c2 = links
     return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
 
 
-def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]:
+def _natural_frequencies(mass: Floats, stiffness: Floats) -> NDArray[np.float64]:
     root = np.sqrt(np.diag(mass))
     values = np.linalg.eigvalsh(stiffness / np.outer(root, root))
     return np.asarray(np.sqrt(values) / (2.0 * np.pi), dtype=np.float64)

@@ -46,7 +46,7 @@ SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
 """Key for the format version of a file, and the supported version."""
 DEEPEST = 5
-"""Largest number of descriptions in a chain in which each names the next one in ``model``."""
+"""Largest number of descriptions in a chain in which each names the next in ``model``."""
 USUAL_SPECIMEN = "gong2025"
 """Default specimen of rigs, studies and commands."""
 ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
@@ -62,7 +62,7 @@ class UnknownSpecimenError(ValueError):
 
 
 class SpecimenWarning(UserWarning):
-    """Warning: a replaced value also changed stiffnesses or dampings, which are computed from it."""
+    """Warning: a replaced value also changed stiffnesses or dampings, which are computed from this value."""
 
 
 class _DescribedModel(FrozenModel):
@@ -151,13 +151,13 @@ class SpecimenDescription(_DescribedModel):
     """Keys and values that a table has by default."""
 
     def __hash__(self) -> int:
-        # The dict of sources cannot be hashed; the JSON text contains all fields.
+        # Hash the JSON text, which contains all fields: the dict of sources cannot be hashed.
         return hash(self.model_dump_json())
 
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, value: object, info: ValidationInfo) -> object:
-        """Complete a table with the values of the specimen that it names; plain text counts as a name."""
+        """Complete a table with values of the specimen that the table names; plain text counts as a name."""
         folder: Path | None = (info.context or {}).get(FOLDER)
         match value:
             case str():
@@ -191,7 +191,7 @@ class SpecimenDescription(_DescribedModel):
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
-        """Return the clearances, with words for infinite ones, because JSON has no infinite numbers."""
+        """Return the clearances, with words for infinite clearances, because JSON has no infinite numbers."""
         if isinstance(gap_m, float):
             return gap_m
         return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
@@ -289,7 +289,7 @@ def usual_specimen() -> SpecimenTable:
 def load_specimen(specimen: str | Path) -> SpecimenDescription:
     """Return the description of a specimen, from its name in vibench or the path of a TOML file.
 
-    Raises UnknownSpecimenError when there is no such file, or it does not describe a specimen.
+    Raises UnknownSpecimenError when there is no such file, or the file does not describe a specimen.
     """
     try:
         return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})
@@ -314,11 +314,11 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
         return _merge(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
     names, called = ", ".join(known), reprlib.repr(specimen)
     if folder is None:
-        raise ValueError(f"no specimen that comes with vibench is called {called}; there are {names}")
+        raise ValueError(f"no specimen that comes with vibench is called {called}; give one of {names}")
     path = folder / specimen
     try:
         is_there = path.exists()
-    except OSError:  # no file can have such a name on this system
+    except OSError:  # a name that this system does not allow
         is_there = False
     if not is_there:
         raise ValueError(
@@ -329,13 +329,13 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
 
 
 def _of_this_version(path: Path) -> dict[str, Any]:
-    """Return the table of a file without its format version; refuse any version except `VERSION`."""
+    """Return the table of a file without the format version; refuse any version except `VERSION`."""
     table = toml_table(path)
     written = table.pop(FORMAT, VERSION)
     if isinstance(written, bool) or written != VERSION:
         raise ValueError(
-            f"{path}: {FORMAT} = {reprlib.repr(written)} is not version {VERSION}, which this vibench "
-            "reads; the file is from a later vibench: install that version"
+            f"{path}: {FORMAT} = {reprlib.repr(written)} is not version {VERSION}, which this vibench reads; "
+            "the file is from a later version of vibench: install that version"
         )
     return table
 
@@ -367,7 +367,7 @@ def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], table: Ma
     changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
     try:
         before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
-    except ValidationError:  # an invalid specimen is refused elsewhere
+    except ValidationError:  # other code refuses invalid specimens
         return
     for name, (kept, direct) in zip(("stiffnesses", "dampings"), ALTERNATIVES, strict=True):
         old, new = getattr(before, name), getattr(now, name)

@@ -16,7 +16,7 @@ PAPER_INDENTATION_M = 1e-6
 
 
 class Strict:
-    """Base of dataclasses that refuse unknown keys when pydantic reads them from a file."""
+    """Base of dataclasses that refuse unknown keys when pydantic reads the data from a file."""
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid")
 

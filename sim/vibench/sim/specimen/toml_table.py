@@ -17,7 +17,7 @@ def toml_table(path: Path) -> dict[str, Any]:
     Raises UnreadableTomlError when the file is missing, is not text, or is not TOML.
     """
     try:
-        # utf-8-sig, because some editors on Windows begin a file with a byte-order mark.
+        # Use utf-8-sig, because some Windows editors write a byte-order mark at the start of a file.
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UnreadableTomlError(
@@ -58,7 +58,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "union_tag_not_found": "{discriminator} is missing: it selects the kind of this table",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
-"""Messages in TOML's terms, by pydantic's error type; they replace pydantic's messages in Python's terms."""
+"""Messages in TOML's terms, by pydantic's error type; these replace pydantic's messages in Python's terms."""
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """Studies: every combination of models, gaps, amplitudes and frequencies, solved as one queue of scenes.
 
 `solve_study` computes on threads or on a Dask cluster and stores the results in memory or in an HDF5 file.
-The file stays valid if the process is killed, and the study can be resumed from it (docs/studies.md,
+The file stays valid if the process is killed, and the study can be resumed from the file (docs/studies.md,
 docs/decisions/0010-studies.md). With the start `up` or `down`, a point starts from the final state at the
 neighbouring frequency. Results do not depend on the computer; the file names the software that computed them.
 

@@ -1,11 +1,9 @@
-from ._errors import (
-    InvalidStudy as InvalidStudy,
-    StudyError as StudyError,
-)
+from ._errors import InvalidStudy as InvalidStudy, StudyError as StudyError
 from ._executor import (
     Executor as Executor,
     Solver as Solver,
     ThreadExecutor as ThreadExecutor,
+    software as software,
 )
 from ._grid import (
     COLUMNS as COLUMNS,
@@ -31,9 +29,6 @@ from ._results import (
     read_arrays as read_arrays,
     read_plan as read_plan,
     read_sessions as read_sessions,
-)
-from ._software import (
-    software as software,
 )
 from ._solve import (
     ExistingStudy as ExistingStudy,

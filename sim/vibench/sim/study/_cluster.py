@@ -16,11 +16,10 @@ from distributed.comm import get_address_host_port
 from ..scene.scene import Scene
 from ..scene.solve import SolvedScene, solve_scene
 from ._errors import ClusterLost
-from ._executor import Bundle, Reply, Solver, empty_queue, solve_timed
-from ._software import software
+from ._executor import Bundle, Reply, Solver, empty_queue, software, solve_timed
 
 CONNECT_PATIENCE_S = 30.0
-"""Longest wait for the scheduler, and then for its first worker [s]."""
+"""Longest wait for the scheduler, and also for the first worker [s]."""
 LOOK_AGAIN_S = 1.0
 """Shortest interval between two queries of the number of workers [s]."""
 RUNNING, CONNECTING = "running", "connecting"
@@ -38,7 +37,7 @@ def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
 class ClusterExecutor:
     """Executor that uses the workers of a Dask scheduler.
 
-    Raises ClusterLost if the scheduler does not answer or has no worker, or if a worker has other software.
+    Raises ClusterLost if the scheduler does not answer, has no worker, or a worker has different software.
     """
 
     def __init__(
@@ -53,7 +52,7 @@ class ClusterExecutor:
             self._client.close()
             raise
         self._arrived: queue.SimpleQueue[tuple[Bundle, Future]] = queue.SimpleQueue()
-        # Keep references, because the scheduler drops futures without references.
+        # Keep a reference to each future: the scheduler drops futures without references.
         self._held: dict[str, Future] = {}
         self._prefix = f"vibench-{uuid.uuid4().hex}"
         self._submitted = 0
@@ -67,7 +66,7 @@ class ClusterExecutor:
 
     @property
     def slots(self) -> int:
-        """Total number of threads of the workers at the last query; 0 while the scheduler does not answer."""
+        """Total number of the workers' threads at the last query; 0 while the scheduler does not answer."""
         if not self._is_in_contact():
             return 0
         now_s = time.monotonic()
@@ -130,7 +129,7 @@ class ClusterExecutor:
         return Reply(bundle, solved)
 
     def _is_in_contact(self) -> bool:
-        """Return whether the scheduler answers; raise ClusterLost if the client has given up."""
+        """Return whether the scheduler answers; raise ClusterLost if the client has stopped trying."""
         if self._client.status in (RUNNING, CONNECTING):
             return bool(self._client.status == RUNNING)
         raise ClusterLost(
@@ -147,7 +146,7 @@ class ClusterExecutor:
 
 def _connect(address: str, patience_s: float) -> Client:
     try:
-        # Check the address first, because a client with an invalid address cannot be closed.
+        # Check the address before creating a client: with an invalid address, a client cannot be closed.
         get_address_host_port(address)
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -158,7 +157,7 @@ def _connect(address: str, patience_s: float) -> Client:
 
 
 def _require_workers(client: Client, address: str, patience_s: float) -> None:
-    """Raise ClusterLost for a cluster without workers, or with workers that have other software."""
+    """Raise ClusterLost for a cluster without workers, or with a worker that has different software."""
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except OSError as error:
@@ -179,6 +178,6 @@ def _require_workers(client: Client, address: str, patience_s: float) -> None:
 
 def _other_software(address: str, made_by: str) -> str:
     return (
-        f"A worker of {address} has other software, so results may differ: {made_by} there,"
+        f"A worker of {address} has different software, so results may differ: {made_by} there,"
         f" {software()} here. Install the same versions on every machine, and restart the workers."
     )

@@ -1,4 +1,4 @@
-"""Errors of a study. Each message states what was given, what is allowed, and what to do next."""
+"""Errors of a study. Every command loads these errors, so this module imports nothing."""
 
 
 class StudyError(Exception):

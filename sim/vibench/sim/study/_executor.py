@@ -3,17 +3,21 @@
 Computing times of scenes exclude what a process does only once: loading modules, computing tables.
 """
 
+import json
 import math
 import os
+import platform
 import queue
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, version
 from typing import Protocol, TypeAlias, TypeVar
 
+from ..engine.library import physics_digest
 from ..scene.cost import learn_cost
 from ..scene.prediction import Method
 from ..scene.scene import Scene
@@ -23,7 +27,7 @@ from ._errors import InvalidStudy
 
 @dataclass(frozen=True)
 class Bundle:
-    """Scenes that are sent to a worker together, because sending short scenes one by one is slow."""
+    """Scenes that are sent to a worker together, because it is slow to send short scenes one by one."""
 
     numbers: tuple[int, ...]
     """Index of the point of the study to which each scene belongs."""
@@ -92,7 +96,7 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[SolvedScene
             found = [SolvedScene(prediction, time.thread_time() - start_s)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
-            # Times of closed forms are not recorded: planning them takes about as long as evaluating them.
+            # Do not record times of closed forms: planning takes about as long as evaluating them.
             if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
                 learn_cost(scene, each.taken_s, solver)
             yield SolvedScene(each.prediction, each.taken_s if is_prepared else math.nan)
@@ -160,7 +164,7 @@ class ThreadExecutor:
 
 
 def empty_queue(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Item]:
-    """Return all items now in a queue; wait at most ``timeout_s`` for the first one."""
+    """Return all items now in a queue; wait at most ``timeout_s`` for the first item."""
     items: list[Item] = []
     try:
         items.append(arrivals.get(timeout=timeout_s))
@@ -168,3 +172,18 @@ def empty_queue(arrivals: queue.SimpleQueue[Item], timeout_s: float) -> list[Ite
             items.append(arrivals.get_nowait())
     except queue.Empty:
         return items
+
+
+PACKAGES = ("vibench", "numpy", "scipy")
+
+
+@cache
+def software() -> str:
+    """Return package versions and a digest of the simulation's sources, as JSON text with sorted keys."""
+    found = {"python": platform.python_version(), "sim_sources": physics_digest()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return json.dumps(found, sort_keys=True)

@@ -3,27 +3,27 @@
 Results are written in this order: numbers, flush, states, flush. If the process or the power fails at any
 time, every point with the state DONE has all its numbers.
 
-HDF5 creates the file with all metadata and with space for all results, and closes it. Afterwards only bytes
-at known offsets are written, so that no crash can leave the file inconsistent.
+HDF5 creates the file with all metadata and with space for all results, and closes the file. Afterwards only
+bytes at known offsets are written, so that no crash can leave the file inconsistent.
 """
 
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hdf5_files.writing import open_hdf5_to_write
+from ..hdf5_files import open_hdf5_to_write
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _grid as layout
 from ._errors import StudyError
+from ._executor import software
 from ._results import offsets_of, read_arrays, read_plan, read_sessions
-from ._software import software
 from ._store import Arrays, PointAnswer, write_cells
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
@@ -33,8 +33,8 @@ _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 def sole_writer(path: Path) -> OpenFile:
     """Open a file for writing, with a lock while it is open.
 
-    Readers keep the file open only briefly. Raises StudyError when another process keeps it open for longer,
-    as a writer does, or when the file cannot be opened.
+    Readers keep the file open only briefly. Raises StudyError when another process keeps the file open for
+    longer, as a writer does, or the file cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -71,7 +71,7 @@ _COMPONENTS = {
 }
 """Coordinates of the additional axes of columns with several components, by name of the axis."""
 HEAD_BYTES = 2_000_000
-"""Upper bound on the size of the file without its columns [bytes]."""
+"""Upper bound on the size of the file without the columns [bytes]."""
 
 
 def make_file(path: Path, plan: layout.GridPlan) -> None:
@@ -80,7 +80,7 @@ def make_file(path: Path, plan: layout.GridPlan) -> None:
     Raises StudyError when the file exists, the folder does not exist, or the disk is too full.
     """
     try:
-        path.open("xb").close()  # if two runs start at the same time, only one can create the file
+        path.open("xb").close()  # of two simultaneous runs, only one can create the file
     except FileExistsError:
         raise StudyError(
             f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
@@ -111,8 +111,8 @@ def _require_room(path: Path, plan: layout.GridPlan) -> None:
     free_bytes = shutil.disk_usage(path.parent).free
     if free_bytes < needed_bytes:
         raise StudyError(
-            f"{path} needs {needed_bytes / 1e6:.0f} MB for {plan.grid.size} points; the disk has"
-            f" {free_bytes / 1e6:.0f} MB. Free space, or choose another folder or a smaller {plan.called}."
+            f"{path} needs {needed_bytes / 1e6:.0f} MB for {plan.grid.size} points; the disk has "
+            f"{free_bytes / 1e6:.0f} MB free. Make room, or choose another folder or a smaller {plan.called}."
         )
 
 
@@ -238,7 +238,7 @@ class FileStore:
             cells = {**answer.cells, layout.SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
             for column, raw in write_cells(self.arrays, self._plan, kept):
-                if column.name in self._offsets:  # files of earlier versions have no digests of points
+                if column.name in self._offsets:  # files of earlier versions have no digests
                     self._write(self._offsets[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
@@ -280,17 +280,18 @@ class FileStore:
 
     def _write_error(self, error: OSError) -> StudyError:
         return StudyError(
-            f"{self._path} could not be written: {error.strerror}. Earlier results are safe;"
-            " free disk space or repair the disk, and resume."
+            f"{self._path} could not be written: {error.strerror}. Earlier results are safe; make room or "
+            "repair the disk, and resume."
         )
 
 
 def _require_same(path: Path, kept: layout.GridPlan, requested: layout.GridPlan) -> None:
     differing = requested.differences(kept)
     if differing:
+        there, here = (each.model_dump(mode="json") for each in (kept, requested))
+        told = (text for each in differing for text in _differences(each, there[each], here[each]))
         raise StudyError(
-            f"{path} contains another {requested.called}: "
-            f"{', '.join(_difference(name, kept, requested) for name in differing)}."
+            f"{path} contains another {requested.called}: {', '.join(told)}."
             f" Nothing was changed; request the same {requested.called}, or choose another file."
         )
 
@@ -299,19 +300,18 @@ SHOWN = 60
 """Largest number of characters of a value that a message shows."""
 
 
-def _difference(name: str, kept: layout.GridPlan, requested: layout.GridPlan) -> str:
-    """Describe how a field differs between two plans; for lists, describe the first difference."""
-    there, here = (plan.model_dump(mode="json")[name] for plan in (kept, requested))
-    match there, here:
-        case [*some], [*others]:
-            index = next(
-                (i for i, pair in enumerate(zip(some, others, strict=False)) if pair[0] != pair[1]),
-                min(len(some), len(others)),
-            )
-            there, here = (_item(values, index) for values in (some, others))
-        case _:
-            pass
-    return f"{name} is {_short(there)} in the file and {_short(here)} in the request"
+def _differences(name: str, there: Any, here: Any) -> Iterator[str]:
+    """Describe how a field differs between two plans: each differing key of a table, first item of a list."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for key in {**there, **here}:
+            if there.get(key) != here.get(key):
+                yield from _differences(f"{name}.{key}", there.get(key), here.get(key))
+        return
+    if isinstance(there, list) and isinstance(here, list):
+        both = enumerate(zip(there, here, strict=False))
+        index = next((i for i, pair in both if pair[0] != pair[1]), min(len(there), len(here)))
+        there, here = (_item(values, index) for values in (there, here))
+    yield f"{name} is {_short(there)} in the file and {_short(here)} in the request"
 
 
 def _item(values: list[object], index: int) -> str:

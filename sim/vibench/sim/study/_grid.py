@@ -15,9 +15,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine.run import Outcome
 from ..scene.prediction import Method, MotionKind, StartMemory
 from ..specimen.frozen_model import FrozenModel
-from ..specimen.outcome import Outcome
 
 FORMAT = "vibench-study"
 FORMAT_VERSION = 2
@@ -35,7 +35,7 @@ COUNTER_DTYPE = "<i8"
 
 
 class PointState(IntEnum):
-    """State of a point; it is written to the file after the point's numbers."""
+    """State of a point, written to the file after the point's numbers."""
 
     MISSING = 0
     """The point has not been computed yet."""
@@ -46,7 +46,7 @@ class PointState(IntEnum):
     FAILED = 3
     """The scene of the point could not be computed; ``message`` is the reason. Numbers are NaN."""
     FILLED = 4
-    """The point of a map was interpolated, not computed, because its neighbours agree."""
+    """The point of a map was interpolated, not computed, because the neighbouring points agree."""
 
 
 SESSION_COLUMNS = {"started_utc": 32, "software_json": 512, "executor": 160}
@@ -174,7 +174,7 @@ ESCAPE_NUMBERS = {
     "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
     "high_per_s": Column("escape_rate_high", REAL, "s-1", "upper end of its interval"),
     "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
-    "chaotic_s": Column("chaotic_time", REAL, "s", "total simulated time in chaos of all starts"),
+    "chaotic_s": Column("chaotic_time", REAL, "s", "total simulated time of all starts in chaos"),
 }
 """Columns, keyed by the field of `EscapeRate` that they store."""
 OTHERS = (
@@ -219,11 +219,7 @@ class Grid:
 
     def place(self, number: int) -> tuple[int, ...]:
         """Return the index of a point along each axis, from its number."""
-        place = []
-        for length in reversed(self.shape):
-            number, index = divmod(number, length)
-            place.append(index)
-        return tuple(reversed(place))
+        return tuple(map(int, np.unravel_index(number, self.shape)))
 
     def neighbours(self, number: int) -> Iterator[int]:
         """Yield the numbers of the neighbouring points along the ordered axes."""
@@ -291,7 +287,7 @@ class GridPlan(FrozenModel, ABC):
         return self.model_dump_json()
 
     def digest_at(self, number: int, arrays: Mapping[str, NDArray[np.generic]]) -> bytes:
-        """Return the digest of a point's number, its plan, and all its values except the point state."""
+        """Return the digest of a point's number and plan, and of all values of the point except its state."""
         found = hashlib.sha256(f"{number} {self.text}".encode())
         for column in self.columns:
             if column.name not in (DIGEST, STATE):
@@ -314,7 +310,7 @@ class GridPlan(FrozenModel, ABC):
         return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
 
     def require_target_alone(self, *names: str) -> None:
-        """Raise ValueError if one of these fields is given together with a requested error or time."""
+        """Raise ValueError if one of these fields is given together with a target error or time."""
         for name in names:
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f"{name} was given with an error or a time, which sets it; leave out one")

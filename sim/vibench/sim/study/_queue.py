@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from ..background import Cancelled, Observer, Progress
 from ..scene.cost import expected_cost_s
 from ..scene.scene import Scene
-from ..scene.solve import SolvedScene, Solver
-from ..specimen.state import Floats
+from ..scene.solve import InBatches, SolvedScene, Solver
+from ..specimen.specimen import Floats
 from ._executor import Bundle, Executor, Reply
 from ._grid import FINAL_STATE, MESSAGE, TAKEN, Grid, PointState
 from ._store import Arrays, PointAnswer, Store, cut_text, is_failed, states
 from ._study import Start
 
-# A point that continues another one is ready when that one is done. The longest ready point is started first.
-#
-# The time of a point is estimated from its plan, and from its neighbours once these are done.
+# If a point continues another point, it is ready when that other point is done. Of all ready points, the
+# point with the longest estimated computing time is started first. This time is estimated from the plan, and
+# from neighbouring points as soon as these are done.
 
 SHORTEST_S = 1e-6
 """Shortest assumed computing time of a point [s]; avoids division by zero."""
@@ -58,7 +58,7 @@ class Costs:
                 yield each
 
     def remaining_s(self, is_missing: NDArray[np.bool_]) -> float:
-        """Return the total computing time of the points marked in ``is_missing``, shape (points,) [s].
+        """Return the total computing time of the points marked in ``is_missing`` (shape (points,)) [s].
 
         Without a finished neighbour, the planned time is scaled by the ratio of actual to planned times.
         """
@@ -77,7 +77,7 @@ class PointScheduler:
     """Points still to be computed, in the order in which they are started.
 
     The point with the longest computing time is started first, which keeps all workers busy to the end. A
-    point's time includes all points that continue it. Each point is taken once, unless it is put back.
+    point's time includes all points that continue it. A point that is not put back is taken only once.
     """
 
     def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
@@ -115,7 +115,7 @@ class PointScheduler:
         return self._is_released & ~self._is_done
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
-        """Take the longest ready point, and further points up to ``worth_s`` [s] or ``most`` in total."""
+        """Take the ready point with the longest time, and more points up to ``worth_s`` [s] or ``most``."""
         taken: list[int] = []
         sum_s = 0.0
         while len(taken) < most and sum_s < worth_s:
@@ -139,7 +139,7 @@ class PointScheduler:
                 self._push(changed)
 
     def finish(self, number: int) -> None:
-        """Mark a point as done, so that the point that continues it may start."""
+        """Mark a point as done, so that the next point, which continues this point, may start."""
         self._is_done[number] = True
         self.left -= 1
         self._is_out[number] = False
@@ -171,7 +171,7 @@ class PointScheduler:
         heapq.heappush(self._queue, (-self._weight(number), number))
 
     def _pop(self) -> int | None:
-        """Return the longest ready point; drop entries of done points and entries with outdated estimates."""
+        """Return the ready point with the longest time; drop entries of done points and outdated entries."""
         while self._queue:
             weight, number = heapq.heappop(self._queue)
             if self._is_ready(number) and -weight == self._weight(number):
@@ -193,12 +193,12 @@ class PointScheduler:
 
 MOST_IN_BUNDLE = 64
 """Largest number of points in a bundle; limits how many results are lost with a worker."""
-SHARE = 8
-"""Ratio of the remaining work per worker to the largest bundle, so that all workers end together."""
+SHARE, BATCHED_SHARE = 8, 2
+"""Ratio of the remaining work per worker to the largest bundle. Larger bundles fill SIMD registers better."""
 QUEUED_PER_SLOT = 2
 """Number of bundles per worker: one runs and one waits, so that no worker is idle."""
 LOOK_S = 0.2
-"""Interval between two checks for cancellation [s]."""
+"""Time between two checks for cancellation [s]."""
 
 
 class StudyEnd(StrEnum):
@@ -221,6 +221,7 @@ class Points(ABC):
 
     def __init__(self, grid: Grid, starts: Sequence[object], solver: Solver) -> None:
         self.grid, self._starts, self._solver = grid, starts, solver
+        self.share = BATCHED_SHARE if isinstance(solver, InBatches) else SHARE
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
@@ -256,7 +257,7 @@ class Points(ABC):
         return np.repeat(some, every)[: self.grid.size]
 
     def predecessor(self, number: int, arrays: Arrays) -> int:
-        """Return the number of the point to continue; `NOBODY` if there is none, or its state is NaN."""
+        """Return the point to continue; `NOBODY` if there is no such point, or the point's state is NaN."""
         before = int(self.after[number])
         if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
             return NOBODY
@@ -300,7 +301,7 @@ def run_points(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute the requested points that the store lacks, until ``cancelled``, as `run_study` does."""
+    """Compute the requested points that are not in the store, until ``cancelled``, as `run_study` does."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)
@@ -343,14 +344,14 @@ class _Session:
         return self._scheduler.left > 0
 
     def feed(self) -> None:
-        """Send bundles to the executor until each of its workers has `QUEUED_PER_SLOT` bundles."""
+        """Send bundles to the executor until each worker has `QUEUED_PER_SLOT` bundles."""
         now_s = time.monotonic()
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s
             self._work_left_s = self._costs.remaining_s(self._scheduler.is_missing)
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
-            worth_s = min(self._points.bundle_s, self._work_left_s / (slots * SHARE))
+            worth_s = min(self._points.bundle_s, self._work_left_s / (slots * self._points.share))
             numbers = self._scheduler.take(worth_s, MOST_IN_BUNDLE)
             if not numbers:
                 return
@@ -374,7 +375,7 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.next_points(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Measure the workers' speed from the first results on, because workers need time to start.
+            # Workers need time to start, so measure their speed only after the first results.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> Progress:

@@ -12,10 +12,11 @@ from pydantic import ValidationError
 
 from ..scene.prediction import ScenePrediction
 from ..specimen.frozen_model import count_text
-from ..specimen.state import Floats
+from ..specimen.specimen import Floats
 from ..specimen.toml_table import fault_in_words
 from . import _grid as layout
 from ._errors import InvalidStudy, StudyError
+from ._executor import software
 from ._grid import (
     CONTINUES,
     DURATION,
@@ -28,9 +29,13 @@ from ._grid import (
     PointState,
     StudyAxis,
 )
-from ._software import software
 from ._store import Arrays, empty_arrays, prediction_at, states
-from ._study import GivenStart, Start, Study, start_name
+from ._study import (
+    GivenStart,
+    Start,
+    Study,
+    start_name,
+)
 
 if TYPE_CHECKING:
     import h5py
@@ -66,7 +71,7 @@ def read_arrays(path: Path, plan: GridPlan) -> Arrays:
 
 
 def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
-    """Return the sessions recorded in a file: time, software and executor of each."""
+    """Return the sessions recorded in a file: time, software and executor of each session."""
     with _open_store(path, kind) as file:
         return _sessions(file)
 
@@ -79,11 +84,11 @@ def _sessions(file: "h5py.File") -> tuple[Session, ...]:
 
 
 def _require_layout(file: "h5py.File", plan: GridPlan) -> None:
-    """Raise ValueError unless the axes and columns of a file match its plan."""
+    """Raise ValueError unless the axes and columns of a file match the plan in the file."""
     for axis in plan.axes:
         kept = [each.decode() if isinstance(each, bytes) else each for each in file[axis.name][...].tolist()]
         if kept != list(axis.values):
-            raise ValueError(f"its axis {axis.name} has other values than its {plan.called}")
+            raise ValueError(f"the values of its axis {axis.name} do not match its {plan.called}")
     for column in _stored_columns(file, plan):
         dataset = file[column.name]
         shape = plan.grid.shape if column.components == 1 else (*plan.grid.shape, column.components)
@@ -98,7 +103,7 @@ def _stored_columns(file: "h5py.File", plan: GridPlan) -> list[layout.Column]:
 
 
 CHECKED = 2000
-"""Approximate number of points whose digests are checked when a file is opened; takes 0.05 s."""
+"""Approximate number of points whose digests are checked when a file is opened; the check takes 0.05 s."""
 
 
 def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session, ...]) -> None:
@@ -114,7 +119,7 @@ def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session,
         if column.meanings and not np.all((values >= lowest) & (values < len(column.meanings))):
             raise ValueError(f"its column {column.name} has a value without a meaning")
         if column.name in ("response_i", DURATION, PHASE) and not np.all(np.isfinite(values)):
-            raise ValueError(f"its column {column.name} lacks a number")
+            raise ValueError(f"a number is missing in its column {column.name}")
     before = arrays[CONTINUES].astype(np.int64)
     if np.any(state >= len(PointState)) or np.any(before >= plan.grid.size):
         raise ValueError("it refers to states or points that do not exist")
@@ -123,11 +128,11 @@ def _require_own_points(plan: GridPlan, arrays: Arrays, sessions: tuple[Session,
     for number in known[:: max(1, len(known) // CHECKED)].tolist():
         digest = bytes(arrays[layout.DIGEST][number])
         if digest and digest != plan.digest_at(number, arrays):
-            raise ValueError(f"point {number} has other values than were computed")
+            raise ValueError(f"point {number} has other values than those computed")
 
 
 def offsets_of(path: Path, plan: GridPlan) -> dict[str, int]:
-    """Return the position in the file [bytes] of every dataset that is written during a run, by its name."""
+    """Return the position in the file [bytes] of every dataset written during a run, by dataset name."""
     sessions = (f"{layout.SESSIONS}/{name}" for name in (*layout.SESSION_COLUMNS, layout.N_SESSIONS))
     with _open_store(path, type(plan)) as file:
         names = (*(column.name for column in _stored_columns(file, plan)), *sessions)
@@ -135,7 +140,7 @@ def offsets_of(path: Path, plan: GridPlan) -> dict[str, int]:
 
 
 def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
-    # Read the states first: results that arrive while reading are then ignored in all columns.
+    # Read the states first: if results arrive while reading, they are then ignored in all columns.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
     arrays: Arrays = {**empty_arrays(plan), layout.STATE: state}
@@ -150,16 +155,16 @@ def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
 
 @contextmanager
 def _open_store(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    # Imported here, because results in memory do not need h5py.
-    from ..hdf5_files.door import UNREADABLE, UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
+    # Import here, because results in memory do not need h5py.
+    from ..hdf5_files import UNREADABLE, UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     wanted = f"give the path of a {kind.called}'s file"
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist, or is not a file"
         raise StudyError(f"{path} {what}; {wanted}.")
     try:
-        # Use HDF5's default lock, which is compatible with the writer's. HDF5 refuses another kind of lock if
-        # this process has already opened the file, for example through xarray.
+        # Use HDF5's default lock, which is compatible with the writer's lock. If this process has already
+        # opened the file, for example through xarray, HDF5 refuses another type of lock.
         file = open_hdf5(path)
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
@@ -189,8 +194,8 @@ def _require_ours(path: Path, file: "h5py.File", kind: type[GridPlan]) -> None:
     version = int(file.attrs["format_version"])
     if version != layout.FORMAT_VERSION:
         raise StudyError(
-            f"{path} has format version {version}; this vibench reads version {layout.FORMAT_VERSION}."
-            " Use the vibench that wrote it."
+            f"{path} has format version {version}; this version of vibench reads version "
+            f"{layout.FORMAT_VERSION}. Use the version that wrote the file."
         )
 
 
@@ -215,7 +220,7 @@ class GridResults(Generic[Plan]):
 
     plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
-    """Columns by name, with one row per point, as in the file."""
+    """Columns by name, with one row per point as in the file."""
     sessions: tuple[Session, ...] = ()
     """Sessions in which the results were computed; empty if the study is only in memory."""
 
@@ -240,7 +245,7 @@ class GridResults(Generic[Plan]):
         return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
 
     def target_text(self, error: float | None) -> str:
-        """State how many computed points reached a requested error; empty if none was requested."""
+        """State how many computed points reached a target error; empty if no error was requested."""
         if error is None:
             return ""
         errors = self.values("error_estimate")[self.state == PointState.DONE]
@@ -249,8 +254,8 @@ class GridResults(Generic[Plan]):
         if met == errors.size:
             return text
         known = errors[np.isfinite(errors)]
-        largest = f"{100.0 * known.max():.2g} %" if known.size == errors.size else "not known"
-        return f"{text} The largest error is {largest}; vibench predict states if more time reduces it."
+        largest = f"{float(f'{100.0 * known.max():.2g}'):g} %" if known.size == errors.size else "not known"
+        return f"{text} The largest error is {largest}; predict one point to see whether more time helps."
 
     def values(self, name: str, **fixed: Value) -> Floats:
         """Return one quantity over the axes that are not fixed; unknown numbers are NaN.
@@ -351,15 +356,17 @@ def results_of(study: Study, arrays: Arrays) -> StudyResults:
 
 
 def _index(axis: StudyAxis, value: Value) -> int:
-    for index, each in enumerate(axis.values):
-        if _is_same(each, value):
-            return index
-    shown = ", ".join(str(each) for each in axis.values[:SHOWN_VALUES])
-    more = ", …" if len(axis.values) > SHOWN_VALUES else ""
-    raise InvalidStudy(f"{value!r} is not a value of {axis.name}; give one of {shown}{more}.")
-
-
-def _is_same(here: Value, requested: Value) -> bool:
-    if isinstance(here, float) and isinstance(requested, float):
-        return abs(here - requested) <= SAME * abs(here)
-    return here == requested
+    if value in axis.values:
+        return axis.values.index(value)
+    close = [
+        index
+        for index, each in enumerate(axis.values)
+        if isinstance(each, float) and isinstance(value, float) and abs(each - value) <= SAME * abs(each)
+    ]
+    if len(close) == 1:
+        return close[0]
+    known = [axis.values[index] for index in close] or axis.values
+    shown = ", ".join(str(each) for each in known[:SHOWN_VALUES])
+    more = ", …" if len(known) > SHOWN_VALUES else ""
+    matches = "several values" if close else "no value"
+    raise InvalidStudy(f"{value!r} matches {matches} of {axis.name}; give one of {shown}{more}.")

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Cancelled, Observer
+from ..engine.run import Outcome
 from ..scene.cost import pilot_cost_s
 from ..scene.prediction import state_of
 from ..scene.scene import Given, Scene
 from ..scene.solve import SolvedScene, solve_scene
-from ..specimen.outcome import Outcome
 from ..specimen.stops import member
 from ._errors import ClusterLost
 from ._executor import Executor, Solver, ThreadExecutor
@@ -22,9 +22,14 @@ from ._grid import CONTINUES, FINAL_STATE, IDENTITY, PHASE, TAKEN, Cell, GridPla
 from ._queue import NOBODY, Points, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
-from ._study import Study, scene_identity, start_name, study_solver
+from ._study import (
+    Study,
+    scene_identity,
+    start_name,
+    study_solver,
+)
 
-BUNDLE_S, LANES_S = 0.05, 0.5
+BUNDLE_S, LANES_S = 0.05, 6.0
 """Computing time of a bundle, and of a bundle that is solved in SIMD batches [s]. Both are long compared with
 the milliseconds of a transfer on a cluster."""
 
@@ -111,7 +116,7 @@ def solve_study(
     study
         Requested study.
     out
-        File for the results, ``NAME.h5``; None to keep them in memory.
+        File for the results, ``NAME.h5``; None to keep the results in memory.
     existing
         Whether to refuse an existing file or to resume it. Resuming computes missing points, or creates the
         file if it does not exist.
@@ -174,7 +179,7 @@ def run_study(
     observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute every point that is missing in the store, the longest first.
+    """Compute every point that is missing in the store, beginning with the longest.
 
     Results do not depend on the executor or the order of computation. A point that continues another point
     waits for the result of that point. An error in a scene is stored as the result of its point. Raises

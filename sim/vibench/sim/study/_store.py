@@ -8,10 +8,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine.run import Accuracy, AccuracyWord, Outcome
 from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
 from ..scene.shares import EscapeRate, Share
-from ..specimen.accuracy import Accuracy, AccuracyWord
-from ..specimen.outcome import Outcome
 from ..specimen.stops import member
 from . import _grid as layout
 
@@ -51,7 +50,7 @@ def write_cells(
             values = arrays[column.name]
             value = plan.digest_at(answer.number, arrays) if is_digest else answer.cells[column.name]
             values[answer.number] = value
-            # Take a slice: numpy removes the padding of text from a single value, but not from a slice.
+            # Take a slice: from a single text, numpy would remove the padding.
             yield column, values[answer.number : answer.number + 1].tobytes()
 
 
@@ -77,10 +76,10 @@ class Store(Protocol):
         """Results stored so far; do not change them."""
 
     def begin(self, executor: str) -> None:
-        """Record that a session begins, with the description of its executor."""
+        """Record the start of a session, with the description of the session's executor."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store the results of points; return once they are safe."""
+        """Store the results of points; return once the results are safe."""
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Store the interpolated points of a map, given by column, with the point state FILLED."""
@@ -153,7 +152,7 @@ def _fill_places(column: layout.Column, values: list[float | None]) -> layout.Ce
 
 
 def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
-    """Return the ensemble of a point from the stored values; None if the point has none."""
+    """Return the ensemble of a point from the stored values; None if the point has no ensemble."""
     if _number(arrays[layout.STARTS][number]) is None:
         return None
     escape = _numbers_at(arrays, layout.ESCAPE_NUMBERS, number)
@@ -217,7 +216,7 @@ def cut_text(text: str) -> bytes:
 def _numbers_at(
     arrays: Arrays, columns: Mapping[str, layout.Column], at: int | tuple[int, int]
 ) -> dict[str, Any]:
-    """Return the values of a point, or of one of its motions, by field name; None for missing values."""
+    """Return the values of a point or of one motion of the point, by field name; None for missing values."""
     return {field: _number(arrays[column.name][at]) for field, column in columns.items()}
 
 

@@ -19,10 +19,10 @@ from pydantic import (
     model_validator,
 )
 
+from ..engine.run import Accuracy
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene, Target
 from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
-from ..specimen.accuracy import Accuracy
 from ..specimen.drive import Harmonic
 from ..specimen.frozen_model import FrozenModel, NumberWith
 from ..specimen.specimen_description import ContactWord, SpecimenTable, usual_specimen
@@ -42,6 +42,8 @@ LONGEST = 1_000_000
 """Largest total number of values of all ranges; more values are probably a mistake."""
 WHOLE = 1e-9
 """Relative tolerance within which a range has a whole number of steps and so includes its stop."""
+ROUNDING_ULPS = 8
+"""Largest difference between equal values of two ranges, in units of the last place."""
 
 
 def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
@@ -61,10 +63,10 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
 
 
 def expand_ranges(given: object) -> object:
-    """Replace each table of start, stop and step, also within lists, by its numbers; return the result."""
+    """Return the values, with tables of start, stop and step (also in lists) replaced by numbers."""
     match given:
         case {"start": start, "stop": stop, "step": step, **rest} if not rest:
-            # Do not use isinstance, because true is also an int.
+            # Do not use isinstance, which also accepts true as an int.
             if not {type(start), type(stop), type(step)} <= {float, int}:
                 raise ValueError(
                     f"a range from {start!r} to {stop!r} by {step!r} is not allowed: give three numbers"
@@ -72,7 +74,7 @@ def expand_ranges(given: object) -> object:
             try:
                 return frequency_range(float(start), float(stop), float(step))
             except OverflowError as error:
-                raise ValueError("a number of the range has over 300 digits; give a smaller one") from error
+                raise ValueError("a number in the range has over 300 digits; give a smaller one") from error
         case list() | tuple():
             values: list[object] = []
             for each in given:
@@ -80,15 +82,19 @@ def expand_ranges(given: object) -> object:
                 values.extend(some if isinstance(some, tuple) else (some,))
                 if len(values) > LONGEST:
                     raise ValueError(f"ranges have more than {LONGEST} values in total; give larger steps")
-            if all(isinstance(value, (int, float)) for value in values):
-                return sorted(set(values))  # type: ignore[type-var]
-            return values
+            if not all(isinstance(value, (int, float)) for value in values):
+                return values
+            distinct: list[float] = sorted(set(values))  # type: ignore[arg-type]
+            if values == list(given):
+                return distinct  # without ranges: every number was typed, or read from a file
+            # Ranges reach the same frequency with different rounding errors; compute it once.
+            return [b for a, b in pairwise([-math.inf, *distinct]) if b - a > ROUNDING_ULPS * math.ulp(b)]
         case _:
             return given
 
 
 MOST_POINTS = 10_000_000
-"""Largest number of points of a study; the file then has 2 GB."""
+"""Largest number of points of a study; the file of such a study has 2 GB."""
 AS_DESCRIBED = "as described"
 """Label of an axis for which no values are given, so that the specimen's value is used."""
 
@@ -168,19 +174,19 @@ def scene_identity(scene: Scene, continued: str = "") -> str:
     scene
         Scene. The digest depends on every bit of its numbers, but not on the order of its fields.
     continued
-        Identity of the scene that this scene continues, if any. It replaces initial state and phase in the
-        digest, because these are results of that scene.
+        Identity of the scene that this scene continues, if any. This identity replaces initial state and
+        phase in the digest, because both are results of that scene.
     """
     content = _scenes.dump_python(scene, mode="python")
-    # The name of the start does not change the motion.
+    # The start's name has no effect on the motion.
     content["start"].pop("name", None)
     if content["target"] is None:
-        # Keeps the digests of files that were written before scenes had a target.
+        # Without this, digests in files from before scenes had targets would not match.
         del content["target"]
     if continued:
         content["start"] = {"continues": continued}
         del content["drive"]["phase_rad"]
-    # Python writes floats with the shortest exact digits, and infinity as a word.
+    # Python writes a float with the fewest exact digits, and infinity as a word.
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
 
@@ -224,7 +230,7 @@ class Study(GridPlan):
     """Processor time per point [s] for integrating chaos further and, with sensitive dependence on the start,
     for other starts."""
     error: TargetError | None = None
-    """Requested relative error of each point, such as "1 %"; replaces accuracy, duration and budget."""
+    """Target relative error of each point, such as "1 %"; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
     """Limit of the computing time per point, such as 2 or "2 s"; one minute if only an error is given."""
 
@@ -247,7 +253,7 @@ class Study(GridPlan):
         """Raise ValueError for an unknown model or a window that is too short, before any computation."""
         for model in range(len(self.models)):
             for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
-                for end in (0, -1):  # lowest and highest amplitude and frequency
+                for end in (0, -1):  # the lowest and the highest amplitude and frequency
                     self.scene((model, 0, gap, end, 0, end), Rest())
         return self
 
@@ -311,7 +317,7 @@ class Study(GridPlan):
 
     @property
     def target(self) -> Target | None:
-        """Requested error and time of each point; None if neither is given."""
+        """Target error and time of each point; None if neither is given."""
         return None if self.error is None and self.time_s is None else Target(self.error, self.time_s)
 
     @property
@@ -323,7 +329,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Return an axis with these numbers, or with the label `AS_DESCRIBED` if there are none."""
+    """Return an axis with these numbers, or with the label `AS_DESCRIBED` if there are no numbers."""
     if values is None:
         return StudyAxis(name, (AS_DESCRIBED,), "", long_name)
     return StudyAxis(name, values, units, long_name)
@@ -335,14 +341,14 @@ def start_name(frequency_hz: float) -> str:
 
 
 OTHER_STARTS = 8
-"""Assumed number of runs per point if the motion may depend sensitively on its initial state."""
+"""Assumed number of runs per point if the motion may depend sensitively on the initial state."""
 
 
 def study_solver(study: Study) -> Solver:
     """Return the solver of a study, which solves points in batches or one by one.
 
-    Batches need points that do not continue others, wide processor registers, and enough simulated time per
-    specimen. Even then, points with non-Hertz stops or the accuracy *reference* are solved one by one.
+    Batches need points that do not continue other points, wide processor registers, and enough simulated time
+    per specimen. Even then, points with non-Hertz stops or the accuracy *reference* are solved one by one.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1

@@ -1,4 +1,11 @@
-"""Curve of error against computing time, for every method that can solve a scene, on this machine."""
+"""Curve of error against computing time, for one scene and every suitable method, on this machine.
+
+>>> from vibench.sim import Harmonic, Scene, Target, gong2025
+>>> from vibench.sim.accuracy_benchmark import scene_curve
+>>> scene = Scene(gong2025(contact="linear"), Harmonic(260.0, 1e-6), target=Target(error=0.01))
+>>> next(scene_curve(scene)).method
+'closed form'
+"""
 
 import time
 from collections.abc import Callable, Iterator
@@ -7,22 +14,21 @@ from functools import partial
 
 import numpy as np
 
-from ..engine.run import check_time, time_limit
-from ..periodic.balance_branch import BalanceOptions, balance
-from ..periodic.first_order_balance import first_order_states
-from ..periodic.harmonic_balance import BalanceEnd, HarmonicSet, structure_of
-from ..periodic.restoring_force import PowerSpring, spring_of
-from ..periodic.shooting import ShootingEnd, periodic_orbit
-from ..scene.prediction import Method, ScenePrediction
-from ..scene.refinement import LONGEST_S, refine_scene
-from ..scene.scene import AutomaticDuration, FixedDuration, Scene
-from ..scene.solve import solve_scene
-from ..specimen.accuracy import Accuracy
-from ..specimen.state import Floats
+from .engine.run import Accuracy, check_time, time_limit
+from .periodic.balance_branch import BalanceOptions, balance
+from .periodic.first_order_balance import first_order_states
+from .periodic.harmonic_balance import BalanceEnd, HarmonicSet, structure_of
+from .periodic.restoring_force import PowerSpring, spring_of
+from .periodic.shooting import ShootingEnd, periodic_orbit
+from .scene.prediction import Method, ScenePrediction
+from .scene.refinement import LONGEST_S, refine_scene
+from .scene.scene import AutomaticDuration, FixedDuration, Scene
+from .scene.solve import solve_scene
+from .specimen.specimen import Floats
 
 REFINED = "requested error"
 TOLERANCES = (1e-2, 1e-4)
-"""Relative tolerances of the harmonic balance with many harmonics; each gives one point of the curve."""
+"""Relative tolerances of the harmonic balance with many harmonics: one for each point of the curve."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +43,13 @@ class CurvePoint:
     response_i: float
     response_ii: float
     is_stated: bool
-    """Whether the method estimates its own error; if not, ``error`` is relative to the refined result."""
+    """Whether the method estimates its error; if not, ``error`` is the deviation from the refined result."""
     is_chosen: bool = False
-    """Whether `refine_scene` returns this result for the scene's requested error and time."""
+    """Whether `refine_scene` returns this result for the scene's target error and time."""
 
 
 Answer = tuple[Floats, float | None]
-"""Responses I and II of x, then of p, and their largest relative error (None if not estimated)."""
+"""Responses I and II of x, then of p, and the largest of their relative errors (None if not estimated)."""
 
 
 def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
@@ -54,7 +60,7 @@ def scene_curve(scene: Scene) -> Iterator[CurvePoint]:
     when the scene has no target, or cannot be simulated.
     """
     end_s = time.monotonic()
-    next(refine_scene(scene))  # not timed: the first solution includes work done once per process
+    next(refine_scene(scene))  # not timed: includes work that is done once per process
     if scene.target is not None:
         limit_s = LONGEST_S if scene.target.time_s is None else scene.target.time_s
         end_s += limit_s

@@ -1,13 +1,45 @@
-"""Check an HDF5 file before reading: no external data, and no sizes that the file cannot contain."""
+"""Open HDF5 files that may be damaged or malicious, and write files to disks that may fail.
+
+HDF5 files can include data of other files (external storage, external links, virtual datasets), and the HDF5
+library does not check the sizes stated in a file. `open_hdf5` refuses external data, except inside the
+context `allow_external_data`, and compares the stated sizes with the length of the file before reading.
+
+HDF5 2.0 crashes if a write fails while a file is being closed, and h5py only prints errors that occur while
+an object is being closed. Therefore `open_hdf5_to_write` gives HDF5 a file object that accepts every write
+and stores the first error. The error is raised after HDF5 has closed the file; a Ctrl-C is also delayed until
+the file is closed.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> import h5py
+>>> from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5
+>>> with TemporaryDirectory() as folder:
+...     path = Path(folder) / "foreign.h5"
+...     with h5py.File(path, "w") as file:
+...         file["copied"] = h5py.ExternalLink("/etc/hosts.h5", "/secret")
+...     try:
+...         open_hdf5(path)
+...     except UnsafeHdf5 as error:
+...         print(error)
+/copied refers to another file (/etc/hosts.h5); read it with --allow-external if you trust this file
+"""
 
 import errno
 import math
 import re
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
+from traceback import walk_stack
+from types import FrameType
+from typing import Any, Literal
 
 import h5py
+
+from .operating_system.this import Buffer, write_all
 
 MOST_OBJECTS = 20_000
 """Largest allowed number of links to groups and datasets in a file; a recording has about forty."""
@@ -96,9 +128,9 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 
 
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Yield path and object of a group and of all objects below it; each object once, ordered by name.
+    """Yield path and object of a group and of all objects in the group; each object once, ordered by name.
 
-    Raises UnsafeHdf5 at a link to another file, unless that is allowed. Soft links are not followed.
+    Raises UnsafeHdf5 at a link to another file, unless such links are allowed. Soft links are not followed.
     """
     seen = {_address(file)}
     links = 0
@@ -110,7 +142,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups are nested more than {DEEPEST} levels deep")
-        links += len(item)  # counted before the loop, because many links may lead to one object
+        links += len(item)  # before the loop: many links may lead to one object
         if links > MOST_OBJECTS:
             raise UnsafeHdf5(f"it contains more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):
@@ -133,7 +165,7 @@ def _leads_to_own_object(group: h5py.Group, name: str) -> bool:
 
 
 def _pointing_out(place: str, where: str) -> str:
-    return f"{place} refers to another file ({where}); read it with --allow-external if you trust this file"
+    return f"{place} refers to another file ({where}); if you trust that file, give --allow-external"
 
 
 def _address(item: h5py.HLObject) -> tuple[int, int]:
@@ -169,7 +201,7 @@ def _require_dataset(dataset: h5py.Dataset, size_bytes: int) -> None:
             begin, stored = dataset.id.get_offset(), dataset.id.get_storage_size()
             if begin is not None and begin + stored > size_bytes:
                 raise UnsafeHdf5(
-                    f"{dataset.name} ends at byte {begin + stored}, but the file has {size_bytes}"
+                    f"{dataset.name} ends at byte {begin + stored}, but the file has {size_bytes} bytes"
                 )
             _require_size(dataset, stored, 1)
         case _:
@@ -194,3 +226,60 @@ def _require_size(dataset: h5py.Dataset, stored: int, ratio: int, spare_bytes: i
     declared = math.prod(dataset.shape or ()) * dataset.dtype.itemsize
     if declared > ratio * stored + spare_bytes + UNSTORED_BYTES:
         raise UnsafeHdf5(f"{dataset.name} declares {declared} bytes, but stores only {stored}")
+
+
+class _Disk(FileIO):
+    refusal: OSError | KeyboardInterrupt | None = None
+
+    def write(self, data: Buffer) -> int:  # type: ignore[override]  # h5py passes nothing else
+        try:
+            write_all(self.fileno(), data, self.tell())
+        except OSError as error:
+            self.refusal = self.refusal or error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.refusal = self.refusal or error
+            return 0
+
+
+@contextmanager
+def open_hdf5_to_write(
+    path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
+) -> Iterator[h5py.File]:
+    """Open a file to create (``x``) or change (``r+``) it; raise OSError at the end if any write failed."""
+    with _Disk(path, "x+" if mode == "x" else mode) as disk:
+        try:
+            with _interrupts(disk), h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
+                yield file
+        finally:
+            if disk.refusal is not None:
+                raise disk.refusal
+
+
+@contextmanager
+def _interrupts(disk: _Disk) -> Iterator[None]:
+    """Delay a Ctrl-C (KeyboardInterrupt) that arrives inside this module until the file is closed."""
+    is_reached = threading.current_thread() is threading.main_thread()
+    found = {each: signal.getsignal(each) for each in (signal.valid_signals() if is_reached else ())}
+    handlers: dict[int, Any] = {number: handler for number, handler in found.items() if callable(handler)}
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        try:
+            handlers[number](number, frame)
+        except KeyboardInterrupt as interrupt:
+            disk.refusal = disk.refusal or interrupt
+            if all(each.f_code.co_filename != __file__ for each, _ in walk_stack(frame)):
+                raise
+
+    for number in handlers:
+        signal.signal(number, on_signal)
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if signal.getsignal(number) is on_signal:  # keep a newer handler
+                signal.signal(number, handler)
