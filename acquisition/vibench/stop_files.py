@@ -18,7 +18,7 @@ TAKEN_S = 1.0
 HEEDED_S = 5.0
 """Longest time without progress until the output is off [s]; a block and a setting take less than 1 s."""
 LOOK_S = 0.01
-SWITCH_OFF = "The generator may still be driving: switch the amplifier off, then open the bench again"
+SWITCH_OFF = "The generator may still be driving: switch the amplifier off, reopen the bench (docs/safety.md)"
 
 
 class Fate(Enum):
@@ -47,15 +47,15 @@ def write_stop_file(stop: str, reason: str) -> None:
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         os.write(descriptor, reason.encode(errors="replace")[:LONGEST_REASON])
-        if hasattr(os, "fchown"):  # if root stops a user's program, the user must own the file to update it
+        if hasattr(os, "fchown"):  # root must give the file to the user, whose program updates it
             os.fchown(descriptor, os.stat(os.path.dirname(stop)).st_uid, -1)  # noqa: PTH116, PTH120
-    except OSError:  # for example a full disk; the file's name alone requests the stop
+    except OSError:  # for example, the disk is full; the file's name is enough for the stop
         pass
     finally:
         os.close(descriptor)
     try:
         os.replace(coming, stop)  # noqa: PTH105 - as above
-    except OSError:  # a network folder may report an error although the file was renamed
+    except OSError:  # on a network folder, the file may be renamed in spite of an error
         if not os.path.exists(stop):  # noqa: PTH110 - as above
             os.unlink(coming)  # noqa: PTH108 - as above
             raise
@@ -70,7 +70,7 @@ def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
         time.sleep(LOOK_S)
     taken, silent, seen_ns = answer_path(stop, "taken"), answer_path(stop, "silent"), 0
     give_up_s = time.monotonic() + HEEDED_S
-    # An older confirmation belongs to an earlier stop.
+    # Ignore a confirmation that is older than this stop.
     while (_modified_ns(silent) or -1) < written_ns:
         if (changed_ns := _modified_ns(taken) or seen_ns) != seen_ns:
             seen_ns, give_up_s = changed_ns, time.monotonic() + HEEDED_S

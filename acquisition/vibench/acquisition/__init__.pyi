@@ -1,14 +1,13 @@
-from .bench.bench import Bench as Bench, open_bench as open_bench
-from .bench.instrument_list import (
-    InstrumentList as InstrumentList,
-    list_instruments as list_instruments,
-    list_rig_instruments as list_rig_instruments,
-)
-from .bench.result import (
+from .bench import (
+    Bench as Bench,
     BenchReport as BenchReport,
     CheckResult as CheckResult,
     Finding as Finding,
+    InstrumentList as InstrumentList,
     Verdict as Verdict,
+    list_instruments as list_instruments,
+    list_rig_instruments as list_rig_instruments,
+    open_bench as open_bench,
 )
 from .campaign import (
     run_campaign as run_campaign,
@@ -26,23 +25,21 @@ from .errors import (
     RecordingError as RecordingError,
 )
 from .host.beside import Beside as Beside
-from .host.chosen import ChosenFrom as ChosenFrom
-from .host.extras import (
-    naming_its_extra as naming_its_extra,
-    require_extra as require_extra,
-    require_space as require_space,
-)
-from .host.printable import printable as printable, shorten as shorten
-from .host.schema import json_schema as json_schema, schema_line as schema_line
-from .host.shipped import (
+from .host.installation import (
     all_shipped as all_shipped,
     built_site as built_site,
     documentation_page as documentation_page,
     file_path as file_path,
+    naming_its_extra as naming_its_extra,
+    require_extra as require_extra,
+    require_space as require_space,
     shipped as shipped,
     shipped_folder as shipped_folder,
 )
+from .host.printable import printable as printable, shorten as shorten
+from .host.schema import json_schema as json_schema, schema_line as schema_line
 from .host.toml_file import (
+    ChosenFrom as ChosenFrom,
     load_toml as load_toml,
     save_toml as save_toml,
     toml_text as toml_text,

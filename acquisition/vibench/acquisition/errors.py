@@ -1,4 +1,4 @@
-"""Errors of a measurement. Each states what happened, what was done about it, and what to do next."""
+"""Errors of a measurement. Each error states what happened, what was done, and what to do next."""
 
 from dataclasses import dataclass
 
@@ -27,11 +27,11 @@ class InstrumentError(AcquisitionError):
 
 
 class InstrumentLost(InstrumentError, ConnectionError):
-    """An instrument cannot be reached: cable out, power off, server down. Its output state is unknown."""
+    """An instrument cannot be reached: cable out, power off, server down. Its output may still be on."""
 
 
 class InstrumentBusy(InstrumentError):
-    """The instrument is in use by another program or by a task that was never closed."""
+    """The instrument is in use by another program, or by a task that was never closed."""
 
 
 class BrokenPromise(InstrumentError):
@@ -43,7 +43,7 @@ class SettingRefused(InstrumentError):
 
 
 class DriveLate(AcquisitionError):
-    """The generator needs more time to change a setting than the plan allows, so the drive falls behind."""
+    """The generator needs more time to change a setting than the plan allows: the drive would be late."""
 
 
 class RunStalled(AcquisitionError):
@@ -56,7 +56,7 @@ class DataLost(AcquisitionError):
 
 @dataclass(frozen=True)
 class LimitTrip:
-    """A limit that a running measurement has exceeded, and the measured value."""
+    """A limit that a running measurement has exceeded, with the measured value."""
 
     channel: str
     """Role of the channel, for example ``"base_acceleration"``."""

@@ -1,4 +1,4 @@
-"""Run many measurements unattended: journal, attempts, reconnecting, notices, catalogue of a folder.
+"""Run many measurements unattended, with a journal, repeated attempts, notices and a folder catalogue.
 
 The state of every point is committed to an SQLite journal before and after each step, so a killed campaign
 resumes at its first unfinished point. Each attempt at a point is recorded in a separate file (``NAME.h5``,

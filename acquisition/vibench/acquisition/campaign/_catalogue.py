@@ -1,4 +1,4 @@
-"""Catalogue of all recordings in a folder and its subfolders; unchanged files are not reopened.
+"""Catalogue of all recordings in a folder and its subfolders; only new or changed files are opened.
 
 The catalogue ``catalogue.sqlite`` in the folder only repeats information from the files. A deleted catalogue
 is created again.
@@ -17,7 +17,7 @@ from typing import Any
 from vibench.sim import count_text
 
 from ..errors import RecordingError
-from ..host.chosen import member
+from ..host.toml_file import member
 from ..plan import present_word
 from ..recording import (
     JOURNAL_SUFFIX,
@@ -59,7 +59,7 @@ class CatalogueEntry:
     """State of the recording: value of `recording.RecordingState`, or ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``samples not checked``, or the problems found: ended early, near full scale, samples lost."""
+    """Either ``samples not checked``, or the problems found: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
@@ -77,7 +77,7 @@ class CatalogueEntry:
     notes: str = ""
     recording_id: str = ""
     samples_id: str = ""
-    """Identifier of the samples, identical in copies; see `vibench.acquisition.recording.Recording`."""
+    """Identifier of the samples, equal in all copies; see `vibench.acquisition.recording.Recording`."""
     seal: str = ""
     """State of the seal: value of `recording.SealState` after a quick check; empty if unknown."""
 
@@ -93,7 +93,7 @@ def place_below(folder: Path, path: Path) -> str:
 
 
 def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
-    """Return the entry of a recording; for a file that cannot be read, an entry with the reason."""
+    """Return the entry of a recording; if the file cannot be read, the entry contains the reason."""
     try:
         with open_recording(path) as recording:
             return _entry(recording, where, size_bytes)
@@ -121,7 +121,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
-        # A growing file contains reserved space without samples; do not count this space.
+        # The file of a running recording contains reserved space without samples; do not count this space.
         size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
         bench_check=recording.check_text,
         results=", ".join(recording.result_names),
@@ -194,7 +194,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     """Return the recordings of a folder, oldest first, and update its catalogue.
 
     In a read-only folder, all files are read each time. Raises RecordingError when the folder does not exist,
-    or ``catalogue.sqlite`` is not a catalogue.
+    or when ``catalogue.sqlite`` is not a catalogue.
     """
     if not folder.is_dir():
         raise RecordingError(f"{folder} is not a folder; give the folder that contains the recordings.")
@@ -207,7 +207,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
     except sqlite3.DatabaseError as error:
         raise RecordingError(
             f"{folder / CATALOGUE_NAME} is not a catalogue ({error}). Nothing was changed; rebuild the "
-            "catalogue (vibench catalogue --rebuild), or move the file away if it is something else"
+            "catalogue (vibench catalogue --rebuild) or, if this file is something else, move it away"
         ) from error
 
 
@@ -242,7 +242,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
             stamp = _stamp(found, noted(path.parent).get(path.name, ()))
         except FileNotFoundError:  # the recording was finished meanwhile and has its final name
             continue
-        except OSError:  # for example a link to itself; the entry states that the file cannot be read
+        except OSError:  # for example a link to itself; its entry says "unreadable"
             size_bytes, stamp = 0, ""
         where = place_below(folder, path)
         # When the program that writes a .part file ends, the recording becomes "interrupted", although the
@@ -252,7 +252,7 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - only question marks
-                # With an empty stamp the file is read again next time, because a disk error may be temporary.
+                # A disk error may be temporary: an empty stamp makes the next update read the file again.
                 (*astuple(entry), "" if entry.state == UNREADABLE else stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
@@ -323,7 +323,7 @@ def verify_recordings(
 ) -> tuple[VerifiedRecording, ...]:
     """Compare recordings with their seals and journals; return one result per file. No file is changed.
 
-    Raises RecordingError when ``place`` does not exist, or the key cannot be read.
+    Raises RecordingError when ``place`` does not exist, or when the key cannot be read.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def _verify(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> Ve
     sentence = found.sentence
     bad = [name for name, each in results.items() if each in BAD]
     if bad:
-        sentence += f"; results changed since they were saved: {', '.join(bad)}"
+        sentence += f"; results that were changed after they had been saved: {', '.join(bad)}"
     return VerifiedRecording(where, found.state.value, sentence, found.seal, results)
 
 

@@ -1,20 +1,21 @@
 """Journal of a campaign on disk: the state of every point, committed before and after each step.
 
 SQLite in WAL mode with full synchronisation is used: a finished transaction survives a kill and a power cut,
-and an unfinished one leaves no trace. After a kill the journal is correct, except that the state of the point
-that was being measured is still ``running``.
+and an unfinished one leaves no trace. After a kill the journal is correct, with one exception: the point that
+was being measured is still ``running``.
 """
 
 import re
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+from ..bench import Bench
 from ..errors import (
     AcquisitionError,
     CheckFailed,
@@ -27,10 +28,61 @@ from ..errors import (
     RecordingError,
 )
 from ..host.beside import ClosedOnLeaving
+from ..host.toml_file import FrozenModel
 from ..plan import Campaign, Measurement, Point
 from ..recording import JOURNAL_SUFFIX, Recording, close_on_error, open_database, open_read_only
+from ..rig import Rig
 from ..run.ending import Progress
-from ._bench_identity import BenchIdentity
+
+
+class BenchIdentity(FrozenModel):
+    """Properties of a bench that must not change during a campaign unless the change is confirmed."""
+
+    rig: Rig
+    instruments: dict[str, dict[str, str]]
+    """Identity of each instrument: maker, model, serial number and firmware."""
+    knobs: dict[str, str]
+    """Confirmed manual settings (knobs), without time of confirmation and name of the operator."""
+
+    @classmethod
+    def of(cls, bench: Bench) -> Self:
+        """Return configuration, instruments and manual settings of an open bench."""
+        instruments = {
+            part: {name: getattr(each, name) for name in ("maker", "model", "serial", "firmware")}
+            for part, each in bench.identities.items()
+        }
+        return cls(rig=bench.rig, instruments=instruments, knobs=bench.confirmations.values)
+
+    def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
+        """Return one clause of text for each difference between this bench and a later one, ``now``."""
+        return differences(self.model_dump(mode="json"), now.model_dump(mode="json"))
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return one clause of text for each difference between two nested descriptions."""
+    return tuple(_differences("", before, now))
+
+
+def _differences(place: str, before: Any, now: Any) -> Iterator[str]:
+    match before, now:
+        case Mapping(), Mapping():
+            for key in dict.fromkeys((*before, *now)):
+                yield from _differences(
+                    f"{place}.{key}".removeprefix("."), before.get(key, _ABSENT), now.get(key, _ABSENT)
+                )
+        case list(), list() if len(before) == len(now):
+            for number, (one, other) in enumerate(zip(before, now, strict=True)):
+                yield from _differences(f"{place}.{number}", one, other)
+        case _ if before != now:
+            yield f"{place} was {before!r} and is now {now!r}"
+
+
+class _Absent:
+    def __repr__(self) -> str:
+        return "absent"
+
+
+_ABSENT = _Absent()
 
 
 class ReasonCode(StrEnum):
@@ -78,7 +130,7 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
 
 
 def reason_code_of(error: AcquisitionError) -> ReasonCode:
-    """Return the journal's reason code for an error."""
+    """Return the code with which the journal names the reason for an error."""
     return next(
         (reason_code for kind, reason_code in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT
     )
@@ -90,7 +142,7 @@ class ExistingRecordings(StrEnum):
     REFUSE = "refuse"
     """Refuse to start a campaign in a folder that already has recordings of this campaign."""
     RESUME = "resume"
-    """Keep complete recordings; measure the other points again, in new files beside the old ones."""
+    """Keep complete recordings; measure all other points again, in new files beside the old files."""
 
 
 class AfterFailure(StrEnum):
@@ -121,7 +173,7 @@ class PointOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class PointResult:
-    """Result of one recording of a campaign, with the reason for this result."""
+    """Result of one recording of a campaign, and the reason for this result."""
 
     name: str
     outcome: PointOutcome
@@ -155,7 +207,7 @@ class DonePoint:
 
 @dataclass(frozen=True)
 class FinishedPoint:
-    """Argument of the ``after`` callback: the point that was just measured, and all points done."""
+    """Argument of the ``after`` callback: the point that was just measured, and all completed points."""
 
     point: DonePoint
     done: tuple[DonePoint, ...]
@@ -163,7 +215,7 @@ class FinishedPoint:
 
 
 After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
-"""Function called with the open recording after every point; returns measurements to make next, or none."""
+"""Function called with the open recording after every point; it may return measurements to make next."""
 
 
 def ignore_campaign_progress(progress: CampaignProgress) -> None:
@@ -269,13 +321,13 @@ def sentences(path: Path) -> Iterator[None]:
         yield
     except (ValueError, TypeError, LookupError) as error:  # invalid contents or missing columns
         raise RecordingError(
-            f"the journal {path} has invalid contents ({str(error).splitlines()[0]}): it is damaged, or was "
-            "written by another version. Nothing was changed; restore a copy, or move it away and resume"
+            f"the journal {path} has invalid contents ({str(error).splitlines()[0]}): it is damaged, or from "
+            "another version. Nothing was changed; restore a copy, or move the journal away and resume"
         ) from error
     except sqlite3.Error as error:
         raise RecordingError(
             f"the journal {path} cannot be read or written ({error}). The recordings are kept; check that "
-            "the disk has space and the folder is writable, then resume"
+            "the disk has space and that the folder is writable, then resume"
         ) from error
 
 
@@ -311,11 +363,11 @@ class JournalPoint:
     ended_utc: str
     """End time of the last attempt (UTC)."""
     seal: str
-    """Seal (checksums) of the recording; empty without a recording or a seal."""
+    """Seal (checksums) of the recording; empty if there is no recording or no seal."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
-    """Return the points in a journal, and change nothing; the campaign may be running.
+    """Return the points in a journal without changing it; the campaign may be running.
 
     Raises RecordingError when the file does not exist or is not a journal.
     """
@@ -328,7 +380,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
 
 
 def _own_name(file: str) -> str:
-    """Return ``file`` if it is a plain file name, else raise ValueError: a path may point elsewhere."""
+    """Return ``file`` if it is a plain file name, else raise ValueError: a path may leave the folder."""
     if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
         raise ValueError(f"{file[:80]!r} is not the file name of a recording")
     return file
@@ -396,7 +448,7 @@ class Journal(ClosedOnLeaving):
         with close_on_error(connect(path)) as connection:
             with sentences(path):
                 require_version(path, connection)
-                # Add the columns that a journal of version 1 lacks, in one transaction.
+                # Add the columns that are missing in a journal of version 1, in one transaction.
                 connection.execute("BEGIN IMMEDIATE")
                 (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
                 if int(version) < VERSION:
@@ -435,12 +487,12 @@ class Journal(ClosedOnLeaving):
     def start(self, name: str, file: str) -> None:
         """Record the start of an attempt at a point, before any signal is played."""
         with self._transaction() as connection:
-            _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
-            connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))
+            code = ReasonCode.RUNNING
+            _set(connection, name, state=JournalPointState.RUNNING, why=code, reason="", file=file, seal="")
             connection.execute(
                 "INSERT INTO attempts SELECT ?, COUNT(*) + 1, ?, 'running', ?, '', ?, '', '' FROM attempts "
                 "WHERE name = ?",
-                (name, file, ReasonCode.RUNNING, _now(), name),
+                (name, file, code, _now(), name),
             )
 
     def end(
@@ -448,8 +500,7 @@ class Journal(ClosedOnLeaving):
     ) -> None:
         """Record the result of the running attempt, and the seal of its recording."""
         with self._transaction() as connection:
-            _set(connection, name, state, reason_code, reason)
-            connection.execute("UPDATE points SET seal = ? WHERE name = ?", (seal, name))
+            _set(connection, name, state=state, why=reason_code, reason=reason, seal=seal)
             connection.execute(
                 "UPDATE attempts SET state = ?, why = ?, reason = ?, ended_utc = ?, seal = ? "
                 "WHERE name = ? AND state = 'running'",
@@ -459,13 +510,13 @@ class Journal(ClosedOnLeaving):
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
         """Queue a point again because its recording is missing or damaged."""
         with self._transaction() as connection:
-            _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
+            _set(connection, name, state=JournalPointState.QUEUED, why=reason_code, reason=reason)
 
     def keep(self, name: str, file: str, seal: str) -> None:
         """Mark a point as done because its complete recording ``file`` is already in the folder."""
         with self._transaction() as connection:
-            _set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
-            connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
+            done, code = JournalPointState.DONE, ReasonCode.FOUND
+            _set(connection, name, state=done, why=code, reason="complete before", file=file, seal=seal)
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
         """In one transaction, add measurements requested after a point, and mark the point as followed up."""
@@ -473,7 +524,7 @@ class Journal(ClosedOnLeaving):
             (place,) = connection.execute("SELECT place FROM points WHERE name = ?", (name,)).fetchone()
             connection.execute("UPDATE points SET place = place + ? WHERE place > ?", (len(further), place))
             self._insert(connection, further, place + 1, added_after=name)
-            connection.execute("UPDATE points SET is_followed_up = 1 WHERE name = ?", (name,))
+            _set(connection, name, is_followed_up=1)
 
     def close(self) -> None:
         """Close the journal. May be called at any time."""
@@ -512,16 +563,15 @@ class Journal(ClosedOnLeaving):
                 yield self._connection
                 self._connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # after a disk error, SQLite has already rolled back
+                if self._connection.in_transaction:  # SQLite itself rolls back after a disk error
                     self._connection.execute("ROLLBACK")
                 raise
 
 
-def _set(
-    connection: sqlite3.Connection, name: str, state: JournalPointState, code: ReasonCode, reason: str
-) -> None:
-    command = "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?"
-    connection.execute(command, (state, code, reason, name))
+def _set(connection: sqlite3.Connection, name: str, **columns: str | int) -> None:
+    assigned = ", ".join(f"{column} = ?" for column in columns)
+    command = f"UPDATE points SET {assigned} WHERE name = ?"  # noqa: S608 - names of columns
+    connection.execute(command, (*columns.values(), name))
 
 
 def _now() -> str:

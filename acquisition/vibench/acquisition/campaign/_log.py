@@ -5,7 +5,7 @@ import shlex
 import shutil
 import smtplib
 import ssl
-import subprocess  # the user gives this command on the command line
+import subprocess  # runs only a command that the user has given
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -62,7 +62,7 @@ class CampaignEvent:
 
 
 CampaignListener = Callable[[CampaignEvent], None]
-"""Function called with every event, in order; it must not raise an exception."""
+"""Function called with every event, in order; the function must not raise an exception."""
 
 
 def ignore_event(event: CampaignEvent) -> None:
@@ -106,7 +106,7 @@ class CampaignLog(ClosedOnLeaving):
 
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
-"""Interval between status lines while a point is measured [s]; they take half a megabyte per night."""
+"""Interval between status lines while a point is measured [s]; the lines take half a megabyte per night."""
 LEFT_ALONE_S = 1.0
 """Longest wait at closing for the last lines to be written [s]."""
 
@@ -130,7 +130,7 @@ class StatusLine(ClosedOnLeaving):
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
-        """Duration of all points and pauses that precede the running point, by the rig's clock [s]."""
+        """Duration of all points and pauses before the running point, by the rig's clock [s]."""
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
@@ -169,7 +169,7 @@ class StatusLine(ClosedOnLeaving):
         self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
-        # A measurement must continue if a full disk prevents storing a status line.
+        # If a full disk prevents storing a status line, the measurement must still continue.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
 
@@ -190,7 +190,7 @@ class Security(StrEnum):
 
 
 class MailSettings(FrozenModel):
-    """Mail server and recipients. Protect the file: it may contain a password."""
+    """Mail server and recipients. Protect the file, because it may contain a password."""
 
     host: str = Field(min_length=1)
     port: PositiveInt = 587
@@ -261,7 +261,7 @@ class CommandMessenger:
     def of(cls, command: str) -> "CommandMessenger":
         """Return the messenger for a command line with shell quoting, but no variables, wildcards or pipes.
 
-        Raises ConfigurationError if the line is empty, lacks a quotation mark, or names no existing program.
+        Raises ConfigurationError if the line is empty, a quotation is not closed, or no such program exists.
         """
         try:
             arguments = tuple(shlex.split(command))
@@ -282,7 +282,7 @@ class CommandMessenger:
         return self.run(notice, COMMAND_LONGEST_S) or f"{self.arguments[0]} ended with 0"
 
     def run(self, document: Mapping[str, Any], longest_s: float) -> str:
-        """Run the command with ``document`` as input; return a clause about a failure, or an empty text."""
+        """Run the command with ``document`` as input; return a clause about its failure, or an empty text."""
         try:
             ended = subprocess.run(  # noqa: S603 - given by the user, and run without a shell
                 self.arguments,
@@ -307,7 +307,7 @@ class Notifier:
     folder: Path
     messengers: tuple[Messenger, ...]
     say: CampaignListener
-    """Function called with a clause that states the result of each notice."""
+    """Function called for each notice, with a clause that states whether the notice was sent."""
 
     def __call__(self, event: CampaignEvent) -> None:
         if event.kind not in TOLD_OF:

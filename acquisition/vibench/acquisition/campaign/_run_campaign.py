@@ -12,19 +12,17 @@ from typing import Self
 
 from vibench.sim import count_text
 
-from ..bench.bench import Bench, RigPower, open_bench
-from ..bench.result import CheckResult
+from ..bench import Bench, CheckResult, RigPower, open_bench
 from ..errors import AcquisitionError, InstrumentLost, RecordingError
 from ..excitation.plan import AbstractFeedback
-from ..host.chosen import member
-from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measuring_s, require_played
+from ..host.toml_file import member
+from ..plan import BYTES_PER_SAMPLE, Campaign, Point, measuring_s, require_played
 from ..recording import open_recording, sole_use
 from ..rig import Confirm, Rig, channels_of, confirm_knobs_of, load_rig
 from ..run.ending import Progress
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import StopSwitch
-from ._attempts import Attempts, CoolingPause, Reopen
-from ._beam import BeamMover, rig_at
+from ._attempts import Attempts, Reopen
 from ._journal import (
     After,
     AfterFailure,
@@ -33,7 +31,6 @@ from ._journal import (
     DonePoint,
     ExistingRecordings,
     FinishedPoint,
-    Journal,
     JournalPoint,
     JournalPointState,
     PointOutcome,
@@ -56,38 +53,39 @@ from ._log import (
     StatusLine,
     ignore_event,
 )
-from ._opening import make_folder, open_journal, planned_recordings, require_all_within_limits, require_new
+from ._opening import (
+    make_folder,
+    open_journal,
+    planned_recordings,
+    require_all_within_limits,
+    require_new,
+    rig_at,
+)
 
 
 @dataclass
-class CampaignRunner:
+class CampaignRunner(Attempts):
     """Measurement of the points of a campaign, and of further points that are requested after a result."""
 
-    journal: Journal
-    folder: Path
-    attempts: Attempts
-    stop: StopSwitch
     after_failure: AfterFailure
     after: After | None
-    say: CampaignListener
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._coming = deque(self.journal.points())
         self._count = len(self._coming)
         self._results: list[PointResult] = []
 
     def run(
-        self,
-        campaign: Campaign,
-        on_progress: Callable[[CampaignProgress], None],
-        on_result: Callable[[PointResult], None],
+        self, on_progress: Callable[[CampaignProgress], None], on_result: Callable[[PointResult], None]
     ) -> tuple[PointResult, ...]:
-        """Measure the points one after another; return the result of each."""
+        """Measure the points one after another; return the result of each point."""
+        name = self.campaign.name
         done = sum(point.state is JournalPointState.DONE for point in self._coming)
         is_resumed = done or any(point.attempts for point in self._coming)
         begun = CampaignEventKind.RESUMED if is_resumed else CampaignEventKind.BEGUN
-        text = f"{campaign.name}: {count_text(self._count, 'point')}, {done} already done"
-        self.say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
+        text = f"{name}: {count_text(self._count, 'point')}, {done} already done"
+        self.say(begun, text, points=self._count, done=done)
         self._report_damage()
         try:
             while self._coming and self._may_begin(self._coming[0]):
@@ -106,14 +104,14 @@ class CampaignRunner:
                 if point_result.outcome is PointOutcome.STOPPED:
                     break
         except AcquisitionError as error:
-            self._report_end(f"{campaign.name} ended: {error}", str(reason_code_of(error)))
+            self._report_end(f"{name} ended: {error}", str(reason_code_of(error)))
             raise
         except BaseException as error:
-            self._report_end(f"{campaign.name} ended: {type(error).__name__}", "stopped")
+            self._report_end(f"{name} ended: {type(error).__name__}", "stopped")
             raise
         is_stopped = any(each.outcome is PointOutcome.STOPPED for each in self._results)
         reason_code = "stopped" if self._coming or is_stopped else "carried_out"
-        self._report_end(f"{campaign.name} {self._closing()}", reason_code)
+        self._report_end(f"{name} {self._closing()}", reason_code)
         return tuple(self._results)
 
     def _report_damage(self) -> None:
@@ -121,22 +119,22 @@ class CampaignRunner:
             if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
                 text = f"{point.name} is measured again: {point.reason}"
                 facts = {"point": point.name, "file": point.file, "why": point.reason_code.value}
-                self.say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
+                self.say(CampaignEventKind.DAMAGED, text, **facts)
 
     def _may_begin(self, point: JournalPoint) -> bool:
-        """Before a measurement, pause and wait until the beam has been moved; return False after a stop."""
-        if point.state is not JournalPointState.DONE and self.stop.request is None:
-            self.attempts.wait_before(point.name, point.measurement)
-        return self.stop.request is None
+        """Before a measurement, pause and wait until the beam has been moved; return False if stopped."""
+        if point.state is not JournalPointState.DONE and self.switch.request is None:
+            self.wait_before(point.name, point.measurement)
+        return self.switch.request is None
 
     def _measure(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
         if point.state is JournalPointState.DONE:
             path = self.folder / point.file
             return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.reason_code)
         try:
-            return self.attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
+            return self.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
-            raise  # without an instrument or disk space, the next point would fail too
+            raise  # the next point would fail too: an instrument or disk space is missing
         except AcquisitionError as error:
             if self.after_failure is AfterFailure.STOP:
                 raise
@@ -156,7 +154,9 @@ class CampaignRunner:
         this = next(each for each in done if each.name == point.name)
         with open_recording(point_result.path) as recording:
             follow_ups = tuple(self.after(FinishedPoint(this, done), recording))
-        further = tuple(Point(name, each) for each in follow_ups for name in _names(each))
+        further = tuple(
+            point for each in follow_ups for point in Campaign(name="further", measurements=(each,)).points()
+        )
         self.journal.follow_up(point.name, further)
         if not further:
             return
@@ -165,10 +165,10 @@ class CampaignRunner:
         self._coming.extendleft(reversed(added))
         self._count += len(added)
         text = f"after {point.name}, these points follow: {', '.join(each.name for each in added)}"
-        self.say(CampaignEvent(CampaignEventKind.FURTHER, text, {"point": point.name, "points": len(added)}))
+        self.say(CampaignEventKind.FURTHER, text, point=point.name, points=len(added))
 
     def _closing(self) -> str:
-        request = self.stop.request
+        request = self.switch.request
         if request is not None:
             return f"was stopped: {request.reason}"
         failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
@@ -176,13 +176,8 @@ class CampaignRunner:
 
     def _report_end(self, text: str, reason_code: str) -> None:
         counts = Counter(point_result.outcome for point_result in self._results)
-        facts: dict[str, str | int | float] = {"why": reason_code, "left": len(self._coming)}
-        facts |= {each.value: counts[each] for each in PointOutcome}
-        self.say(CampaignEvent(CampaignEventKind.ENDED, text, facts))
-
-
-def _names(measurement: Measurement) -> tuple[str, ...]:
-    return tuple(point.name for point in Campaign(name="further", measurements=(measurement,)).points())
+        results = {each.value: counts[each] for each in PointOutcome}
+        self.say(CampaignEventKind.ENDED, text, why=reason_code, left=len(self._coming), **results)
 
 
 def run_campaign(
@@ -206,7 +201,7 @@ def run_campaign(
     All points are checked against the limits of the rig before the first one starts. The journal records
     what was done, what failed and why. A killed campaign continues with ``existing="resume"`` at its first
     unfinished point. Ctrl-C ramps the running measurement down and ends the campaign. Returns one result per
-    recording made, kept or failed; a stopped campaign returns fewer results than planned.
+    recording made, kept or failed; a stopped campaign returns fewer results than it has points.
 
     Parameters
     ----------
@@ -214,7 +209,7 @@ def run_campaign(
         The open bench, the plan, and the folder of the recordings.
     existing, after_failure, changed_bench
         What to do about existing recordings, a point whose attempts are used up, and a bench that differs
-        from the one at the start; members of the enums or their values.
+        from the bench at the start; give members of the enums or their values.
     on_progress, on_result, on_event
         Functions called after every block, after every recording, and at every event.
     switch
@@ -224,12 +219,12 @@ def run_campaign(
         this session or after a resume.
     reopen
         Function that closes and opens the bench when an instrument is lost and the campaign allows another
-        attempt; if absent, a lost instrument ends the campaign.
+        attempt; if None, a lost instrument ends the campaign.
     messengers
         Ways to notify somebody at every fault and at the end.
     move_beam
         Command that moves the vibrometer of a real rig to each point of a scan; it reads the point as JSON.
-        If absent, the campaign holds until the operator has moved the vibrometer.
+        If None, the campaign holds until the operator has moved the vibrometer.
 
     Raises
     ------
@@ -260,19 +255,16 @@ def run_campaign(
         status = session.enter_context(StatusLine(where, campaign.name, journal.points(), campaign.rest_s))
         notifier = Notifier(campaign.name, folder, messengers, log)
 
-        def say(event: CampaignEvent) -> None:
+        def say(kind: CampaignEventKind, text: str, **facts: str | float) -> None:
             for listener in (log, status, notifier, on_event):
-                listener(event)
+                listener(CampaignEvent(kind, text, facts))
 
         def progress(stand: CampaignProgress) -> None:
             status.progress(stand)
             on_progress(stand)
 
-        pause = CoolingPause(campaign.rest_s, stop, say)
-        beam = BeamMover(move_beam, stop, say)
-        attempts = Attempts(bench, journal, campaign.retry, stop, say, pause, beam, reopen)
-        runner = CampaignRunner(journal, folder, attempts, stop, after_failure, after, say)
-        return runner.run(campaign, progress, on_result)
+        runner = CampaignRunner(bench, campaign, journal, stop, say, move_beam, reopen, after_failure, after)
+        return runner.run(progress, on_result)
 
 
 @contextmanager
@@ -284,13 +276,13 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
         except RecordingError as error:
             raise RecordingError(
                 f"another program is running the campaign {campaign.name!r} in {folder}. "
-                "Nothing was changed; wait until that program has ended, or stop it"
+                "Nothing was changed; wait until that program has ended, or stop that program"
             ) from error
         yield log
 
 
 LOOK_AGAIN_S = 1.0
-"""Simulated time before a virtual bench is reopened [s]; the fault script may reconnect cables meanwhile."""
+"""Simulated time before a virtual bench is reopened [s], in which the fault script may reconnect cables."""
 
 
 class ReconnectingBench:
@@ -318,13 +310,13 @@ class ReconnectingBench:
     def reopen(self) -> Bench:
         """Close the bench, open it again and return it; confirmed manual settings (knobs) stay valid.
 
-        Raises AcquisitionError when an instrument is still missing. The bench is then closed; try again.
+        Raises AcquisitionError when an instrument is still missing. The bench then stays closed; try again.
         """
         before, self._bench = self._bench, None
         if before is not None:
             self._last_check = before.last_check
             self._confirm = partial(confirm_knobs_of, before.confirmations, "the first opening of the bench")
-            with suppress(AcquisitionError):  # fails only if an instrument is lost
+            with suppress(AcquisitionError):  # closing fails only if an instrument is lost
                 before.close()
         self._power.let_pass(LOOK_AGAIN_S)
         self._bench = open_bench(self._rig, self._confirm, power=self._power)
@@ -397,7 +389,7 @@ def estimate_campaign(
     """Estimate the duration and disk space of a campaign; open no instrument and write nothing.
 
     Raises RecordingError when the folder contains recordings of the campaign and ``existing`` refuses that,
-    ConfigurationError when the rig lacks a part that a measurement needs, and LimitExceeded when feedback on
+    ConfigurationError when a part that a measurement needs is missing, and LimitExceeded when feedback on
     the rig cannot hold a requested motion.
     """
     for each in campaign.measurements:

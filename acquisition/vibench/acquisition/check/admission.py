@@ -16,8 +16,18 @@ from pydantic import ValidationError
 
 from vibench.sim.operating_system.this import replace_file, state_folder
 
-from ..bench.bench import Bench, BenchKind
-from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, age, finding_of, rig_digest
+from ..bench import (
+    Bench,
+    BenchKind,
+    BenchReport,
+    Bounds,
+    CheckResult,
+    Finding,
+    Verdict,
+    age,
+    finding_of,
+    rig_digest,
+)
 from ..errors import CheckFailed, RecordingError
 from ..rig import Rig
 from ..stopping.stop import StopSwitch
@@ -33,7 +43,7 @@ class CheckRule(StrEnum):
     NOW = "now"
     """A new check of the bench must pass before the measurement."""
     WAIVED = "waived"
-    """No check is required; recordings contain the result of the last check, if there is one."""
+    """No check is required; recordings contain the result of the last check, if any."""
 
 
 FOLDER = "bench_checks"
@@ -51,9 +61,9 @@ def archive_path(rig_name: str, *, passed: bool = False) -> Path:
 
 
 def last_check(rig_name: str) -> CheckResult | None:
-    """Return the last check of a rig; None if it is missing, or this version cannot read it.
+    """Return the last check of a rig; None if the check is missing, or if this version cannot read it.
 
-    ``rig_name`` is the name in its hardware configuration.
+    ``rig_name`` is the name in the hardware configuration.
     """
     return _read(archive_path(rig_name))
 
@@ -99,11 +109,11 @@ def _write(result: CheckResult, *, passed: bool) -> None:
 DRIFT_DB = Bounds(0.5, 3.0)
 """Bounds on the drift of a gain between two checks of an unchanged configuration [dB]."""
 CLOCK_PPM = Bounds(20.0, inf)
-"""Bounds on the drift of the ratio of two clocks [ppm]; oscillators age by a few ppm per year."""
+"""Bounds on the drift of the ratio of the two clocks [ppm]; oscillators age by a few ppm per year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "the configuration has not changed: look for a changed knob, a bad cable, a loose sensor or a failing "
-    "amplifier; if you changed something that is not in the configuration, run the check once as a new "
+    "amplifier; if you changed something that is not in the configuration, run one check as the new "
     "reference (menu Test, or vibench bench check --new-reference)"
 )
 
@@ -114,7 +124,7 @@ def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, .
     Both checks used the same sine level, because the configuration is the same.
     """
     before = {finding.name: finding for finding in last.findings}
-    since = f"since {age(at - last.checked)}"
+    since = f"in {age(at - last.checked)}"
     found = [
         _change(finding, before[finding.name], since) for finding in now.findings if finding.name in before
     ]
@@ -168,7 +178,7 @@ def check_bench(
     switch
         Switch by which another thread can stop the check.
     new_reference
-        Whether to skip the comparison with the last passed check; changes since then are accepted.
+        Whether to skip the comparison with the last passed check, and so accept all changes since that check.
     """
     report, at = bench_report(bench, folder, switch), clock()
     last = None if new_reference else last_passed_check(bench.rig)
@@ -187,7 +197,7 @@ def require_fresh(
     clock: Clock = utc_now,
     switch: StopSwitch | None = None,
 ) -> CheckResult | None:
-    """Admit a bench to measurements by its last check or a new one; return this check for the recordings.
+    """Admit a bench to measurements by its last check or a new check; return this check for the recordings.
 
     A virtual rig without a valid check is checked at once; a real bench is checked only if ``rule`` is NOW. A
     rig that plays back a recording needs no check. ``bench`` must not be sampling; ``folder`` is for the
@@ -241,7 +251,7 @@ def _complaint_about_last_check(bench: Bench, now: datetime) -> str | None:
 
 
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
-    """Return the reason why a check is not valid for a rig; None if it is valid."""
+    """Return the reason why a check is not valid for a rig; None if the check is valid."""
     if last is None:
         return f"the bench {rig.name!r} was never checked under this user account"
     when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"

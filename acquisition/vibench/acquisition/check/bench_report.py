@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bench.bench import Bench
-from ..bench.result import BenchReport, Bounds, Finding, Verdict, finding_of
+from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, finding_of
 from ..errors import CheckStopped, ConfigurationError, DataLost, RunStalled
 from ..excitation.dwell import Dwell
 from ..excitation.steps import Tone
@@ -23,23 +22,23 @@ from .loop import LoopCheck
 
 CHECK_SHARE = 0.02
 """Largest level of the test sine as a fraction of the bench's amplitude limit, far below clipping."""
-# After this time, the step response of an AC coupling with a corner of 0.5 Hz has decayed.
+# After this time, the step response of an AC coupling with a corner frequency of 0.5 Hz has decayed.
 _SETTLE_S = 1.5
 _READ_S = 2.0
 _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
-"""Bounds on the rms of a silent channel relative to its full scale."""
+"""Bounds on the rms of a channel in silence, relative to its full scale."""
 _MEDIAN_OF_NORMAL = 0.6745
 """Ratio of median magnitude to standard deviation of a normal variable."""
 _IN_MOMENTS = 0.2
 """Smallest ratio of the rms estimated from the median to the total rms; bursts make the ratio smaller."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
-"""Bounds on the mean of a silent channel relative to its full scale."""
+"""Bounds on the mean of a channel in silence, relative to its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
 """Bounds on the time to change and verify one generator setting [s]; a stop takes the same time."""
 ROOM_H = Bounds(-10.0, -1.0)
-"""Bounds on the recording time for which the disk has space [h], negated because a longer time is better."""
+"""Bounds on the recording time for which the disk has space [h]; negated, because a longer time is better."""
 
 
 def bench_report(
@@ -49,8 +48,8 @@ def bench_report(
 
     All channels are read in silence, during a small sine at 160 Hz for some seconds, and in silence again.
     ``bench`` must not be sampling; ``folder`` is for the recordings; another thread can stop the check with
-    ``switch``, within a block of samples. By default, ``amplitude_vpp`` [V] is at most 2 % of the amplitude
-    limit, and too small for contact.
+    ``switch``, within a block of samples. The default of ``amplitude_vpp`` [V] is at most 2 % of the
+    amplitude limit, and causes no contact.
 
     Raises CheckStopped when somebody stopped the check, InstrumentError when an instrument fails, DataLost
     when the converter lost samples, and ConfigurationError when the bench plays a recording back. All other
@@ -81,7 +80,7 @@ def bench_report(
     during = reader.during_sine(drive)
     after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
-        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # in case its relay is stuck
+        bench.generator.set_amplitude(bench.generator.amplitude_range_vpp[0])  # the relay may be stuck
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle_finding(bench.output))
@@ -125,7 +124,7 @@ class _BlockReader:
                 blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
                 return np.concatenate(blocks, axis=1)
             except BaseException:
-                guard.silence()  # the call below also lowers the amplitude, in case the output relay is stuck
+                guard.silence()  # the call below also lowers the amplitude, which helps if the relay is stuck
                 raise
             finally:
                 try:
@@ -153,8 +152,8 @@ class _BlockReader:
             self._advance()
             if block.first_sample != self._due:
                 raise DataLost(
-                    f"the converter returned sample {block.first_sample} instead of {self._due}: it loses "
-                    "samples although no other program uses it. Look for other traffic on its bus"
+                    f"the converter returned sample {block.first_sample} instead of {self._due}: the "
+                    "converter loses samples although no other program uses it. Look for other bus traffic"
                 )
             self._due += block.volts.shape[1]
             blocks.append(block.volts)

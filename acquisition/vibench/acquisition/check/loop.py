@@ -1,31 +1,20 @@
-"""Check of the whole signal chain with one sine: its presence, level and phase in each channel."""
+"""Check of the whole signal chain with one sine: the sine's presence, level and phase in each channel."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from math import hypot, inf, log10, pi, sqrt
+from math import inf, log10, pi, sqrt
 
 import numpy as np
 
-from ..bench.bench import Bench
-from ..bench.result import Bounds, Finding, Verdict, finding_of
+from ..bench import Bench, Bounds, Finding, Verdict, finding_of
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ, check_phasors, nearest_expected
 from ..rig import RESPONSE_ROLES, BaseQuantity, ComplexArray, RigModel, Role
+from ..run.silence_watch import BASE_TOLERANCE_DB, DRIVE_TOLERANCE, WRONG_LOAD, SineFit, fit_sine
 
 _PPM = 1e6
 _WINDOWS = 20
-
-
-@dataclass(frozen=True)
-class SineFit:
-    """Sine fitted to samples by least squares."""
-
-    amplitude: float
-    uncertainty: float
-    """Standard uncertainty of the amplitude, from the residual of the fit."""
-    phase_rad: float
-    """Phase of the cosine at the first sample [rad]."""
 
 
 @dataclass(frozen=True)
@@ -34,24 +23,6 @@ class ClockRatio:
 
     ppm: float
     uncertainty_ppm: float
-
-
-def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> SineFit:
-    """Return the least-squares fit of a cosine, a sine and a constant.
-
-    The uncertainty assumes white noise: ``residual * sqrt(2 / n)`` (Kay, Fundamentals of Statistical Signal
-    Processing, vol. 1, example 3.14). ``volts`` must span more than one period of the sine.
-    """
-    angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
-    basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
-    solution = np.linalg.lstsq(basis, volts)[0]
-    residual = float(np.sqrt(np.mean((volts - basis @ solution) ** 2)))
-    in_phase, quadrature = float(solution[0]), float(solution[1])
-    return SineFit(
-        amplitude=hypot(in_phase, quadrature),
-        uncertainty=residual * sqrt(2 / volts.size),
-        phase_rad=float(np.arctan2(-quadrature, in_phase)),
-    )
 
 
 def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> ClockRatio:
@@ -73,19 +44,18 @@ def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> C
     return ClockRatio(float(line[0]) * scale, sqrt(float(covariance[0, 0])) * scale)
 
 
-DRIVE_DEVIATION = Bounds(0.02, 0.15)
+DRIVE_DEVIATION = Bounds(0.02, DRIVE_TOLERANCE)
 """Bounds on the relative deviation of the measured drive voltage from the generator setting."""
 GAIN_DB = Bounds(1.0, 3.0)
 """Bounds on the deviation of the amplifier's gain from the rig's model [dB]."""
-BASE_DB = Bounds(1.5, 3.0)
+BASE_DB = Bounds(1.5, BASE_TOLERANCE_DB)
 """Bounds on the deviation of the base's acceleration from the rig's model [dB]."""
 CLOCK_PPM = Bounds(100.0, 500.0)
 """Bounds on the deviation of the clock ratio from 1, for two oscillators of 50 ppm each [ppm]."""
 DETECTED = 10.0
 """Smallest ratio of amplitude to its uncertainty at which a sine counts as detected."""
-WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
-"""Bounds on a channel's phase deviation from the rig's model; above 90 degrees its sign is wrong."""
+"""Bounds on a channel's phase deviation from the rig's model; above 90 degrees the sign is wrong."""
 M0_PHASE_DEG = Bounds(90.0, inf)
 """Bounds on m0's phase deviation, which never FAILs because the model of the specimen is less accurate."""
 LEFT_OVER = Bounds(0.02, 0.05)
@@ -107,7 +77,7 @@ class Lasting(Enum):
     """Kinds of quantities whose changes between two checks are limited."""
 
     GAIN = auto()
-    """A gain, whose change is limited in decibels."""
+    """A gain; the limit on its change is in decibels."""
     LEVEL = auto()
     CLOCK = auto()
 
@@ -142,7 +112,7 @@ class LoopCheck:
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
-        # Channels without the sine were reported above.
+        # Channels in which the sine is missing were reported above.
         if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):
@@ -172,8 +142,8 @@ class LoopCheck:
         is_detected = self._detects(role)
         advice = {
             "voltage": "check that the cable is intact and plugged in at both ends, and the amplifier is on",
-            "velocity": "check that the laser is on and focused, and its beam not blocked",
-            "acceleration": "check that the accelerometer is plugged in and its supply current is on",
+            "velocity": "check that the laser is on and focused, and that its beam is not blocked",
+            "acceleration": "check that the accelerometer is plugged in and that its supply current is on",
         }.get(role.quantity, "check that the sensor is plugged in, within its range, and powered")
         return Finding(
             name=detection_name(role),
@@ -239,7 +209,7 @@ class LoopCheck:
         modelled = nearest_expected(fit.amplitude, self._base_modelled)
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
-        advice = "check the accelerometer's sensitivity, fixture, specimen, and amplifier power and gain"
+        advice = "check fixture, specimen, accelerometer sensitivity, and amplifier power and gain"
         return finding_of(
             BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty
         )
@@ -254,8 +224,8 @@ class LoopCheck:
             Role.AMPLIFIER_VOLTAGE: "swap the two wires of this input, or check if the amplifier inverts",
         }.get(
             role,
-            "if the sign of the base acceleration is right, this sensor is reversed (direction, or side that "
-            "the laser hits), or the specimen is not the configured one",
+            "if the sign of the base acceleration is right, this sensor is reversed (its direction, or the "
+            "side that the laser hits), or the specimen is not the configured one",
         )
         expected = f"0 ± {bounds.well:g} deg"
         verdict = bounds.verdict(abs(off_deg))

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench.bench import Bench, open_bench
-from vibench.acquisition.check.loop import fit_sine
+from vibench.acquisition.bench import Bench, open_bench
 from vibench.acquisition.errors import AcquisitionError, BrokenPromise, ConfigurationError
-from vibench.acquisition.host.shipped import all_shipped
+from vibench.acquisition.host.installation import all_shipped
 from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, plug_ins_of
+from vibench.acquisition.run.silence_watch import fit_sine
 
 LEVEL = 0.02
 """Signal level of the tests, as a fraction of the bench's amplitude limit."""
@@ -21,7 +21,7 @@ _RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
 def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
-    """Return the given bench, or the first suitable shipped one; None if no bench uses the instrument."""
+    """Return the given bench, or the first suitable shipped bench; None if no bench uses the instrument."""
     if given is not None:
         rig = load_rig(Path(given))
         return rig if (kind, name) in plug_ins_of(rig) else None
@@ -36,10 +36,10 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in called ``name``; refuse a name that no bench uses."""
+    """Return one bench for each kind of plug-in called ``name``; refuse a name that no bench uses."""
     if name is None:
         raise pytest.UsageError(
-            "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
+            "--vibench-instrument NAME is missing; give the name of an entry point, such as afg1022x"
         )
     kinds = [each for each in PlugInKind if name in plug_in_names(each)]
     if not kinds:
@@ -57,7 +57,7 @@ def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
     """Return the error text for an instrument that no bench names."""
     who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
     kinds_in_words = " or ".join(each.value for each in kinds)
-    return f"{who} {name!r} as one of {kinds_in_words}; give such a bench with --vibench-bench"
+    return f"{who} {name!r} as one of {kinds_in_words}; use --vibench-bench to give a bench that does"
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.acquisition.bench.bench import Bench
+from vibench.acquisition.bench import Bench
 from vibench.acquisition.contract.conftest import refusal
 from vibench.acquisition.instruments import PlugInKind
 

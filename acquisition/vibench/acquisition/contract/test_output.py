@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench.bench import Bench
+from vibench.acquisition.bench import Bench
 from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refusal
 from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput, PlugInKind, Samples

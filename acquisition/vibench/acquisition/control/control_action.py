@@ -7,7 +7,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from ..excitation.feedback import BaseLevel
+from ..excitation.plan import BaseLevel
 from ..instruments import Block, Samples
 from ..plan import Phase
 from ..recording import FeedbackNote, Hold
@@ -19,7 +19,7 @@ class ControlAction:
     """The next phase to play, and the notes to write at its first sample."""
 
     phase: Phase | None
-    """Phase to play; None to only write the notes, without sampling."""
+    """Phase to play; None if only the notes are written, without sampling."""
     notes: tuple[FeedbackNote, ...] = ()
 
 
@@ -43,7 +43,7 @@ SILENCE = PhaseSamples(0, np.empty((0, 0)))
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
-    """Return the joined blocks of a phase, from its last gap on; a paused run has gaps."""
+    """Return the joined blocks of a phase, from the last gap in the phase on; a paused run has gaps."""
     if not blocks:
         return SILENCE
     joined: list[Block] = []
@@ -55,7 +55,7 @@ def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
 
 
 _DEAD_SHARE = 0.3
-"""Dead band relative to the tolerance. Smaller errors stay uncorrected: a correction disturbs the motion."""
+"""Dead band relative to the tolerance. Errors in it are not corrected: a correction disturbs the motion."""
 _SURE = 2.0
 """Number of standard uncertainties above which a level error counts as significant."""
 _GAIN = 0.8

@@ -30,9 +30,9 @@ def feedback_controller(
 ) -> Controller[None]:
     """Return the controller of a measurement with feedback, from its ramp up to its ramp down.
 
-    The controller yields one phase after another and is sent the samples of each, shape (channels, n) [V];
-    ``channels`` lists the channels in the order of these rows. Raises ConfigurationError, before any phase,
-    when the rig lacks a channel that feedback needs, or no package offers the controller.
+    The controller yields one phase after another and is sent the samples of each phase, shape (channels, n)
+    [V]; ``channels`` lists the channels in the order of these rows. Raises ConfigurationError, before any
+    phase, when the rig has no channel that feedback needs, or no package offers the controller.
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     kind = measurement.excitation.kind

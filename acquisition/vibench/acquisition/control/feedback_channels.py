@@ -54,7 +54,7 @@ class FeedbackChannels:
         )
 
     def velocity_over_response(self, frequency_hz: Samples) -> Phasors:
-        """Return the ratio of m0's velocity to its sensor signal; 0 at 0 Hz except for a velocity sensor."""
+        """Return the ratio of m0's velocity to its sensor signal; 0 at 0 Hz, except for a velocity sensor."""
         is_known = (frequency_hz > 0) | (self.response_derivatives == 0)
         omega = 2j * pi * np.where(frequency_hz > 0, frequency_hz, 1.0)
         return np.asarray(np.where(is_known, omega**self.response_derivatives, 0.0))
@@ -62,7 +62,7 @@ class FeedbackChannels:
     def transmissibility(
         self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0
     ) -> complex:
-        """Return the ratio of m0's displacement to the base's; zero if the base does not move.
+        """Return the ratio of m0's displacement to the base displacement; zero if the base does not move.
 
         Another ``harmonic`` of m0 (also 1/2 or 1/3) is divided by the amplitude of the base's fundamental.
         From the phase of that harmonic, ``harmonic`` times the phase of the base is subtracted.
@@ -103,17 +103,17 @@ def _row(channels: tuple[Channel, ...], *roles: Role) -> int:
         if role in rows:
             return rows.index(role)
     raise ConfigurationError(
-        f"feedback needs the channel {' or '.join(role.value for role in roles)}, which this rig lacks. "
+        f"feedback needs the channel {' or '.join(role.value for role in roles)}, but the rig has none. "
         "Nothing was played; add this channel to daq.channels, or use an excitation without feedback"
     )
 
 
 _REMEMBERED_S = 0.1
-"""Duration of the stored samples [s], from which a later drop-out is recognised and bridged."""
+"""Duration of the stored samples [s]; a later drop-out is recognised and bridged from them."""
 
 
 class BridgedRows:
-    """Filter that bridges drop-outs in a stream of samples; it holds back samples where one may begin."""
+    """Filter that bridges drop-outs in a stream of samples; it holds samples back if a drop-out may begin."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
@@ -155,6 +155,6 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(
             f"the base acceleration was {acceleration:.3g} m/s2 at {frequency_hz:g} Hz; the model predicts "
-            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of it. The run was ramped down "
-            "and its recording kept; check the accelerometer, its cable and the amplifier"
+            f"{modelled:.3g} m/s2, and feedback needs at least {LEAST_ANSWER:.0%} of that value. The run was "
+            "ramped down, and its recording was kept; check the accelerometer, its cable and the amplifier"
         )

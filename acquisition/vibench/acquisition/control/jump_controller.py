@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from math import inf, log
 
-from ..excitation.feedback import JumpSearch
-from ..excitation.settled_sine import SettledSine
+from ..excitation.plan import JumpSearch
+from ..excitation.stepped_sine import SettledSine
 from ..excitation.steps import Segment
 from ..plan import RunState
 from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
@@ -19,7 +19,7 @@ from .sine_loop import SineLoop, glide, start
 
 RUNGS = 12
 RUNG = 1.2
-"""Factor by which each of `RUNGS` steps lowers the generator setting; together they lower it to about 1/9."""
+"""Factor by which each of `RUNGS` steps lowers the generator setting; all steps lower it to about 1/9."""
 _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
@@ -39,8 +39,8 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Return whether a point between the ends of a jump belongs before or after the jump.
 
-    It belongs before the jump if its response and the response of ``before`` are the closest pair of the
-    three. A jump to a third branch counts as after.
+    The point belongs before the jump if its response and the response of ``before`` are the closest pair of
+    the three responses. A jump to a third branch counts as after.
     """
     away = ratio(point, before)
     return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
@@ -56,9 +56,9 @@ def ratio(one: SettledPoint, other: SettledPoint) -> float:
 def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Return whether a point is on the same branch as an earlier point at the same frequency.
 
-    Both must have the same period, or both be aperiodic. The responses of branches differ by at least
+    Both points must have the same period or be aperiodic. The responses of two branches differ by at least
     ``factor``, so the limit is half of this factor in decibels. Repeated measurements of a chaotic motion
-    scatter more than those of a periodic one: their limit is the whole factor.
+    scatter more than those of a periodic motion: their limit is the whole factor.
     """
     if point.period != expected.period:
         return False
@@ -66,7 +66,7 @@ def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> 
 
 
 _MOST_BRACKETS = 4
-"""Largest number of brackets (frequency intervals) per jump; a new one starts if the branch is left early."""
+"""Largest number of brackets (frequency intervals) per jump; if a branch is left early, a new one starts."""
 
 
 class _Return(Enum):
@@ -85,7 +85,7 @@ class _Pace(Enum):
 
 @dataclass
 class JumpBracket:
-    """Bracket around a jump; each new point replaces one of its ends, chosen by `side`."""
+    """Bracket around a jump; each new point replaces the end that `side` chooses."""
 
     branch: list[SettledPoint]
     """Points on the branch before the jump, in the order of the pass."""
@@ -122,7 +122,7 @@ class JumpBracket:
 
 @dataclass(frozen=True)
 class SettledPass:
-    """One pass of a settled sine through its frequencies."""
+    """One pass of a settled sine through all its frequencies."""
 
     controller: SettlingController
     plan: SettledSine
@@ -145,7 +145,7 @@ class SettledPass:
         return found.point
 
     def run(self, frequencies_hz: Sequence[float], came_from: str) -> Controller[None]:
-        """Go to every frequency and record there; locate the jumps between neighbouring frequencies."""
+        """Go to every frequency and record there; locate every jump between two neighbouring frequencies."""
         points: list[SettledPoint] = []
         searched, branch = 0, 1  # each jump increases the branch number by 1
         for frequency_hz in frequencies_hz:
@@ -180,8 +180,8 @@ class JumpLocator:
 
         Return the point reached there, and whether it is on the new branch behind a jump.
 
-        A steep slope is not a jump: across it, the change of the response shrinks with the bracket. If both
-        branches exist at the frequency of ``after``, the motion may end on either; the note states on which.
+        A steep slope is not a jump: its change of the response shrinks with the bracket. If both branches
+        exist at the frequency of ``after``, the motion may end on either branch, which the note states.
         """
         search = JumpBracket(list(points), after)
         why = yield from self._bisect(search)
@@ -239,7 +239,7 @@ class JumpLocator:
     def _find_departure(
         self, branch: Sequence[SettledPoint], steps: range
     ) -> Controller[tuple[int, SettledPoint] | None]:
-        """Go forward. Return index and state where the motion left the branch; None if it did not."""
+        """Go forward. Return index and state at which the motion left the branch; None if it stayed."""
         for place in steps:
             found = yield from self._pass.settle_at(branch[place].frequency_hz)
             if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
@@ -247,7 +247,7 @@ class JumpLocator:
         return None
 
     def _rejoin(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
-        """Go back in growing steps until the motion is on the branch. Return the index reached, or None."""
+        """Go back in growing steps until the motion is on the branch. Return that index, or None."""
         stretch = 1
         place = len(branch) - 1
         while not self._is_late():
@@ -266,7 +266,7 @@ class JumpLocator:
         return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
     def _is_late(self) -> bool:
-        """Return whether too little time is left for another step and the move to the end of the bracket."""
+        """Return whether the time is too short for another step and the move to the end of the bracket."""
         plan = self._pass.plan
         return self._loop.elapsed_s + 2 * plan.settling.longest_wait_s + plan.record_s > self._until_s
 

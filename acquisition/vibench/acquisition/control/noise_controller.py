@@ -6,8 +6,7 @@ from math import log10, sqrt
 import numpy as np
 
 from ..errors import LimitExceeded
-from ..excitation.held_noise import HeldNoise, density_at
-from ..excitation.multisine import shaped_period
+from ..excitation.noise import HeldNoise, density_at, shaped_period
 from ..excitation.steps import Waveform
 from ..instruments import Samples
 from ..plan import Phase, RunState, ramp
@@ -20,7 +19,7 @@ from .sine_loop import SineLoop
 _NEWEST = 0.5
 """Weight of the newest gains in the average with earlier gains; single gains scatter due to impacts."""
 _MOST_CHANGE = 4.0
-"""Largest factor by which the squared gain of a spectral line may change between two realisations."""
+"""Largest factor by which the squared gain of a spectral line may change from one realisation to the next."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +71,8 @@ class Equaliser:
         if needed_vpp > plan.amplitude_vpp:
             raise LimitExceeded(
                 f"the spectrum needs {needed_vpp:.3g} Vpp at {level_db:g} dB, but the plan allows at most "
-                f"amplitude_vpp = {plan.amplitude_vpp:g}. The run was ramped down and its recording kept; "
-                "raise amplitude_vpp, or lower the spectrum where the base responds least"
+                f"amplitude_vpp = {plan.amplitude_vpp:g}. The run was ramped down, and its recording was "
+                "kept; raise amplitude_vpp, or lower the spectrum where the base responds least"
             )
         return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
 
@@ -110,8 +109,8 @@ class Equaliser:
                 raise LimitExceeded(
                     f"the {what} reached {measured[worst]:.3g} {unit} at {self.frequency_hz[worst]:g} Hz, "
                     f"{10 * log10(measured[worst] / line[worst]):.1f} dB above {line[worst]:.3g}; abort_db = "
-                    f"{self._plan.abort_db:g}. The run was ramped down and its recording kept; lower the "
-                    "spectrum, or give more equalisations"
+                    f"{self._plan.abort_db:g}. The run was ramped down, and its recording was kept; lower "
+                    "the spectrum, or give more equalisations"
                 )
 
     def off_db(self, densities: MeasuredDensities, level_db: float) -> Samples:
@@ -132,8 +131,8 @@ class Equaliser:
         if measured < LEAST_ANSWER * modelled:
             raise LimitExceeded(
                 f"the base acceleration was {measured / modelled:.1%} of the model's value; feedback needs "
-                f"{LEAST_ANSWER:.0%}. The run was ramped down and its recording kept; check the "
-                "accelerometer, its cable and the amplifier"
+                f"at least {LEAST_ANSWER:.0%}. The run was ramped down, and its recording was kept; check "
+                "the accelerometer, its cable and the amplifier"
             )
 
 
@@ -175,7 +174,7 @@ def _note(
 
 
 def _average(values: Samples, width: int) -> Samples:
-    """Return the moving average over ``width`` values; near the ends, over fewer values."""
+    """Return the moving average over ``width`` values, or over fewer values near the ends."""
     sums = np.concatenate(([0.0], np.cumsum(values)))
     places = np.arange(values.size)
     first = np.maximum(places - width // 2, 0)

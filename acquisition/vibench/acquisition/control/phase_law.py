@@ -20,11 +20,11 @@ _WIDER = np.linspace(-0.25, 0.25, 15)
 _MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
 """Trial changes of ln(half-width) for super- and subharmonics, whose first half-width is only an estimate."""
 _SURE_RAD = radians(12.0)
-"""Unexplained phase drift that weighs as much in the fit as a change of the half-width by the factor e."""
+"""Unexplained phase drift with the same weight in the fit as a change of the half-width by the factor e."""
 _STEEPER = 0.5
 """Largest assumed relative change of ``bend_hz`` from one level to the next."""
 _EXPLAINED_RAD = radians(3.0)
-"""Rms of the unexplained phase drift above which the specimen is taken to have changed to another motion."""
+"""Rms of the unexplained phase drift above which the motion is assumed to have changed to another."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class LearntMode:
     """Properties of a mode, as estimated by the phase-locked loop."""
 
     narrowest_hz: float
-    """Half-width in the first search (zero for a super- or subharmonic). It is a lower bound, because
-    contacts and hard springs only widen a resonance."""
+    """Half-width in the first search (zero for a super- or subharmonic). This half-width is a lower bound,
+    because contacts and hard springs only widen a resonance."""
     half_width_hz: float
     bend_hz: float = 0.0
     """Change of the resonance frequency [Hz] when the base level grows by the factor e; 0 if unknown."""
@@ -48,17 +48,17 @@ class TrackedPlace:
     frequency_hz: float
     base_m_per_s2: float
     mode: LearntMode | None = None
-    """Estimate of the mode. None if the loop never locked; the next level then starts with a search."""
+    """Estimate of the mode. None if the loop never locked, so that the next level starts with a search."""
 
 
 class PhaseLaw:
     """Control law of the phase-locked loop (decisions 0064 and 0074).
 
-    A look is one measurement of the loop, of duration L [s]. During a look the phase of the motion relative
+    A look is one measurement of the loop, of duration L [s]. During a look, the phase of the motion relative
     to the drive changes by ``d = 2 pi L (r - f - w e)``: f is the drive frequency, r the resonance, e the
     phase error [rad] and w the half-width of the mode. Hence ``r - f = w e + d / (2 pi L)``. The loop changes
-    f by g (r - f), so that each look reduces the error by the fraction g. If the error falls too slowly, g
-    is raised for the term ``w e`` only. For harmonic n, L is replaced by n L, and r and w are the mode's
+    f by g (r - f), so that each look reduces the error by the fraction g. If the error falls too slowly, g is
+    raised, but only for the term ``w e``. For harmonic n, L is replaced by n L, and r and w are the mode's
     values divided by n. For a subharmonic of order n, e is the error of n times its phase, r and w refer to
     the drive, and a look has n times as many drive periods.
 
@@ -136,11 +136,11 @@ class PhaseLaw:
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
 
     def _off_hz(self, frequency_hz: float) -> float:
-        """Return the frequency change that corrects the phase error, from the newest two looks [Hz]."""
+        """From the newest two looks, return the frequency change that corrects the phase error [Hz]."""
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
-        # With a single measurement, only the level has changed so far. Assume an unchanged phase error.
+        # Before the first measurement only the level has changed: assume the same phase error as now.
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
@@ -160,7 +160,7 @@ _NEAREST = 3
 _STEEPEST_DEG = 85.0
 """Upper limit on phase errors in the fit, because the tangent of 90 degrees is infinite [degrees]."""
 _BEND = 0.15
-"""Largest relative difference between the slope of the straight part and the slope at the resonance."""
+"""Largest relative difference between the phase slopes on the straight part and at the resonance."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class PhaseSearch:
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
         """Return the resonance: the zero of a line fitted to the phases measured near it.
 
-        ``sensor_phase_deg`` is the standard uncertainty of their common phase error [degrees].
+        ``sensor_phase_deg`` is the standard uncertainty of the error common to these phases [degrees].
         """
         nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]
@@ -228,16 +228,16 @@ class PhaseSearch:
             used = away[:_NEAREST]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
-        # For a mode, the tangent of the phase error (not the error) is a straight line over frequency.
+        # Near a mode, the tangent of the phase error, not the phase error itself, is linear in frequency.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
         if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
-            # All measurements have one frequency, or all errors are too large: the zero is undetermined.
+            # All frequencies are equal, or all phase errors are too large: the zero is undetermined.
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        # The tangent magnifies phase errors by 1 / cos^2, so each point has the weight cos^4.
+        # The tangent magnifies errors of the phase by 1 / cos^2, so each measurement has the weight cos^4.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
         slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # Extrapolate from the best measurement: other modes bend the line and thereby shift its zero.
+        # Extrapolate from the best measurement, because other modes bend the line and so shift its zero.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)

@@ -1,4 +1,4 @@
-"""Track a phase resonance from level to level: first by a search, then by a phase-locked loop."""
+"""Track a phase resonance from level to level: find it by a search, then follow it by a phase-locked loop."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from math import degrees, hypot, isfinite, pi, radians, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation.feedback import BaseLevel
+from ..excitation.plan import BaseLevel
 from ..excitation.resonance_tracking import ResonanceTracking
 from ..plan import LOOK_PERIODS, RunState, needed_vpp
 from ..recording import Hold, LockResult, ResonanceNote, Steadiness
@@ -21,7 +21,7 @@ from .steadiness import ORDERS, Periods
 _UNKNOWNS = 8
 """Number of real unknowns in the fit: frequency, damping, and a complex polynomial of degree two."""
 _SURE = 2.0
-"""Smallest accepted ratio of a damping ratio to its standard uncertainty."""
+"""Smallest accepted quotient of a damping ratio and its standard uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.com
     Return None for too few points, a damping within its uncertainty, or a frequency outside the points.
 
     The polynomial on the right contains the residue of the mode, the base motion itself and the flanks of
-    other modes. An error common to all phases only rotates this polynomial. The method is Levy's linear
-    least squares, reweighted by the fitted denominator.
+    other modes. An error common to all phases only rotates this polynomial. The method is Levy's linear least
+    squares, with the equations reweighted by the fitted denominator.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def fit_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.com
 def _solve(
     s: NDArray[np.complex128], answer: NDArray[np.complex128], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # Solve a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T, real and imaginary parts separately.
+    # Solve a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T as two equations: real part and imaginary part.
     powers = np.stack([np.ones_like(s), s, s**2], axis=1)
     columns = np.concatenate([(s * answer)[:, None], answer[:, None], -powers, -1j * powers], axis=1)
     weighted = weight[:, None] * columns
@@ -91,11 +91,11 @@ _LOST_RAD = pi / 4
 _CORRECTED = 0.5
 """Relative standard uncertainty of the frequency correction for the remaining phase error."""
 _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
-"""Allowed remaining change of a locked motion in phase tolerances; second value: other harmonics."""
+"""Allowed remaining change of a locked motion, in phase tolerances; second value: for other harmonics."""
 _LOOKS_LOCKED = 3
 """Number of consecutive measurements (looks) within tolerance after which the loop counts as locked."""
 _FINEST = 2e-6
-"""Smallest relative frequency step of a search; a smaller step means that the phase jumps."""
+"""Smallest relative frequency step of a search; if a smaller step is needed, the phase jumps."""
 _BATCHES = 8
 _KNOWN = 4.0
 """Ratio of an amplitude to its standard error above which the phase of the motion is well defined."""
@@ -104,10 +104,10 @@ _FURTHEST = 1.5
 
 
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
-    """Lock on to the resonance at every level and record there; each level starts where the last ended."""
+    """Lock on to the resonance at every level and record there; start each level where the last ended."""
     loop.drives = plan.subharmonic
     if not plan.is_fundamental:
-        # The tracked order may be 1 % of the motion; the whole motion would seem settled too early.
+        # The tracked order may be 1 % of the motion: judge this order, not the whole motion.
         loop.settling_order = plan.harmonic
     yield from start(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
@@ -151,7 +151,7 @@ def _go_on(
 def _lock(
     controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
 ) -> Controller[tuple[int, LockResult | None]]:
-    """Control phase and level. Return the number of looks (measurements) and the result (None if lost)."""
+    """Control phase and level. Return the number of looks (measurements), and the result or None."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
     most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
@@ -212,7 +212,7 @@ def _search(
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
-            # Convert a frequency measured with the converter's clock to one set with the generator's clock.
+            # Convert the frequency from the converter's clock, which measured it, to the generator's clock.
             next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE
@@ -227,7 +227,7 @@ def _search(
     if lock is LockResult.LOCKED and plan.is_fundamental:
         flanks = yield from _flanks(controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
-        # Return to the resonance before the recording, because the next level starts where this one ends.
+        # Return to the resonance for the recording; the search at the next level starts from this resonance.
         move(loop, found.frequency_hz, level)
         found = yield from controller.settle()
     yield from record_settled(controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
@@ -236,8 +236,8 @@ def _search(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks of the peak, so keep the width at the first level, measured without contacts.
-    # The width of a super- or subharmonic also depends on the distance to the first contact: no lower bound.
+    # Contacts bend the flanks of the peak, so keep the width of the first level, measured without contacts. A
+    # super- or subharmonic has no lower bound: its width depends on the distance to the first contact.
     narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
@@ -266,22 +266,22 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
 
 
 def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Return whether this may be the tracked motion; a subharmonic does not repeat after one drive period."""
+    """Return whether this can be the tracked motion; a subharmonic does not repeat after one drive period."""
     return plan.subharmonic == 1 or found.judgement.period != 1
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
     """Return the uncertainty of the phase due to both sensors' phases and sensitivities [degrees].
 
-    For a super- or subharmonic it includes the possible remaining change of the motion. A subharmonic settles
-    so slowly that its change per look is undetectable, so at least the settling tolerance is included.
+    For a super- or subharmonic, add the possible remaining change of the motion. A subharmonic settles so
+    slowly that its change per look is not detected, so at least the settling tolerance is added.
     """
     if not plan.is_fundamental:
         remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0
         if plan.subharmonic > 1:
             remaining = max(remaining, plan.settling.tolerance)
         return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
-    # The phase of the relative motion also depends on the ratio of both sensitivities.
+    # The phase of the relative motion also depends on the ratio of the sensitivities of the two sensors.
     turned = plan.motion(found.harmonics) - found.transmissibility
     size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
     return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
@@ -299,7 +299,7 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
-    # Subtract the base phase times the order from the phase of each harmonic. Then rotate and scale the
+    # From the phase of each harmonic, subtract its order times the base phase. Then rotate and scale the
     # batches so that their mean equals ``found.harmonics``.
     away = np.angle(base * base.mean().conjugate())
     orders = np.arange(1, ORDERS) / plan.subharmonic

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from math import ceil, isfinite
 
-from ..excitation.feedback import BaseLevel, Settling
-from ..excitation.held_dwell import HeldDwell
-from ..excitation.held_sweep import HeldSweep
+from ..excitation.dwell import HeldDwell
+from ..excitation.plan import BaseLevel, Settling
+from ..excitation.sine_sweep import HeldSweep
 from ..excitation.steps import Segment
 from ..plan import LOOK_PERIODS, RunState, look_s
 from ..recording import (
@@ -31,12 +31,12 @@ class SettledPoint:
     frequency_hz: float
     response: float
     period: int = 1
-    """Number of drive periods after which the motion repeats; 0 if it does not."""
+    """Number of drive periods after which the motion repeats; 0 if the motion does not repeat."""
 
 
 _SURE = 2.0
 _SAME_LEVEL = 0.004
-"""Relative tolerance of the level if a single order of the response determines settling."""
+"""Relative tolerance on the base level if a single order of the response determines settling."""
 _PROMPT = 0.7
 """Exponent below 1 that reduces a correction while the specimen still responds to the last correction."""
 
@@ -56,7 +56,7 @@ class SettledState:
     """Acceleration amplitude of the base's fundamental [m/s2]."""
     held: Hold
     harmonics: tuple[complex, ...]
-    """Displacements of m0 at 1 to 4 times its repetition rate, divided by the base's at ``drive_hz``."""
+    """Ratio of m0's displacement at 1 to 4 times its repetition rate to the base's at ``drive_hz``."""
     drives: int = 1
     """Number of drive periods in one period of m0."""
 
@@ -77,14 +77,14 @@ class SettledState:
 
     @property
     def note(self) -> SettledNote:
-        """Note on this result; its numbers are also stored with the segment."""
+        """Note on this result; the numbers in the note are also stored with the segment."""
         found = self.judgement
         return SettledNote(
             frequency_hz=self.frequency_hz,
             motion=found.steadiness,
             period=found.period,
             waited_s=round(self.waited_s, 3),
-            # If there are too few periods to measure the scatter, it is set to the size of the motion.
+            # With too few periods, the scatter is unknown: set it to the size of the motion.
             scatter=found.scatter if isfinite(found.scatter) else 1.0,
             noise=found.noise if isfinite(found.noise) else 0.0,
             setting_vpp=self.setting_vpp,
@@ -152,7 +152,7 @@ class SettlingController:
         self.loop.require_answer(measured.amplitude)
         level = self.level
         if self.loop.settling_order is not None:
-            # The phase of a single order depends on the level, so all compared periods need the same level.
+            # The phase of a single order depends on the level: compare only periods of equal level.
             level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         next_vpp = self.loop.bounded_vpp(now.setting_vpp * measured.correction(level, self._target))
         if next_vpp == now.setting_vpp:
@@ -163,7 +163,7 @@ class SettlingController:
     def settled_state(self, waited_s: float) -> SettledState:
         """Return the state of the motion, from the periods since the last change of the drive."""
         loop, periods = self.loop, self.loop.periods
-        # A motion judged by a single order settles slowly, so use only its newest periods.
+        # A motion that is judged by a single order settles slowly, so use only the newest periods.
         newest = periods.last(
             max(self.rule.periods, periods.count // 2) if loop.settling_order is None else self.rule.periods
         )
@@ -192,7 +192,7 @@ class SettlingController:
         return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
-        """Return whether the base level is well known, and is in tolerance or limited by ``most_vpp``."""
+        """Return whether the base level is accurately known, and in tolerance or limited by ``most_vpp``."""
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
@@ -201,7 +201,7 @@ class SettlingController:
 
 
 def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
-    """Ramp up to the level, settle, record, ramp down."""
+    """Ramp up to the level, wait for settling, record, and ramp down."""
     controller = SettlingController(loop, plan.settling, plan.base_level)
     yield from start(loop, plan.frequency_hz, plan.base_level)
     yield from controller.settle()
@@ -226,7 +226,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
                 level=held,
             )
         )
-        # Average over all pieces since the last change of the drive, because chaos needs a long average.
+        # Chaos needs a long average, so average over all pieces since the last change of the drive.
         next_vpp = loop.bounded_vpp(loop.setting.setting_vpp * measured.correction(plan.base_level, target))
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
@@ -275,7 +275,7 @@ def _note(controller: SettlingController, found: SettledState, segment: Segment)
 
 
 def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
-    """Ramp up to the level, settle, sweep, ramp down."""
+    """Ramp up to the level, wait for settling, sweep, and ramp down."""
     level = plan.base_level
     yield from start(loop, plan.start_hz, level)
     yield from SettlingController(loop, plan.settling, level).settle()
@@ -300,7 +300,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 def _excursion(
     loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> ExcursionNote | None:
-    """Extend the range of frequencies with levels out of tolerance; return None for a level in tolerance."""
+    """Extend the range of frequencies at which the level is out of tolerance; None if it is in tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
             loop.note(before)

@@ -9,9 +9,8 @@ import numpy as np
 
 from vibench.sim import PhaseReference
 
-from ..excitation.feedback import BaseLevel
-from ..excitation.held_response import HeldResponse
-from ..excitation.settled_sine import GLIDE_TONE_S
+from ..excitation.plan import BaseLevel
+from ..excitation.stepped_sine import GLIDE_TONE_S, HeldResponse
 from ..excitation.steps import Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, look_s, lowest_setting_vpp, needed_vpp, ramp
 from ..recording import FeedbackNote, HeldResponseNote, Hold
@@ -38,8 +37,8 @@ class _Answer:
 class GainEstimator:
     """Recent gain from generator setting to base motion, relative to the linear model of the rig.
 
-    In a chaotic motion the fundamental of a few periods is mostly random, so recent steps (the track) are
-    averaged. If the gain changes steadily (near a resonance), a line through these steps is extrapolated.
+    In a chaotic motion, the fundamental of a few periods is mostly random, so recent steps (the track) are
+    averaged. If the gain changes steadily (near a resonance), a line through the gains is extrapolated.
     """
 
     def __init__(self, memory_s: float) -> None:
@@ -49,7 +48,7 @@ class GainEstimator:
     def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
         """Add the base phasors of a step, shape (periods,) [m/s2].
 
-        ``modelled`` is the base acceleration by the linear model, ``target`` is the acceleration to be held.
+        ``modelled`` is the base acceleration by the linear model, ``target`` the acceleration to be held.
         """
         if not len(base):
             return
@@ -69,7 +68,7 @@ class GainEstimator:
         return float(abs(np.mean([each.level for each in self._answers]))) if self._answers else 1.0
 
     def gain_at(self, time_s: float) -> float:
-        """Return the predicted magnitude of the gain relative to the model; 1 without measurements."""
+        """Return the predicted magnitude of the gain relative to the model; 1 if nothing was measured yet."""
         if not self._answers:
             return 1.0
         gain = np.array([each.gain for each in self._answers])
@@ -111,8 +110,8 @@ class SineLoop:
         self.drives = 1
         """Number of drive periods in one period of the motion; set before anything is played."""
         self.settling_order: int | None = None
-        """The only order of the response that determines settling; None if all orders do. It is set before
-        anything is played."""
+        """The only order of the response that determines settling; None if all orders determine it. Set
+        before anything is played."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
         """Smallest amplitude setting of the generator [Vpp]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
@@ -150,7 +149,7 @@ class SineLoop:
         """Sample without drive, to measure the noise of the response."""
         samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
-        # During the first half of this silence, the vibration from the bench check decays.
+        # Leave out the first half of this silence, in which the vibration from the bench check decays.
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
@@ -220,7 +219,7 @@ _GLIDE_MEMORY_S = 0.5
 
 
 def start(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
-    """Ramp up to the setting that the model predicts for ``level``, or (if None) to the plan's setting."""
+    """Ramp up to the setting that the model predicts for ``level``; if None, to the plan's setting."""
     wanted_vpp = loop.most_vpp if level is None else _bare_vpp(loop, level, frequency_hz)
     yield from _start_at(loop, frequency_hz, wanted_vpp)
 
@@ -255,7 +254,7 @@ def move(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
 def track(
     loop: SineLoop, frequency_hz: float, level: BaseLevel | None, estimator: GainEstimator, duration_s: float
 ) -> None:
-    """Change the frequency for ``duration_s``, at the setting predicted for the middle of that time."""
+    """Set the frequency for the next ``duration_s``, at the setting predicted for the middle of that time."""
     if level is None or not estimator.is_known:
         move(loop, frequency_hz, level)
         return
@@ -277,12 +276,12 @@ def update_track(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimat
 
 
 def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
-    """Return the amplitude setting for the base level at a frequency, assuming a bare table [Vpp]."""
+    """Return the amplitude setting for the base level at a frequency and an empty table [Vpp]."""
     return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz, OnTable.NOTHING)
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
-    """Change frequency and setting. If a level is held, ``most_change`` limits the change of the setting."""
+    """Change frequency and setting. To hold a level, ``most_change`` limits the change of the setting."""
     if level is not None:
         now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
@@ -296,7 +295,7 @@ _IN_A_ROW = 2
 
 
 def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
-    """Ramp up to a low level. At each frequency, bring m0 to ``response_m`` and record (decision 0066)."""
+    """Ramp up to a low level. At each frequency, bring m0 to ``response_m``, then record (decision 0066)."""
     passes = tuple(plan.passes())
     yield from _start_at(loop, passes[0][1][0], plan.start_share * loop.most_vpp)
     for direction, frequencies_hz in passes:
@@ -319,7 +318,7 @@ def _bring_to_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
         wanted = plan.response_m / max(response_m, 1e-15)
         in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
         change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
-        # Use only the newest measurement: earlier ones were made at another setting of the drive.
+        # Use only the newest measurement: earlier measurements belong to other settings of the drive.
         if in_a_row == 0:
             loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
         else:

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 from math import hypot, pi, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import kendalltau
 
-from ..excitation.feedback import Settling
+from ..excitation.plan import Settling
 from ..instruments import Samples
 from ..recording import Steadiness
 
-# One sample of the motion consists of its Fourier coefficients over one drive period. The generator's clock,
-# estimated from the recorded drive, gives the beginning of each drive period in the converter's time.
+# One sample of the motion consists of its Fourier coefficients over one drive period. The recorded drive
+# shows when each drive period begins, although the generator has a separate clock.
 
 _MEMORY = 40
 """Number of blocks whose phases are fitted by a line; the slope of the line gives the drive frequency."""
@@ -45,7 +45,7 @@ class DriveClock:
         angle = 2 * pi * self._near_hz * offset_s
         basis = np.stack([np.sin(angle), np.cos(angle), np.ones(count)], axis=1)
         solution = np.linalg.lstsq(basis, drive)[0]
-        # Phase [cycles] of A sin(2 pi (f t + c)) at the block's centre, relative to the nominal frequency.
+        # Phase c [cycles] at the block's centre, relative to a sine of the nominal frequency.
         turns = float(np.arctan2(solution[1], solution[0])) / (2 * pi) - self._near_hz * centre_s
         before = self._phases[-1] if self._phases else turns
         turns = before + (turns - before + 0.5) % 1.0 - 0.5
@@ -155,7 +155,7 @@ class Stroboscope:
 
     def _keep_from(self, start_s: float) -> None:
         self._begun_s = start_s
-        # Keep one more sample, because the next block may shift the estimated start of a period to the left.
+        # Keep one more sample, because the next block may move the estimated start of a period earlier.
         keep = max(0, int(start_s * self._rate_hz) - 1 - self._first)
         self._left = self._left[:, keep:]
         self._first += keep
@@ -177,7 +177,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
         at_starts = _hermite(integral, rotated, low, part)
         scale = 1.0 if order == 0 else 2.0
-        # The factor 1j makes the coefficient of A sin(...) equal to A if the sine begins with the period.
+        # With the factor 1j, a sine of amplitude A that begins with the period has the coefficient A.
         turned = np.exp(2j * pi * order * turns * starts[:-1]) * (1j if order else 1.0)
         found[:, order] = scale * np.diff(at_starts) / length * turned
     return found
@@ -311,7 +311,7 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
     allowed = _limit(figures, tolerance)
-    # Noise also shifts the means of the window's thirds, so the limit of ``remaining`` allows for noise too.
+    # Noise also shifts the means of the window's thirds, so the limit for ``remaining`` includes noise.
     return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
@@ -324,7 +324,7 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
     """Return the judgement from block statistics: stationary if the blocks show neither trend nor step."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    # Use order 1, or the judged order if there is only one.
+    # Use order 1; if only one order is judged, use this order.
     fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)
@@ -341,11 +341,11 @@ def _has_no_trend(figure: Samples) -> bool:
     """Return whether Kendall's tau finds no trend (reverse-arrangements test of Bendat and Piersol)."""
     if float(np.ptp(figure)) == 0.0:
         return True
-    return float(kendalltau(np.arange(len(figure)), figure).pvalue) > _SIGNIFICANCE
+    return float(scipy.stats.kendalltau(np.arange(len(figure)), figure).pvalue) > _SIGNIFICANCE
 
 
 def _halves_agree(figure: Samples) -> bool:
     first, second = np.array_split(figure, 2)
     spread = sqrt((float(first.var(ddof=1)) + float(second.var(ddof=1))) / len(first))
-    # The factor 4.4 is Student's t at 0.125 % (two-sided) with ten degrees of freedom.
+    # The factor 4.4 is Student's t for a two-sided probability of 0.125 % and ten degrees of freedom.
     return abs(float(first.mean() - second.mean())) <= 4.4 * spread

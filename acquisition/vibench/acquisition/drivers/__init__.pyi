@@ -8,18 +8,21 @@ from ._daqmx import (
 from ._daqmx_output import (
     DaqmxOutput as DaqmxOutput,
 )
-from ._generator_limits import (
+from ._limits import (
     AFG1022_MODEL as AFG1022_MODEL,
     NO_GENERATOR as NO_GENERATOR,
     ArbitraryCodes as ArbitraryCodes,
     GeneratorModel as GeneratorModel,
     NoGenerator as NoGenerator,
     Shape as Shape,
+    overload_ranges as overload_ranges,
+    require_playable as require_playable,
 )
-from ._overload import overload_ranges as overload_ranges, require_playable as require_playable
-from ._scpi import SWITCH as SWITCH, Number as Number, Word as Word
-from ._visa_link import (
+from ._scpi import (
+    SWITCH as SWITCH,
     Link as Link,
+    Number as Number,
+    Word as Word,
     list_visa_resources as list_visa_resources,
     open_link as open_link,
 )

@@ -1,4 +1,4 @@
-"""Driver of the Tektronix AFG1022: settings are read back; the output is off after a failed change."""
+"""Driver of the Tektronix AFG1022: it reads settings back, and turns the output off after a failed change."""
 
 import re
 import statistics
@@ -12,12 +12,10 @@ import numpy as np
 from ..errors import AcquisitionError, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
 from ..instruments import Identity, Knob, Samples, Sweep
 from ..rig import HIGH_Z, GeneratorConfig
-from ._generator_limits import AFG1022_MODEL, ArbitraryCodes, GeneratorModel, Shape
-from ._scpi import SWITCH, Number, ScpiInstrument, Word
-from ._visa_link import open_link
+from ._limits import AFG1022_MODEL, ArbitraryCodes, GeneratorModel, Shape
+from ._scpi import SWITCH, Number, ScpiInstrument, Word, open_link
 
 OUTPUT = Word("OUTP{c}:STAT", SWITCH)
-_BURST_CHANNEL = 1
 _QUIET_FREQUENCY_HZ = 1000.0
 _STOP_ATTEMPTS = 2
 _LATENCY_TRIALS = 9
@@ -29,24 +27,25 @@ _SAME_LOAD = 0.01
 class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
-    `open` returns it with the output off, set to a 1 kHz sine of the smallest amplitude. Frequency and
-    amplitude may change during the drive. Settings beyond the model's limits or ``amplitude_limit_vpp`` are
-    refused (`LimitExceeded`). During a change, the amplitude exceeds neither the old nor the new setting.
+    `open` returns the generator with its output off, set to a 1 kHz sine of the smallest amplitude. Frequency
+    and amplitude may change during the drive. Settings beyond the model's limits or ``amplitude_limit_vpp``
+    are refused (`LimitExceeded`). During a change, the amplitude exceeds neither the old nor the new setting.
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` describes this pattern in words."""
+    """Pattern of maker and model in the reply to ``*IDN?``; `wanted` describes the pattern in words."""
     wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
+    burst_channels: ClassVar[tuple[int, ...]] = (1,)
 
     output = OUTPUT
     shape = Word(
         "SOUR{c}:FUNC:SHAP", {Shape.SINE: ("SIN", "SINUSOID"), Shape.EDIT_MEMORY: ("EMEM", "EMEMORY")}
     )
-    # Frequencies are sent with a resolution of 1 uHz; replies have at least seven digits.
+    # The driver sends frequencies with a resolution of 1 uHz; replies have at least seven digits.
     frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
-    # The panel resolves 1 mVpp. A deviation above half of this plus 0.1 % of the value is not rounding.
+    # The panel resolves 1 mVpp. A deviation above 0.5 mVpp plus 0.1 % of the value is not a rounding error.
     panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
     offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
     burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
@@ -58,7 +57,7 @@ class AFG1022X(ScpiInstrument):
     codes: ArbitraryCodes | None = None
     """Waveform that the output plays from its memory; None if the output plays a sine."""
     unconfirmed: tuple[Knob, ...] = ()
-    """Settings that could be neither made nor read remotely: the operator must confirm them."""
+    """Settings that could be neither made nor read remotely; the operator must confirm these settings."""
     _is_known = False
     _is_silent_and_closed = _has_not_stopped = False
 
@@ -74,10 +73,10 @@ class AFG1022X(ScpiInstrument):
         """Find the generator, switch its output off, bring it into a known state, and return it.
 
         Raises InstrumentLost when nothing answers, InstrumentBusy when another program uses the resource,
-        InstrumentError for another instrument. After an error the output is off, if it could be switched.
+        InstrumentError for another instrument. After an error the output is off, if it could be switched off.
         """
         generator = cls(config)
-        leave = generator.disconnect  # another kind of instrument must receive no more commands
+        leave = generator.disconnect  # send no more commands to an instrument of another type
         try:
             generator._identify()
             leave = generator.close
@@ -104,7 +103,7 @@ class AFG1022X(ScpiInstrument):
         return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output stays on if it was on, and off if it was off."""
+        """Set up a sine. The output keeps its state: on or off."""
         self.model.check_frequency(Shape.SINE, frequency_hz)
         self.model.check_amplitude(self._config, amplitude_vpp)
         with self._changing():
@@ -121,8 +120,8 @@ class AFG1022X(ScpiInstrument):
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Write one period to the memory, verify the memory, and select it. The output keeps its state.
 
-        The mean is removed, see `GeneratorModel.codes`. While the memory changes, the amplitude is at its
-        minimum.
+        The mean of the values is removed; see `GeneratorModel.codes`. While the memory changes, the amplitude
+        is at its minimum.
 
         Raises SettingRefused when the memory reads back differently, and LimitExceeded when points,
         repetition or amplitude are outside the limits of the instrument or the bench.
@@ -136,7 +135,7 @@ class AFG1022X(ScpiInstrument):
             self._mute()
             self.offset_v = 0.0
             self._upload(codes)
-            # Set the frequency before the shape and after it: the sine's may be too high for the memory.
+            # Set the frequency before and after the shape: that of a sine may be too high for the waveform.
             self._set_frequency(repetition_hz)
             self._select(codes)
             self._set_frequency(repetition_hz)
@@ -155,7 +154,7 @@ class AFG1022X(ScpiInstrument):
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude during the drive."""
-        _ = self.playing  # raises an error, and sends nothing, if settings are unknown
+        _ = self.playing  # if settings are unknown, raises an error before anything is sent
         panel_vpp = amplitude_vpp * self._panel_factor
         self.model.check_amplitude(self._config, panel_vpp)
         with self._changing():
@@ -163,9 +162,13 @@ class AFG1022X(ScpiInstrument):
 
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each call of `trigger`; raises LimitExceeded on channel 2."""
-        if self.channel != _BURST_CHANNEL:
+        if self.channel not in self.burst_channels:
             raise LimitExceeded(f"a burst was requested on channel {self.channel}; use channel 1 for bursts")
-        self._arm_burst(cycles)
+        self.model.check_burst(cycles)
+        with self._changing():
+            self.burst_mode = "TRIG"
+            self.burst_cycles = cycles
+            self.burst = "ON"
 
     def trigger(self) -> None:
         """Start an armed burst with a trigger."""
@@ -174,18 +177,18 @@ class AFG1022X(ScpiInstrument):
 
     def end_burst(self) -> None:
         """End the burst mode, so that the signal plays continuously."""
-        if self.channel == _BURST_CHANNEL:
+        if self.channel in self.burst_channels:
             with self._changing():
                 self.burst = "OFF"
 
     def start(self) -> None:
         """Turn the output on, and read the state of the output back."""
         with self._changing():
-            _ = self.playing  # raises an error if settings are unknown, so the output stays off
+            _ = self.playing  # this raises if settings are unknown: the output then stays off
             self.output = "ON"
 
     def stop(self) -> None:
-        """Switch the output off, at any time; after a failure, try again, if necessary in a new session.
+        """Switch the output off, at any time. If this fails, try again, if necessary in a new session.
 
         Raises InstrumentLost when the generator could not be reached: the output may be ON, and the operator
         must act.
@@ -193,7 +196,7 @@ class AFG1022X(ScpiInstrument):
         if self._is_silent_and_closed:
             return
         last = ""
-        # An instrument that did not answer gets one attempt, so that the run ends in a bounded time.
+        # If the previous stop failed, make a single attempt, so that the run ends in a bounded time.
         for attempt in range(2 * _STOP_ATTEMPTS - 1 if self._has_not_stopped else 0, 2 * _STOP_ATTEMPTS):
             try:
                 if attempt >= _STOP_ATTEMPTS:
@@ -215,8 +218,8 @@ class AFG1022X(ScpiInstrument):
         raise InstrumentLost(
             f"THE OUTPUT OF {self.name} MAY STILL BE ON: it could not be switched off in "
             f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection{lowered}. Turn the "
-            "amplifier's gain down, switch the amplifier off, then check cable and power of the generator "
-            f"({last})"
+            "amplifier's gain down, switch the amplifier off, then check the cable and the power of the "
+            f"generator ({last})"
         )
 
     def close(self) -> None:
@@ -246,7 +249,7 @@ class AFG1022X(ScpiInstrument):
 
     def _end_modes(self) -> None:
         self.end_if_known("SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
-        bursts = ("BURS",) if self.channel == _BURST_CHANNEL else ()
+        bursts = ("BURS",) if self.channel in self.burst_channels else ()
         for node in (*bursts, "AM", "FM", "PM", "FSK", "PWM", "ASK", "PSK"):
             self.end_if_known(f"SOUR{{c}}:{node}:STAT", "OFF", SWITCH["OFF"])
         self.end_if_known("SOUR{c}:FREQ:CONC", "OFF", SWITCH["OFF"])
@@ -276,18 +279,11 @@ class AFG1022X(ScpiInstrument):
 
     @property
     def _panel_factor(self) -> float:
-        """Ratio of panel to requested amplitude; not 1 for a waveform with DC or a peak other than 1."""
+        """Ratio of panel amplitude to requested amplitude; not 1 for a waveform with DC or another peak."""
         return 1.0 if self.codes is None else self.codes.panel_factor
 
     def _mute(self) -> None:
         self.panel_vpp = self.amplitude_range_vpp[0]
-
-    def _arm_burst(self, cycles: int) -> None:
-        self.model.check_burst(cycles)
-        with self._changing():
-            self.burst_mode = "TRIG"
-            self.burst_cycles = cycles
-            self.burst = "ON"
 
     def _ensure_known(self) -> None:
         if not self._is_known:
@@ -296,7 +292,7 @@ class AFG1022X(ScpiInstrument):
 
     def _to_quiet_sine(self) -> None:
         """From any state, set a sine of the smallest amplitude, without modulation or offset."""
-        # *RST is not used: its effect on the output of this model is not documented.
+        # Do not use *RST, because its effect on the output is not documented for this model.
         self._end_modes()
         self.offset_v = 0.0  # set the offset first, because this lowers every peak
         self._mute()
@@ -323,16 +319,16 @@ class AFG1022X(ScpiInstrument):
         self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
-        """Set the load that the generator expects; return it as a knob to confirm if it cannot be read.
+        """Set the load that the generator expects; if the load cannot be read, return a knob to confirm.
 
         Sources disagree on whether an AFG1022 accepts its load remotely (hardware reference 1.2), so the
-        driver tries it. A wrong load changes the terminal voltage by a factor of two. Raises SettingRefused
-        when the generator reports a different load and does not change it.
+        driver tries to set it. A wrong load changes the terminal voltage by a factor of two. Raises
+        SettingRefused when the generator reports a different load and does not change it.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
         complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
         reply = self.query(f"{header}?")
-        self.complaints()  # discard the error of an unknown query, which the empty reply shows
+        self.complaints()  # discard the error: for an unknown query, the reply is empty
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)
@@ -344,8 +340,8 @@ class AFG1022X(ScpiInstrument):
         raise SettingRefused(
             f"the generator is set to a load of {HIGH_Z if is_open else f'{held_ohm:g} ohm'}, but "
             f"generator.load_ohm is {load}: every amplitude would be wrong, by a factor of two between 50 "
-            f"ohm and high-Z. The output is off; set the load to {wanted} on its panel, or correct the "
-            f"configuration{because}"
+            f"ohm and high-Z. The output is off; set the load to {wanted} on the generator's panel, or "
+            f"correct the configuration{because}"
         )
 
     @contextmanager

@@ -25,14 +25,14 @@ from ..errors import ConfigurationError, InstrumentError, SettingRefused
 from ..instruments import Block, Counts, FoundDevice, Identity, Overload, Samples
 from ..rig import TOKEN_KEY, Channel, ChannelConfig, DaqConfig, Rig, channels_of, token_from_env
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
-from ._overload import overload_ranges
+from ._limits import overload_ranges
 
-# Longer than any single read (`LONGEST_READ_S` plus its margin): a server that is silent for this time
-# counts as gone, even if its connection still exists.
+# This time is longer than any read (`LONGEST_READ_S` plus margin). A server that is silent for this time
+# counts as lost, even if the connection still exists.
 CALL_DEADLINE_S = 20.0
 LOST_DEADLINE_S = 1.0
-"""Time limit of every call after a call without a reply [s], so that a run ends in a bounded time."""
-# One second of four channels at the highest rate exceeds gRPC's default limit of 4 MB for a message.
+"""Time limit of every call that follows a call without a reply [s], so that a run ends in a bounded time."""
+# At the highest rate, one second of four channels exceeds gRPC's default limit of 4 MB per message.
 _NO_LIMIT = -1
 _CHANNEL_OPTIONS = (
     ("grpc.max_receive_message_length", _NO_LIMIT),
@@ -47,7 +47,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
         self._is_lost = False
 
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
-        # A namedtuple's _replace is public in spite of its underscore.
+        # The method _replace of a namedtuple is public in spite of the underscore.
         carried = ((TOKEN_KEY, token_from_env()),) if token_from_env() else ()
         metadata = (*(details.metadata or ()), *carried)
         deadline_s = LOST_DEADLINE_S if self._is_lost else CALL_DEADLINE_S
@@ -81,7 +81,7 @@ class DaqmxSession:
 
 
 def daqmx_session(server: str | None) -> DaqmxSession:
-    """Return a connection to a driver; no server is contacted before the first call."""
+    """Return a connection to a driver; a server is first contacted at the first call."""
     if server is None:
         return DaqmxSession(None, None, None)
     channel = grpc.insecure_channel(server, options=_CHANNEL_OPTIONS)
@@ -116,14 +116,14 @@ _TERMINALS = {
 }
 _COUPLINGS = {"AC": Coupling.AC, "DC": Coupling.DC}
 _SAME = 1e-6
-# A larger deviation from a straight line is not rounding: volts are then not multiples of one step.
+# A larger deviation from a straight line is not a rounding error: the scaling is then not linear.
 _LINEAR = 1e-9
-# One count of an int32 marks lost samples in recordings; a 32-bit converter may use this count for a voltage.
+# Recordings mark a lost sample by one int32 count, which a 32-bit converter may return for a voltage.
 _MOST_COUNTS = 2**29
 
 
 def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | None:
-    """Add one input to a task under the name of its role; return its volts per count (None if not linear).
+    """Add one input to a task under the name of its role; return the volts per count (None if not linear).
 
     Raises SettingRefused when coupling or sensor current read back differently, and DaqError when the device
     refuses a setting.
@@ -152,11 +152,11 @@ def _excite(made: AIChannel, channel: Channel) -> None:
         made.ai_excit_voltage_or_current = ExcitationVoltageOrCurrent.USE_CURRENT
         made.ai_excit_val = channel.iepe_current_a
         held_a = made.ai_excit_val
-        if not abs(held_a - channel.iepe_current_a) <= _SAME * channel.iepe_current_a:  # refuses a NaN too
+        if not abs(held_a - channel.iepe_current_a) <= _SAME * channel.iepe_current_a:  # refuses NaN too
             raise _refusal(channel, "sensor current", f"{channel.iepe_current_a:g} A", f"{held_a:g} A")
         return
     try:
-        # A current that an earlier program left on would shift the vibrometer's output.
+        # A current left on by an earlier program would shift the vibrometer's output.
         made.ai_excit_src = ExcitationSource.NONE
     except DaqError as error:
         if error.error_type not in NOT_OFFERED:
@@ -180,8 +180,8 @@ def _couple(made: AIChannel, channel: Channel) -> None:
 def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
     """Return the step of a converter [V]; None if volts are not multiples of one step.
 
-    A calibrated device may scale counts with an offset or a curve; then its volts are recorded as read.
-    ``coefficients`` define the polynomial from counts to volts, constant term first.
+    A calibrated device may scale counts with an offset or a curve; its volts are then recorded as they are
+    read. ``coefficients`` define the polynomial from counts to volts, constant term first.
     """
     if len(coefficients) < 2 or not coefficients[1] * _MOST_COUNTS > range_v:
         return None
@@ -192,7 +192,7 @@ def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None
 
 def _refusal(channel: Channel, what: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
-        f"{channel.physical}: {what} was set to {sent} and reads back {got}. The device was released; "
+        f"{channel.physical}: {what} was set to {sent}, but {got} was read back. The device was released; "
         f"correct the input of {channel.role.value} in the hardware configuration"
     )
 
@@ -208,23 +208,23 @@ def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
     return Identity("National Instruments", product, serial, driver, reply)
 
 
-# A read is divided into pieces of this length, so that no single call waits long or needs the whole buffer.
+# Reads are divided into pieces of this length: no call then waits long or needs the whole buffer.
 LONGEST_READ_S = 2.0
-# Time added to the duration of a read [s]; if samples come later, the read fails.
+# A read fails if it takes longer than the duration of its samples plus this time [s].
 _READ_MARGIN_S = 10.0
-# Sigma-delta modules use the next higher rate of a list: below this multiple of the requested rate.
+# Sigma-delta modules use the next higher rate of a list, which is below this multiple of the request.
 _MOST_COERCED = 2.0
 
 
 class DaqmxDigitizer:
     """A `Digitizer` on NI-DAQmx, on this computer or behind a gRPC device server.
 
-    `open` creates it and reserves the device. All settings are checked by `open`, not at the start of a run.
+    `open` creates the digitizer, reserves the device, and checks all settings before any run starts.
     """
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
         self.session = session
-        """Connection to the driver; an output of the same driver uses it, too."""
+        """Connection to the driver; an output of the same driver uses this connection, too."""
         self._config = config
         self._channels = channels
         self.roles = tuple(channel.role.value for channel in channels)
@@ -284,7 +284,7 @@ class DaqmxDigitizer:
         After a failure the run cannot continue, because its sample numbers are lost: stop and start again.
 
         Raises DataLost when samples were overwritten before they were read; InstrumentLost when the device or
-        its server is gone; InstrumentError when the samples do not come in time, or nothing is running.
+        its server is gone; InstrumentError when the samples do not come in time, or when nothing is running.
         """
         if not self._is_running:
             raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")
@@ -352,7 +352,7 @@ class DaqmxDigitizer:
             raise SettingRefused(
                 f"{self._config.device} was set to {rate_hz:g} samples a second, but uses "
                 f"{self.sample_rate_hz:g}; the next higher rate was expected. The device was released; "
-                "set daq.sample_rate_hz to a rate that it supports"
+                "set daq.sample_rate_hz to a rate that the device supports"
             )
         task.control(TaskMode.TASK_RESERVE)
         if None in self.volts_per_count:
@@ -360,7 +360,7 @@ class DaqmxDigitizer:
         else:
             self._reader = AnalogUnscaledReader(task.in_stream)
             self._steps_v = np.array(self.volts_per_count)[:, np.newaxis]
-        # Every array here is made for the channels of this task, so the client's check is not needed.
+        # This class makes every array for the channels of this task, so the client's check is not needed.
         self._reader.verify_array_shape = False
 
     def _open_task(self) -> Task:
@@ -384,9 +384,9 @@ class DaqmxDigitizer:
         piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self.sample_rate_hz))
         for first in range(0, rows.shape[1], piece):
             count = min(piece, rows.shape[1] - first)
-            # The reader needs C order, which a slice of columns lacks, so pieces of a long read are copied.
+            # The reader needs C order, which a slice of columns does not have: read pieces into a copy.
             target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
-            # A short reply leaves this marker in place; no converter returns such a value.
+            # If the reply is too short, this marker remains; no converter returns such a value.
             target[-1, -1] = missing = -np.inf if target.dtype.kind == "f" else np.iinfo(target.dtype).min
             came = read(target, count, count / self.sample_rate_hz + _READ_MARGIN_S)
             if came != count or target[-1, -1] == missing:
@@ -416,7 +416,7 @@ class DaqmxDigitizer:
         scales_v = tuple(channel.full_scale_v for channel in self._channels)
         seen = overload_ranges(volts, self.roles, scales_v, first_sample)
         unseen = overloaded_roles - {overload.channel for overload in seen}
-        # The clipping is too short to be visible in the samples; only the block that contains it is known.
+        # The samples do not show such a short overload; only the block that contains the overload is known.
         last_sample = first_sample + volts.shape[1] - 1
         return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))
 

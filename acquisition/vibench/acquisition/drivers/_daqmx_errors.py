@@ -35,10 +35,10 @@ _SLOWER = "read more often, lower the sample rate, or close other programs that 
 _BUSY = "the device is in use by another program, or by a task that was never closed"
 _RELEASE = "close that program (or restart the device server, or reset the device), then open the bench again"
 _GONE = "the device cannot be reached"
-_RECONNECT = "check its cable and power, then open the bench again"
+_RECONNECT = "check the device's cable and power, then open the bench again"
 _UNDERFLOW = "the output ran out of samples and stopped; some devices then hold the last value"
 _FEED = "write further ahead, or lower the output's sample rate"
-_CONFIGURE = "correct daq in the hardware configuration; `vibench bench list` shows the connected devices"
+_CONFIGURE = "correct [daq] in the hardware configuration; `vibench bench list` shows the connected devices"
 
 MEANINGS: dict[Code, Meaning] = {
     Code.SAMPLES_NO_LONGER_AVAILABLE: Meaning(DataLost, _LOST, _SLOWER),
@@ -52,7 +52,7 @@ MEANINGS: dict[Code, Meaning] = {
     Code.SAMPLES_NOT_YET_AVAILABLE: Meaning(
         InstrumentError,
         "the samples did not come in time",
-        "check that the sample clock runs and the device is connected, then start the run again",
+        "check that the sample clock runs and that the device is connected, then start the run again",
     ),
     Code.SAMPLES_WILL_NEVER_BE_AVAILABLE: Meaning(
         InstrumentError, "samples were requested past the end of the acquisition", "start the run again"
@@ -60,7 +60,7 @@ MEANINGS: dict[Code, Meaning] = {
     Code.PAL_RESOURCE_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),
     Code.RESOURCE_ALREADY_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),
     Code.INVALID_ATTRIBUTE_VALUE: Meaning(
-        ConfigurationError, "the device does not support a rate, range, coupling or current", _CONFIGURE
+        ConfigurationError, "the requested rate, range, coupling or current is not supported", _CONFIGURE
     ),
     Code.INVALID_DEVICE_ID: Meaning(
         ConfigurationError, "the driver knows no device with this name", _CONFIGURE
@@ -74,7 +74,7 @@ MEANINGS: dict[Code, Meaning] = {
     Code.RUNTIME_ABORTING_ROUTING: Meaning(
         InstrumentLost,
         "the device was reset while it ran",
-        "find out which program reset it, then open the bench again",
+        "find out which program reset the device, then open the bench again",
     ),
     Code.PAL_TRANSFER_ABORTED: Meaning(
         InstrumentLost, "the transfer from the device was interrupted", _RECONNECT
@@ -102,11 +102,11 @@ MEANINGS: dict[Code, Meaning] = {
         "open the bench again",
     ),
     Code.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING: Meaning(
-        InstrumentError, "the task is running", "stop it before changing it"
+        InstrumentError, "the task is running", "stop the task before changing it"
     ),
 }
 
-# Errors for a property that this device, or this kind of task, does not have.
+# Errors for a property that this device does not have, or that this type of task does not have.
 NOT_OFFERED = frozenset({Code.ATTR_NOT_SUPPORTED, Code.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT})
 
 _SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED})
@@ -141,7 +141,7 @@ def from_code(error: DaqError, doing: str) -> AcquisitionError:
     text = " ".join(str(error).split())
     meaning = MEANINGS.get(error.error_type)
     if meaning is None:
-        return InstrumentError(f"{doing} failed: {text}. Look the number up in the NI-DAQmx help")
+        return InstrumentError(f"{doing} failed: {text}. Look up the error number in the NI-DAQmx help")
     name = f"{error.error_type.name}, {error.error_code}"
     return meaning.kind(f"{doing} failed: {meaning.happened} ({name}: {text}). To do: {meaning.advice}")
 
@@ -149,7 +149,7 @@ def from_code(error: DaqError, doing: str) -> AcquisitionError:
 def _from_server(error: RpcError, doing: str) -> InstrumentError:
     if error.rpc_code in _SERVER_LOST:
         return InstrumentLost(
-            f"{doing} failed: the device server does not answer ({error}). Check that it runs and that "
-            "daq.server is its address, then open the bench again"
+            f"{doing} failed: the device server does not answer ({error}). Start the server or "
+            "correct daq.server, then open the bench again"
         )
     return InstrumentError(f"{doing} failed: the device server reported an error ({error}); read its log")

@@ -16,12 +16,12 @@ from ..instruments import Identity, IdleOutput, Samples
 from ..rig import OutputConfig
 from ._daqmx import DaqmxDigitizer, daqmx_identity
 from ._daqmx_errors import daqmx_call
-from ._overload import require_playable
+from ._limits import require_playable
 
 _WRITE_TIMEOUT_S = 10.0
-# Number of zeros at the end: the output holds its last value, and some devices need more than one zero.
+# The output holds the last value, so zeros are written at the end. Some devices need more than one zero.
 _ZERO_SAMPLES = 64
-# Rounding error of the rate that is read back; a larger deviation means a different rate.
+# Largest rounding error of the rate read back; a larger deviation means a different rate.
 _SAME_RATE = 1e-6
 
 
@@ -37,7 +37,7 @@ class DaqmxOutput:
         self._physical = physical
         self._config = config
         self.sample_rate_hz = config.sample_rate_hz
-        """Sample rate that was requested and that the device accepted."""
+        """Sample rate, which was requested and which the device accepted."""
         self.ahead_samples = int(config.ahead_s * config.sample_rate_hz)
         """Largest number of samples that can be written ahead of the sample being played."""
         self._digitizer = digitizer
@@ -48,7 +48,7 @@ class DaqmxOutput:
         """Whether the output is at zero volts and nothing is reserved; if not, `stop` sets it to zero."""
         self._is_open = True
         self.idle = IdleOutput.HELD
-        """Voltage of the output after its last sample, as read back: zero if the device supports that."""
+        """Voltage of the output after its last sample, as read back: zero if the device can do this."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -73,7 +73,7 @@ class DaqmxOutput:
 
     @property
     def identity(self) -> Identity:
-        """Identity of the output's module, with the name of the output in its reply."""
+        """Identity of the output's module; its reply contains the name of the output."""
         device, _, _ = self._physical.rpartition("/")
         with daqmx_call(f"identifying {self._physical}"):
             module = daqmx_identity(self._digitizer.session, device)
@@ -113,9 +113,9 @@ class DaqmxOutput:
         task, self._task, self._written = self._task, None, 0
         try:
             with ExitStack() as last:
-                last.callback(self._to_zero)  # even if stopping fails: devices may hold their last value
+                last.callback(self._to_zero)  # even if stopping fails: devices may hold the last value
                 last.callback(self._release)
-                # An output that has run out of samples reports this error again; it has stopped, as required.
+                # Ignore this error, which an output without samples raises again although it has stopped.
                 last.enter_context(suppress(DataLost))
                 if task is not None:
                     with daqmx_call(f"stopping {self._physical}"):
@@ -131,7 +131,7 @@ class DaqmxOutput:
     def close(self) -> None:
         """Set the output to zero volts and release it. May be called at any time."""
         self._is_open = False
-        if self._task is not None:  # without a task, `stop` has already succeeded or raised an error
+        if self._task is not None:  # no task means that `stop` has succeeded or raised an error
             self.stop()
 
     def _reserve(self) -> Task:
@@ -151,7 +151,7 @@ class DaqmxOutput:
                 raise SettingRefused(
                     f"{physical} was set to {config.sample_rate_hz:g} samples a second, but uses "
                     f"{rate_hz:g}: every frequency would be wrong. The output was released; set "
-                    "daq.output.sample_rate_hz to a rate that it supports"
+                    "daq.output.sample_rate_hz to a rate that the device supports"
                 )
             task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
             task.out_stream.output_buf_size = self.ahead_samples

@@ -1,30 +1,126 @@
-"""SCPI instruments: the error queue and each setting are read back; lost connections are reported."""
+"""SCPI instruments over VISA: each setting is read back, and failed connections are reported with advice."""
 
+import os
 import re
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pyvisa
 from numpy.typing import NDArray
+from pyvisa.resources import MessageBasedResource
 
-from ..errors import AcquisitionError, InstrumentError, InstrumentLost, SettingRefused
-from ..host.log import LOG
-from ._visa_link import Link
+from ..errors import AcquisitionError, InstrumentBusy, InstrumentError, InstrumentLost, SettingRefused
+from ..host import LOG
+from ..host.installation import shipped
+from ..instruments import usb_ids
+
+# Time limit for a reply [s]. The slowest known reply contains all 8192 points of a waveform.
+TIMEOUT_S = 3.0
+UDEV_RULES = "hardware_configs/70-vibench.rules"
+USB_DEVICES = Path("/sys/bus/usb/devices")
+USB_NODES = Path("/dev/bus/usb")
+_MS_PER_S = 1000.0
+
+
+Link = MessageBasedResource
+"""An open VISA session with an instrument."""
+
+
+def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:
+    """Open a VISA resource for messages that end in a newline.
+
+    Raises InstrumentLost when no such instrument answers; InstrumentBusy when another program uses it;
+    InstrumentError when the VISA library itself cannot be used.
+    """
+    manager = _manager(visa_library)
+    try:
+        link = manager.open_resource(resource, open_timeout=int(timeout_s * _MS_PER_S))
+    except pyvisa.VisaIOError as error:
+        if error.error_code == pyvisa.constants.StatusCode.error_resource_busy:
+            raise InstrumentBusy(
+                f"{resource} is in use by another program; close that program and open the bench again"
+            ) from error
+        raise _absent(resource, error) from error
+    except MemoryError:  # the caller releases its memory reserve
+        raise
+    except Exception as error:  # pyvisa-py raises Exception, ValueError or OSError for absent devices
+        raise _absent(resource, error) from error
+    message_link = cast("Link", link)
+    message_link.timeout = timeout_s * _MS_PER_S
+    message_link.write_termination = "\n"
+    if resource.upper().endswith("::SOCKET"):  # USB marks the end of a reply, a stream does not
+        message_link.read_termination = "\n"
+    return message_link
+
+
+def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
+    """Return the resource names of everything that the VISA library finds now.
+
+    pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
+    """
+    with warnings.catch_warnings():
+        # When pyvisa-py searches the network, it warns of missing packages and leaves a socket open.
+        warnings.simplefilter("ignore", UserWarning)
+        warnings.simplefilter("ignore", ResourceWarning)
+        return tuple(_manager(visa_library).list_resources("?*"))
+
+
+def _manager(visa_library: str) -> pyvisa.ResourceManager:
+    # Keep one manager for each library until the process ends: all sessions share the manager, and closing
+    # the manager would close them all.
+    try:
+        return pyvisa.ResourceManager(visa_library)
+    except (OSError, ValueError) as error:
+        raise InstrumentError(
+            f"the VISA library {visa_library or 'of the system'} cannot be loaded ({error}); "
+            'install it, or set generator.visa_library = "@py"'
+        ) from error
+
+
+def _absent(resource: str, error: Exception) -> InstrumentLost:
+    # A list of other devices would help, but searching the network takes seconds: too long in an emergency.
+    if _is_locked_out(resource):
+        return InstrumentLost(
+            f"{resource} is on the USB bus, but this user account may not use it ({error}). Copy "
+            f"{shipped(UDEV_RULES)} to /etc/udev/rules.d, run 'udevadm control --reload' as root, and plug "
+            "the instrument in again"
+        )
+    return InstrumentLost(
+        f"no instrument answers at {resource} ({error}). Check the instrument's power and cable, and "
+        "generator.resource in the hardware configuration; `vibench bench list` lists the instruments found"
+    )
+
+
+def _is_locked_out(resource: str) -> bool:
+    """Whether Linux lists a USB device that this account may not write to; libusb finds no such device."""
+    wanted = usb_ids(resource)
+    for device in USB_DEVICES.glob("*"):
+        try:
+            found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))
+            bus, number = (int((device / each).read_text()) for each in ("busnum", "devnum"))
+        except (OSError, ValueError):  # the device is a port of a hub, or was just unplugged
+            continue
+        if found == wanted and not os.access(USB_NODES / f"{bus:03d}" / f"{number:03d}", os.W_OK):
+            return True
+    return False
+
 
 Codes = NDArray[np.uint16]
 
-# An error queue has some tens of entries; more replies than this mean that the queue is not being emptied.
+# An error queue has some tens of entries. More replies than this mean that reading does not empty the queue.
 _LONGEST_QUEUE = 64
 # A faulty instrument may never stop sending. The longest SCPI text has 255 letters; 8192 points have 16 kB.
 _LONGEST_TEXT = 300
 _LONGEST_REPLY = 1_000_000
-# Wait for an old reply on its way [ms]: long enough to receive it, short enough for an emergency stop.
+# Waiting time for a late reply [ms]: long enough to receive the reply, short enough for an emergency stop.
 _STALE_REPLY_MS = 100.0
 _LATE = pyvisa.constants.StatusCode.error_timeout
 _QUEUE_ENTRY = re.compile(r'([+-]?[0-9]{1,9})\s*,\s*"?([^"]*)"?')
@@ -41,13 +137,13 @@ class ScpiInstrument:
     Parameters
     ----------
     connect
-        Opens the VISA session; called again by `reconnect`.
+        Function that opens the VISA session; `reconnect` calls it again.
     name
         Name of the instrument in errors.
     channel
         Replaces ``{c}`` in the headers of settings.
     settle_s
-        Pause that the instrument needs after each command [s]; it needs none after a reply.
+        Pause that the instrument needs after each command [s]; no pause is needed after a reply.
     """
 
     def __init__(
@@ -123,7 +219,7 @@ class ScpiInstrument:
         payload = reply[first : first + length]
         if len(payload) != length or length % 2:
             raise InstrumentError(
-                f"{self.name}: {message} announced {length} bytes and sent {len(payload)}; both must be "
+                f"{self.name}: {message} announced {length} bytes but sent {len(payload)}; both must be "
                 "the same even number. Upload the waveform again"
             )
         return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
@@ -144,27 +240,27 @@ class ScpiInstrument:
             found.append(f"{entry[2]} ({int(entry[1])})")
         raise InstrumentError(
             f"{self.name} still reports errors after {_LONGEST_QUEUE} were read; "
-            "switch it off and on, and open the bench again"
+            "switch the instrument off and on, and open the bench again"
         )
 
     def last_value(self, header: str) -> Any:
         """Return the last value read back for a setting; raises InstrumentError after a failed change."""
         if header not in self.held:
             raise InstrumentError(
-                f"{self.name}: a change failed, so its settings are unknown; load a sine or a waveform first"
+                f"{self.name}: a change failed, so the settings are unknown; load a sine or a waveform first"
             )
         return self.held[header]
 
     def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
-        """End a mode. An empty reply means that the firmware lacks the mode, so the mode cannot be on."""
+        """End a mode. An empty reply means that the firmware has no such mode, so it cannot be on."""
         header = header.format(c=self.channel)
         self.send(f"{header} {word}")
         reply = self.query(f"{header}?")
-        self.complaints()  # an unknown query leaves an error in the queue after its empty reply
+        self.complaints()  # after an unknown query, the reply is empty and the queue has an error
         if reply and reply.strip('"').upper() not in answers:
             raise SettingRefused(
-                f"{self.name}: {header} was set to {word} and still reads {reply!r}; "
-                "the output is off. End that mode on its panel and open the bench again"
+                f"{self.name}: {header} was set to {word}, but still reads {reply!r}; "
+                "the output is off. End that mode on the instrument's panel and open the bench again"
             )
 
     def disconnect(self) -> None:
@@ -186,13 +282,13 @@ class ScpiInstrument:
             self._reply_due = True
             self._link.write(message)
             reply = self._link.read_bytes(longest + 1, break_on_termchar=True)
-            # On a stream, a newline byte among the waveform codes also ends a read.
+            # A read from a stream also ends at a newline byte among the waveform codes.
             while self._link.read_termination and len(reply) <= min(sum(_block(reply)), longest):
                 reply += self._link.read_bytes(longest + 1 - len(reply), break_on_termchar=True)
             if len(reply) > longest:
                 raise InstrumentError(
-                    f"{self.name}: {message} was answered with more than {longest} bytes; check its address, "
-                    "switch it off and on, and open the bench again"
+                    f"{self.name}: {message} was answered with more than {longest} bytes; check the "
+                    "instrument's address, switch the instrument off and on, and open the bench again"
                 )
             self._reply_due = False
         LOG.debug("%s answers %r", self.name, reply)
@@ -207,7 +303,7 @@ class ScpiInstrument:
                 with self._report_losses("resuming the dialogue"):
                     usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
                     try:
-                        is_stream = bool(self._link.read_termination)  # codes may contain newlines
+                        is_stream = bool(self._link.read_termination)  # waveform codes may contain newlines
                         self._link.read_bytes(_LONGEST_REPLY, break_on_termchar=not is_stream)
                     except pyvisa.VisaIOError as error:
                         if error.error_code != _LATE:
@@ -224,7 +320,7 @@ class ScpiInstrument:
             yield
         except (AcquisitionError, MemoryError):
             raise
-        except Exception as error:  # pyvisa-py passes on whatever PyUSB, sockets and RPC raise
+        except Exception as error:  # pyvisa-py does not catch errors of PyUSB, sockets and RPC
             if isinstance(error, pyvisa.VisaIOError) and error.error_code == _LATE:
                 raise InstrumentError(
                     f"{self.name} did not answer {doing!r} within {self._link.timeout / 1000:g} s; "
@@ -232,7 +328,7 @@ class ScpiInstrument:
                 ) from error
             raise InstrumentLost(
                 f"the connection to {self.name} is lost: {doing!r} failed ({error}). The state of its output "
-                "is unknown; check its cable and power, then open the bench again"
+                "is unknown; check the instrument's cable and power, then open the bench again"
             ) from error
 
 
@@ -244,9 +340,9 @@ def _block(reply: bytes) -> tuple[int, int]:
         return 0, -1
 
 
-# Settings are descriptors: an assignment sends the value, reads it back, and keeps the instrument's value.
-# These generators replace a value out of range by a default (Tektronix AFG1000 programmer manual, general
-# syntax), so the absence of an error proves nothing.
+# Settings are descriptors: an assignment sends the value, reads it back, and keeps the instrument's value. If
+# a value is out of range, these generators use a default without an error (Tektronix AFG1000 programmer
+# manual, general syntax). Only reading back shows this.
 
 
 @dataclass(frozen=True)
@@ -300,8 +396,8 @@ class Word:
 
 def _refusal(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
     return SettingRefused(
-        f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument uses another value "
-        "but reports no error. Stop, and check this setting and its limits on the panel"
+        f"{owner.name}: {header} was set to {sent}, but {got!r} was read back: the instrument uses another "
+        "value but reports no error. Stop, and check this setting and its limits on the panel"
     )
 
 

@@ -1,4 +1,4 @@
-"""``python -m vibench.acquisition.engine``: process of an engine. Its first line of output is its address."""
+"""``python -m vibench.acquisition.engine``: process of an engine. It first writes a line with its address."""
 
 import argparse
 import json
@@ -31,7 +31,7 @@ def main() -> None:
         "--forgotten-s",
         type=float,
         default=FORGOTTEN_S,
-        help="time [s] without a request until an unattended engine ends, if it has no campaign to run",
+        help="an unattended engine with no campaign ends when no request arrives for this time [s]",
     )
     options = parser.parse_args()
     engine = Engine(options.attendance)
@@ -51,29 +51,29 @@ def main() -> None:
 
 def _handle_signals(handler: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        handler.shutdown(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
+        handler.end(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
 
     for number in stop_signals():
         signal.signal(number, on_signal)
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:
-    """End an idle engine that is no longer used, because it may block a bench for other programs."""
+    """End an idle engine that nobody uses any more, because it may block a bench for other programs."""
     pause = Event()
     while not handler.is_forgotten(after_s):
         pause.wait(after_s / 10)
-    handler.shutdown(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to run")
+    handler.end(Cause.PARENT_GONE, f"no request for {after_s:g} s, and no campaign to run")
 
 
 def _follow_parent(handler: RequestHandler) -> None:
     """Wait until the parent has closed the standard input and no work remains, then end the engine."""
-    # Do not use sys.stdin: a buffer on which a thread waits cannot be closed when the process ends.
+    # Do not use sys.stdin: at the end, its buffer cannot be closed while a thread waits on it.
     while os.read(sys.stdin.fileno(), 4096):
         pass
     pause = Event()
     while handler.outlives_its_parent:
         pause.wait(PARENT_INTERVAL_S)
-    handler.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
+    handler.end(Cause.PARENT_GONE, "the program that started the engine has ended")
 
 
 if __name__ == "__main__":

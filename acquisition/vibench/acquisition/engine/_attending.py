@@ -1,7 +1,7 @@
-"""``python -m vibench.acquisition.engine._attending``: process of an `Attendant`; it imports little.
+"""``python -m vibench.acquisition.engine._attending``: process of an `Attendant`, with few imports.
 
-Its standard input is a line with the engine's address, then one byte each time the parent program shows that
-it is responsive. The process ends when the parent program ends.
+On its standard input, the process receives a line with the engine's address, then one byte whenever the
+parent program shows that it is responsive. The process ends with the parent program.
 """
 
 import json
@@ -20,7 +20,7 @@ BEAT_S = 0.04
 STOPPED = ("T", "t", "Z", "X")
 """State letters in ``/proc`` of a suspended or dead process (Linux)."""
 LEAST_OWN = 0.25
-"""At least this fraction of the time without an input byte counts; the rest may be processor waits."""
+"""Smallest counted fraction of the time without input bytes; the rest may be waits for a processor."""
 
 
 class _Program:
@@ -37,7 +37,7 @@ class _Program:
 
         In state R (runnable), only its processor time counts: Linux reports a wait only when it is over.
         """
-        lived_s = self._lived_s  # read this before the clock: a byte may arrive between the two
+        lived_s = self._lived_s  # before reading the clock: a byte may arrive meanwhile
         now_s, worked_s = monotonic(), self._processor_s
         seen_s, lived_then_s, worked_then_s = self._seen_s
         self._seen_s = (now_s, lived_s, worked_s)
@@ -68,7 +68,7 @@ class _Program:
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
             self._lived_s = monotonic()
-        os._exit(0)  # ends the process although the other thread waits
+        os._exit(0)  # exit at once, although the other thread still waits
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Functions and classes that find engines of this user, send them requests, and attend an engine."""
+"""Functions and classes that find engines of this user, send requests to engines, and attend an engine."""
 
 import json
 import os
@@ -11,7 +11,7 @@ from math import inf
 from pathlib import Path
 from threading import Lock
 from time import monotonic
-from typing import IO, Any, Literal, TypeVar
+from typing import IO, Any, Literal
 
 from vibench.sim.operating_system.this import Place, state_folder
 from vibench.stop_files import SWITCH_OFF
@@ -20,8 +20,7 @@ from .. import errors
 from ..campaign import ExistingRecordings
 from ..errors import AcquisitionError
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import member
-from ..host.toml_file import FrozenModel
+from ..host.toml_file import FrozenModel, member
 from ..plan import Campaign
 from ..stopping.program import (
     Press,
@@ -33,8 +32,9 @@ from ..stopping.program import (
     unconfirmed_programs,
     withdraw,
 )
+from ._request_handler import RequestHandler
 from ._status import ArmedPlan, ConnectionRole, EngineStatus, RowStatus
-from ._verbs import CampaignRequest, EngineVerbs, Verb
+from ._verbs import CampaignRequest, Verb, sent
 from ._wire import ANSWERS, EngineError, EngineGone, EngineSilent, Message, receive, send
 
 
@@ -47,11 +47,11 @@ class EngineAddress(FrozenModel):
 
 
 REFUSAL_S = 0.2
-"""Time limit of a connection attempt [s]; on the same computer, a refused connection returns at once."""
+"""Time limit of a connection attempt [s]; on the same computer, a refusal is returned at once."""
 
 
 class Announcement(Program):
-    """An engine of this user on this computer; it accepts all requests, not only requests to stop."""
+    """An engine of this user on this computer; an engine accepts all requests, not only requests to stop."""
 
     address: EngineAddress
 
@@ -68,7 +68,7 @@ def announce(address: EngineAddress, what: str, press: Press) -> AbstractContext
 def announced_engines() -> tuple[Announcement, ...]:
     """Return all engines on this computer whose process runs, oldest first, even if they do not answer.
 
-    An engine that refuses connections is left out; `programs_without_engine` returns it if its process runs.
+    Engines that refuse connections are left out; `programs_without_engine` returns those that still run.
     """
     found = []
     for announcement in announced_programs(Announcement):
@@ -80,7 +80,7 @@ def announced_engines() -> tuple[Announcement, ...]:
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Return programs that drive a bench without an engine, and engines that refuse connections."""
+    """Return all programs that drive a bench without an engine, and all engines that refuse connections."""
     engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
@@ -100,7 +100,7 @@ def the_engine(pid: int | None) -> Announcement:
     if others:
         raise EngineError(f"{wanted}; {_names(others)} drives a bench without an engine: use 'vibench stop'")
     raise EngineError(
-        f"{wanted}; 'vibench measure' and 'vibench gui' start one. Only {state_folder()} was searched: "
+        f"{wanted}; 'vibench measure' and 'vibench gui' start an engine. Only {state_folder()} was searched: "
         "engines of other users, or with another VIBENCH_STATE_DIR, are not found"
         + "".join(f". {each}" for each in [out_of_reach()] if each)
     )
@@ -109,9 +109,9 @@ def the_engine(pid: int | None) -> Announcement:
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
     """Return the programs that a stop addresses: engines, and programs that drive a bench themselves.
 
-    Programs in other containers of this computer are included, since they read the same state folder. So are
-    programs that ended without confirming silence. Raises EngineError when there is no such program. ``pid``
-    selects one program; None selects all programs of this computer.
+    Programs in other containers of this computer are included, since they read the same state folder, and so
+    are programs that ended without confirming silence. Raises EngineError when there is no such program.
+    ``pid`` selects one program; None selects all programs of this computer.
     """
     contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
     programs = (*announced_engines(), *programs_without_engine(), *contained, *unconfirmed_programs())
@@ -119,12 +119,10 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Return a sentence about other computers' programs that use the same state folder, or empty text."""
+    """Return a sentence about programs on other computers that use the same state folder, or empty text."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
-    return (
-        f"Not reached because it runs on another computer: {named}; run 'vibench stop' there" if named else ""
-    )
+    return f"Programs on other computers were not reached: {named}; run 'vibench stop' there" if named else ""
 
 
 def require_ended(engine: Announcement) -> None:
@@ -172,8 +170,8 @@ def connect(address: EngineAddress, role: ConnectionRole, patience_s: float = PA
         raise _silent(patience_s) from error
     except OSError as error:
         raise EngineGone(
-            f"no engine answers at {address.host}:{address.port} ({error}); check that it still runs, or "
-            "start one"
+            f"no engine answers at {address.host}:{address.port} ({error}); check that the engine still "
+            "runs, or start an engine"
         ) from error
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     try:
@@ -198,7 +196,7 @@ def exchange(
     EngineGone
         When the connection has ended; it is then closed on this side, too.
     AcquisitionError
-        When the engine refuses the request; this is the engine's own error.
+        When the engine refuses the request; the error is the engine's own error.
     """
     usual_s = connection.gettimeout()
     patience_s = (usual_s or PATIENCE_S) + work_s
@@ -208,7 +206,7 @@ def exchange(
         answer = receive(connection, ANSWERS)
         connection.settimeout(usual_s)
     except TimeoutError as error:
-        # A late answer must not be taken for the answer to the next request.
+        # Close the connection: a late answer would be taken for the answer to the next request.
         connection.close()
         raise _silent(patience_s) from error
     except OSError as error:
@@ -226,7 +224,7 @@ def _silent(patience_s: float) -> EngineSilent:
     return EngineSilent(
         f"the engine does not answer within {patience_s:g} s; its process hangs or is suspended. The output "
         "may stay on: 'vibench stop' requests a stop that the engine obeys when it runs again; in an "
-        "emergency switch the amplifier off by hand"
+        "emergency, switch the amplifier off by hand"
     )
 
 
@@ -238,16 +236,32 @@ def _refusal(kind: str, sentence: str) -> AcquisitionError:
     return EngineError(sentence)
 
 
-Answer = TypeVar("Answer")
-
-
-class EngineClient(EngineVerbs, ClosedOnLeaving):
+class EngineClient(ClosedOnLeaving):
     """A connection to an engine.
 
     Every request over an attending connection shows that a viewer is present: an attended run
     continues only with at least two requests per second. Each method raises `EngineGone` when the engine's
-    process has ended, and the engine's own `AcquisitionError` when it refuses the request.
+    process has ended, and the engine's own `AcquisitionError` when the engine refuses the request.
     """
+
+    open = sent(RequestHandler.open)
+    close_bench = sent(RequestHandler.close_bench)
+    check = sent(RequestHandler.check)
+    arm_request = sent(RequestHandler.arm_request)
+    disarm = sent(RequestHandler.disarm)
+    start = sent(RequestHandler.start)
+    stop = sent(RequestHandler.stop)
+    resume = sent(RequestHandler.resume)
+    mark = sent(RequestHandler.mark)
+    note_change = sent(RequestHandler.note_change)
+    open_rig = sent(RequestHandler.open_rig)
+    last_request = sent(RequestHandler.last_request)
+    turn_twin = sent(RequestHandler.turn_twin)
+    publish_twin = sent(RequestHandler.publish_twin)
+    status_since = sent(RequestHandler.status_since)
+    heartbeat = sent(RequestHandler.heartbeat)
+    look = sent(RequestHandler.look)
+    shutdown = sent(RequestHandler.shutdown)
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
@@ -263,8 +277,8 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
     ) -> "EngineClient":
         """Connect to a running engine, to watch or to attend its run.
 
-        Raises EngineSilent when no answer comes within ``patience_s`` [s], now or later, and EngineGone when
-        no engine listens at the address.
+        Raises EngineSilent when the engine does not answer this or a later request within ``patience_s`` [s],
+        and EngineGone when no engine listens at the address.
         """
         return cls(connect(address, member(ConnectionRole, role), patience_s))
 
@@ -289,11 +303,11 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         """End the connection; the engine continues. May be called at any time."""
         self._connection.close()
 
-    def ask(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
+    def ask(self, verb: Verb, arguments: Mapping[str, object]) -> Any:
         """Send a request and wait for its answer."""
         request = verb.message(**arguments)
         with self._asking:
-            return verb.answer.read(*exchange(self._connection, request, verb.work_s))
+            return verb.answer(*exchange(self._connection, request, verb.work_s))
 
 
 BEAT_EVERY_S = 0.02
@@ -307,8 +321,8 @@ class Attendant:
 
     On a busy computer, a thread of a window can wait a second or more for Python's global lock. A process
     that mostly sleeps gets a processor at once (decision 0068). The process ends with the parent program. It
-    sends no heartbeat while the system has suspended that program (Linux). Each heartbeat reports how long
-    `live` has not been called.
+    sends no heartbeat while the operating system has suspended the parent program (Linux). Each heartbeat
+    reports how long `live` has not been called.
     """
 
     def __init__(self, address: EngineAddress) -> None:
@@ -331,7 +345,7 @@ class Attendant:
         self._beat_s = now_s
         try:
             os.write(self._pipe.fileno(), b".")
-        except BlockingIOError:  # the pipe is full, because the attendant does not read it
+        except BlockingIOError:  # the pipe is full: the attending process does not read
             pass
         except OSError:
             if now_s - self._begun_s > AGAIN_S:
@@ -340,7 +354,7 @@ class Attendant:
 
     def close(self) -> None:
         """Stop attending the engine. May be called at any time."""
-        self._beat_s = inf  # with this value, `live` sends nothing more
+        self._beat_s = inf  # after this, `live` sends nothing
         self._end()
 
     def _end(self) -> None:
@@ -356,7 +370,7 @@ class Attendant:
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             bufsize=0,
-            # A separate session: Ctrl-C does not reach it, and Linux shares processors among sessions.
+            # Ctrl-C does not reach a separate session, and Linux shares processors among sessions.
             start_new_session=True,
         )
         assert self._process.stdin is not None

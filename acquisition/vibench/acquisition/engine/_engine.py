@@ -9,7 +9,7 @@ from queue import SimpleQueue
 
 from vibench.stop_files import SWITCH_OFF
 
-from ..bench.bench import Bench
+from ..bench import Bench
 from ..campaign import (
     CampaignEvent,
     CampaignEventKind,
@@ -85,7 +85,7 @@ class Engine:
 
     @property
     def stop_sentence(self) -> str:
-        """Sentence on why the run was stopped and whether the output is off; empty without a stop."""
+        """Sentence on why the run was stopped and whether the output is off; empty if it was not stopped."""
         request = self.switch.request
         if request is None or request.cause is Cause.FAULT:
             return ""
@@ -168,7 +168,7 @@ class Engine:
         if request.twin is TwinSwitch.ON or may_end_by_change:
             self.turn_twin(TwinSwitch.ON)
         try:
-            # This precedes the check of the bench, so an unplayable plan is refused before anything moves.
+            # Do this before the check of the bench, so that an invalid plan is refused before anything moves.
             require_all_within_limits(request.campaign.points(), self.bench)
             make_folder(request.folder)
             with stop_on_signal(self.switch):
@@ -205,7 +205,7 @@ class Engine:
         self.published.twin(TwinStatus() if self._twin.is_on else None)
 
     def look_after_twin(self) -> None:
-        """Warn if the live twin has ended by itself: changes of the specimen are then no longer noticed."""
+        """Warn if the live twin has ended by itself: nothing then notices changes of the specimen."""
         if (words := self._twin.last_words()) is not None:
             self.published.twin(None)
             self.published.messages.warn(

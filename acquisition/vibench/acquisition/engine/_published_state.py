@@ -11,7 +11,7 @@ from time import monotonic
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bench.result import BenchReport
+from ..bench import BenchReport
 from ..campaign import CampaignProgress, PointOutcome, PointResult
 from ..errors import AcquisitionError
 from ..host.beside import Beside
@@ -143,7 +143,7 @@ class Messages:
 
 
 def message_parts(text: str) -> tuple[str, str, str]:
-    """Split "What happened. What was done; what to do next" into its three parts; missing parts are empty."""
+    """Split "What happened. What was done; what to do next" into three parts; missing parts are empty."""
     what, _, rest = text.partition(". ")
     done, _, next_step = rest.partition("; ")
     return (f"{what.rstrip('.')}.", _sentence(done), _sentence(next_step))
@@ -160,7 +160,7 @@ _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.R
 
 
 class PublishedState:
-    """Newest status of an engine. It is always replaced as a whole, so that readers see no partial change."""
+    """Newest status of an engine. It is always replaced as a whole, so that no reader sees half a change."""
 
     def __init__(self, supervision: Supervision) -> None:
         self.sample_buffer = SampleBuffer()
@@ -236,11 +236,11 @@ class PublishedState:
     def note_progress(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Update the status after a block of samples."""
         run = progress.run
-        if progress.path != self._file:  # each attempt at a point is a new recording
+        if progress.path != self._file:  # a new point or attempt has a new recording
             self._file = progress.path
             self._overloads = 0
             self.sample_buffer.begin(len(bench.channels), bench.sample_rate_hz)
-            self._put(bench=bench)  # a scan gives the vibrometer's channel another role
+            self._put(bench=bench)  # in a scan, the role of the vibrometer's channel changes
             self._row(progress.name, "running", "", str(progress.path))
         self.sample_buffer.add(run.block)
         self._overloads += len(run.block.overloads)
@@ -262,7 +262,7 @@ class PublishedState:
         self._look_at_disk()
 
     def twin(self, status: TwinStatus | None) -> None:
-        """Set the live twin's report; None without a twin."""
+        """Set the live twin's report; None if there is no twin."""
         buffer = self.sample_buffer
         if status is not None and status.run_id == buffer.run_id and self._status.bench is not None:
             late = max(0, buffer.samples - status.end_sample)
@@ -270,7 +270,7 @@ class PublishedState:
         self._put(twin=status)
 
     def note_pause(self, rest_s: float, text: str) -> None:
-        """Add a pause between two recordings to the completed time [s], and publish ``text``."""
+        """Add the pause between two recordings [s] to the completed time, and publish ``text``."""
         self._done_s += rest_s
         self.messages.info(text)
 
@@ -331,7 +331,7 @@ class PublishedState:
 def _free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(folder).free
-    except OSError:  # the recorder reports a missing folder; this display must not end a run
+    except OSError:  # only a display, which must not end a run; the recorder reports the missing folder
         return 0
 
 

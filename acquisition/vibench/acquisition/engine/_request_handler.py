@@ -1,21 +1,21 @@
 """The engine's request handler: it answers at once, in any thread, and uses no instrument itself."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from threading import Lock
 from time import monotonic
-from typing import TypeVar
+from typing import Annotated, Any
+
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt
 
 from vibench.sim import count_text
 
-from ..bench.bench import Bench
-from ..campaign import planned_recordings
+from ..bench import Bench
+from ..campaign import planned_recordings, require_all_within_limits
 from ..check.admission import CheckRule, require_on_record
-from ..plan import LimitCheck, distinct_drives, require_within_limits
 from ..rig import KnobSheet, Rig, confirm_knobs_of
-from ..run.drive import drive_for
 from ..stopping.program import INTERVAL_S
 from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
 from ._engine import Engine, JobQueue
@@ -33,32 +33,26 @@ from ._status import (
     hung_patience_s,
     patience_s,
 )
-from ._verbs import CampaignRequest, Verb
+from ._verbs import ARMING_S, AbsolutePath, AbsoluteRequest, CampaignRequest, Verb, verb
 from ._wire import EngineError
-
-Answer = TypeVar("Answer")
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this time [s]."""
 
 
 def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision) -> ArmedPlan:
-    """Check a campaign for this bench and folder, and return its plan; no signal is played, no file written.
+    """Check a campaign for this bench and folder, and return its plan; play no signal, write no file.
 
     Raises AcquisitionError with every reason why the campaign cannot be run.
     """
     if request.check is CheckRule.FRESH:
         require_on_record(bench)
-    checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    # Check equal plans only once: a long campaign would otherwise make viewers wait.
-    for point in distinct_drives(points):
-        checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
-        drive_for(bench, point.measurement)  # refuses plans that this bench cannot play
+    checks = require_all_within_limits(points, bench)
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
-    # Reaching a limit on waveform points or ramps is harmless; only loads can cause damage.
+    # Only loads can cause damage; it is harmless to reach a limit on waveform points or ramps.
     loads = [named for named in checks if named[1].load is not None]
     tightest, closest = max(loads or checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
@@ -77,7 +71,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         lines=(
             f"What: {count_text(len(missing), 'recording')} ({kinds}){kept}",
             f"Level: at most {loudest:g} Vpp at the generator",
-            f"Limits: the closest is {closest.what}, at {closest.use:.0%} of {bound} in {tightest}",
+            f"Closest limit: {closest.what} is at {closest.use:.0%} of {bound} in {tightest}",
             f"Duration: {length} (h:min:s), ramps and checks included",
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
             "Without a viewer: "
@@ -96,11 +90,11 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
 STALL_S = 0.2
 """This process counts as stalled if the time between two checks for viewers exceeds this value [s]."""
 LATE_FACTOR = 4.0
-"""Extra time without requests, as a multiple of this process's own delay, which viewers may share."""
+"""Extra time without requests, as a multiple of this process's own delay: viewers may be delayed too."""
 TAKEN_OVER_S = 2.0
 """A viewer attends an engine without a parent if the viewer's last request is newer than this [s]."""
 FORGETTING = 0.995
-"""Factor by which the remembered largest delay shrinks at each check; the delay halves in 7 s."""
+"""Factor by which the stored largest delay is multiplied at each check; the stored delay halves in 7 s."""
 
 
 class RequestHandler:
@@ -108,7 +102,7 @@ class RequestHandler:
 
     The handler answers from the published state, queues a job for the engine, or sets the engine's stop
     switch. `carry_out` accepts requests: it raises `EngineError` with one sentence when the engine's state
-    does not permit them. Each verb has a method here, with the parameters of `EngineVerbs`.
+    does not permit a request. The client's methods have the names, parameters and descriptions of the verbs.
     """
 
     def __init__(self, engine: Engine, jobs: JobQueue) -> None:
@@ -124,15 +118,14 @@ class RequestHandler:
         self._late_s = self._still_s = 0.0
         self._attendance, self._patience_s = engine.supervision, VIEWER_PATIENCE_S
 
-    def carry_out(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
-        """Carry out a request, if the engine's state permits it."""
-        method: Callable[..., Answer] = getattr(self, verb.method)
+    def carry_out(self, verb: Verb, arguments: Mapping[str, object]) -> Any:
+        """Carry out a request, if the engine's state permits it, and return its answer."""
         if not verb.states:  # a stop must not wait for other requests
-            return method(**arguments)
+            return verb.call(self, **arguments)
         with self._asking:
             state = self._engine.published.state
-            # A viewer that has seen the bench closed may open it, even if the request to close it has not
-            # returned yet.
+            # Once the bench is published as closed, a viewer may open it, even if the request to close it has
+            # not returned yet.
             if self._is_ending or (self._is_closing and state is not EngineState.CLOSED):
                 raise EngineError(
                     f"the bench is being closed, so the engine cannot {verb.word} now; "
@@ -144,15 +137,17 @@ class RequestHandler:
                 raise EngineError(
                     f"the engine is {now} and cannot {verb.word} now; it must be {allowed} first"
                 )
-            return method(**arguments)
+            return verb.call(self, **arguments)
 
     def note_presence(self) -> None:
-        """Register that a viewer is present; requests to check, arm or start count as presence, too."""
+        """Register that a viewer is present."""
         self._last_request_s = monotonic()
 
-    def heartbeat(self, still_s: float = 0.0) -> None:
-        """Register how long the window has been blocked [s]; the server registers the viewer's presence."""
+    @verb("beat")
+    def heartbeat(self, still_s: NonNegativeFloat = 0.0) -> None:
+        """Report that the viewer is present, and how long its window has been blocked (``still_s`` [s])."""
         self._still_s = still_s
+        self.note_presence()
 
     def status(self) -> EngineStatus:
         """Return the status of the engine."""
@@ -160,41 +155,51 @@ class RequestHandler:
         is_left_alone = self._is_orphan and not self._is_looked_after
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
+    @verb("status")
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Return the status of the engine, without the ``rows`` if the viewer already has them."""
+        """Return the engine's status, without its ``rows`` if ``known_rows`` equals its ``rows_number``."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 
-    def look(self, since_sample: int = 0, *, most: int) -> SampleSlice:
-        """Return the newest samples of the run."""
+    @verb("look")
+    def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:
+        """Return the newest samples of the run: from ``since_sample`` on, at most ``most`` per channel."""
         return self._engine.published.sample_buffer.samples_since(since_sample, most)
 
+    @verb("open", EngineState.CLOSED, EngineState.FAULT)
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
-        """Open the bench of a rig."""
+        """Open the bench of a rig; the status shows when it is open.
+
+        ``confirmations`` lists the manual settings that the operator confirmed; a virtual rig needs none.
+        """
         self._engine.published.enter(EngineState.OPENING)
         confirm = partial(confirm_knobs_of, confirmations, "the list of knobs set by hand")
         self._jobs.put(lambda: self._engine.open(rig, None if rig.virtual else confirm))
 
+    @verb("close", EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED)
     def close_bench(self) -> None:
         """Close the bench."""
         self._disarm()
         self._is_closing = True
         self._jobs.put(self._close)
 
-    def check(self, folder: Path = Path(), *, new_reference: bool = False) -> None:
-        """Check the bench with a small sine, and the free disk space of ``folder``."""
-        self.note_presence()
+    @verb("check", EngineState.READY)
+    def check(self, folder: AbsolutePath = Path(), *, new_reference: bool = False) -> None:
+        """Check the bench with a small sine, and the free disk space of ``folder``.
+
+        ``new_reference``: do not compare with an earlier check, because the bench was changed on purpose.
+        """
+        self.heartbeat()
         self._engine.switch = StopSwitch()
         self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S
         self._engine.published.enter(EngineState.CHECKING)
         self._jobs.put(lambda: self._engine.check(folder, new_reference=new_reference))
 
-    def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
-        """Prepare a campaign; raises AcquisitionError with the reasons when it cannot be carried out.
-
-        Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to disarm,
-        so the campaign is armed only if no stop was counted meanwhile.
-        """
+    @verb("arm", EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
+    def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:
+        """Prepare a campaign and return its plan, or refuse the campaign with the reasons."""
+        # Checking the limits of a long campaign takes seconds. A stop during this time finds nothing to
+        # disarm, so the campaign is armed only if no stop was counted meanwhile.
         stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
         if stops != self._stops:
@@ -203,45 +208,52 @@ class RequestHandler:
             )
         self._attendance, self._patience_s = plan.attendance, plan.patience_s
         self._request = campaign_request
-        self.note_presence()
+        self.heartbeat()
         self._armed_s = monotonic()
         self._engine.published.arm(plan, campaign_request.campaign)
         return plan
 
+    @verb("disarm")
     def disarm(self) -> None:
         """Disarm the campaign, so that it cannot be started."""
         with self._asking:
             self._disarm()
 
+    @verb("start", EngineState.ARMED)
     def start(self) -> None:
         """Start the armed campaign."""
         assert self._request is not None
-        self.note_presence()
+        self.heartbeat()
         request, self._request = self._request, None
         self._carried = request
         self._engine.switch = StopSwitch()
         self._engine.published.enter(EngineState.RUNNING)
         self._jobs.put(lambda: self._engine.measure(request))
 
+    @verb("stop")
     def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
-        """Pause or end the run, and disarm an armed campaign; refuse a pause that would end the drive."""
+        """Pause or end the run, and disarm an armed campaign; only a pause can be refused."""
         if level is StopLevel.HOLD and (refusal := self._engine.switch.refusal_to_hold()):
             raise EngineError(f"{refusal}. The run continues; stop it with ramp, abort or off")
         self._stop(StopRequest(Cause.OPERATOR, level, reason))
 
+    @verb("resume")
     def resume(self) -> None:
         """Continue a paused run."""
         self._engine.switch.resume()
 
-    def mark(self, text: str) -> None:
+    @verb("mark", *sorted(DRIVING))
+    def mark(self, text: Annotated[str, Field(min_length=1, max_length=200)]) -> None:
         """Write an event at the next sample of the recording."""
         self._engine.switch.mark(text)
 
-    def note_change(self, text: str) -> None:
-        """Note in the recording that the specimen has changed."""
+    @verb("tell_change", *sorted(DRIVING))
+    def note_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:
+        """Report that the specimen has changed; a run with ``on_changed_specimen = "stop"`` ends."""
         self._engine.published.messages.warn(text)
         self._engine.switch.note_change(text)
 
+    @verb("rig")
     def open_rig(self) -> Rig:
         """Return the configuration of the open bench."""
         rig = self._engine.rig
@@ -251,33 +263,41 @@ class RequestHandler:
             )
         return rig
 
+    @verb("request")
     def last_request(self) -> CampaignRequest:
-        """Return the last started campaign, with its options."""
+        """Return the last started campaign with its options, for a viewer that did not arm it."""
         if self._carried is None:
             raise EngineError("no campaign was started in this engine yet; arm and start a campaign")
         return self._carried
 
+    @verb("twin")
     def turn_twin(self, switch: TwinSwitch) -> None:
         """Start or end the live twin."""
         with self._asking:
             self._engine.turn_twin(switch)
 
+    @verb("tell_twin")
     def publish_twin(self, told: TwinStatus) -> None:
         """Publish the live twin's report."""
         self._engine.published.twin(told)
 
-    def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "a request ended the engine") -> None:
+    @verb("shutdown")
+    def shutdown(self) -> None:
+        """Ramp the drive down, silence all outputs, and end the process."""
+        self.end(Cause.OPERATOR, "a request ended the engine")
+
+    def end(self, cause: Cause, reason: str) -> None:
         """End the run, silence everything, and let the engine end. Allowed in every engine state."""
         self._stop(StopRequest.of(cause, reason))
         self._is_ending = True
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
-        """Apply the time limits: disarm a campaign that nobody starts, and abort a run without a viewer."""
+        """Apply the time limits: disarm a campaign that nobody starts, and abort a run that has no viewer."""
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if since_s > STALL_S:  # this process was stalled, so viewers' requests had to wait
+        if since_s > STALL_S:  # this process was stalled and could not answer viewers
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -303,11 +323,11 @@ class RequestHandler:
     def outlives_its_parent(self) -> bool:
         """Whether work remains after the parent program has ended.
 
-        The work is an unattended campaign; afterwards the engine continues while a viewer attends it.
+        The work is an unattended campaign; after it, the engine continues while a viewer attends it.
         """
         if self.continues_unattended and not self._is_orphan:
             self._is_orphan = True
-            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer that sent the request has gone
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # the requesting viewer has gone
         return self.continues_unattended or (self._is_orphan and self._is_looked_after)
 
     @property
@@ -348,7 +368,7 @@ class RequestHandler:
     def _stop(self, request: StopRequest) -> None:
         self._stops += 1
         switch = None
-        while switch is not self._engine.switch:  # if a run starts in the meantime, it has a new switch
+        while switch is not self._engine.switch:  # a run that starts meanwhile has a new switch
             switch = self._engine.switch
             switch.ask(request)
             if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:

@@ -6,7 +6,6 @@ engine's own thread is busy.
 
 import errno
 import hmac
-import os
 import secrets
 import selectors
 import socket
@@ -14,17 +13,22 @@ from _thread import start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from threading import Lock, Thread
 from time import monotonic, sleep
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ..errors import AcquisitionError
+from ..host.toml_file import FrozenModel
 from ..stopping.program import Watchdog
+from ..stopping.stop import DescriptorReserve
 from ._client import EngineAddress, Hello, announce
 from ._request_handler import RequestHandler
 from ._status import ConnectionRole
-from ._verbs import DONE, REQUEST, VERBS
+from ._verbs import VERBS, answer_message
 from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireError, receive, refusal, send
 
 # Admission: connections without the token are limited in number, time and size.
@@ -36,7 +40,7 @@ WAITING_MOST = 64
 GREETING_S = 2.0
 """Time after which a connection that has not shown the token is closed [s]."""
 YOUNG_S = 0.01
-"""Shortest time that a connection gets to show the token, even if there are many connections [s]."""
+"""Shortest time that a connection has to show the token, even if there are many connections [s]."""
 _NO_ROOM = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
 Admitted = Callable[[socket.socket, ConnectionRole], None]
@@ -60,7 +64,7 @@ class Admission:
         self._admitted = admitted
         self._make_room = make_room
         self._waiting: dict[socket.socket, _Waiting] = {}  # ordered from the oldest to the newest
-        self._reserve: int | None = None
+        self._reserve = DescriptorReserve()
         self._wake, self._woken = socket.socketpair()
         self._selector = selectors.DefaultSelector()
         listening.setblocking(False)  # noqa: FBT003 - the socket's own parameter
@@ -79,10 +83,9 @@ class Admission:
 
     def _run(self) -> None:
         while True:
-            # Keep a file descriptor in reserve, for a connection when the limit of open files is reached.
-            if self._reserve is None:
-                with suppress(OSError):
-                    self._reserve = os.open(os.devnull, os.O_RDONLY)
+            # Reserve a file descriptor: a connection can use it when the limit of open files is reached.
+            with suppress(OSError):
+                self._reserve.hold()
             ready = {key.fileobj for key, _ in self._selector.select(self._timeout_s())}
             if self._woken in ready:
                 break
@@ -94,7 +97,7 @@ class Admission:
         for connection in tuple(self._waiting):
             self._turn_away(connection)
         self._selector.close()
-        self._give_reserve()
+        self._reserve.release()
 
     def _timeout_s(self) -> float | None:
         oldest = next(iter(self._waiting.values()), None)
@@ -112,7 +115,7 @@ class Admission:
         except OSError as error:
             if error.errno in _NO_ROOM:
                 sleep(YOUNG_S)
-            return  # any other error: the client closed the connection
+            return  # otherwise the client has closed the connection
         with suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setblocking(False)  # noqa: FBT003 - the socket's own parameter
@@ -128,7 +131,7 @@ class Admission:
                 raise
         if self._waiting:
             self._turn_away(next(iter(self._waiting)))
-        elif not self._give_reserve():
+        elif not self._reserve.release():
             self._make_room()
         return self._listening.accept()
 
@@ -174,12 +177,10 @@ class Admission:
         self._selector.unregister(connection)
         del self._waiting[connection]
 
-    def _give_reserve(self) -> bool:
-        if self._reserve is None:
-            return False
-        os.close(self._reserve)
-        self._reserve = None
-        return True
+
+_REQUESTS: Any = Annotated[reduce(or_, (verb.request for verb in VERBS.values())), Field(discriminator="ask")]
+REQUEST: TypeAdapter[FrozenModel] = TypeAdapter(_REQUESTS, config=FrozenModel.model_config)
+"""Validator of the JSON text of a request."""
 
 
 def answer_to(handler: RequestHandler, message: Message) -> Message:
@@ -187,7 +188,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
     try:
         arguments = dict(REQUEST.validate_json(message.text))
         verb = VERBS[arguments.pop("ask")]
-        return verb.answer.written(handler.carry_out(verb, arguments))
+        return answer_message(handler.carry_out(verb, arguments))
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
@@ -198,7 +199,7 @@ def answer_to(handler: RequestHandler, message: Message) -> Message:
 
 LOOPBACK = "127.0.0.1"
 VIEWERS_MOST = 16
-"""Maximum number of viewers (20 MB each if they do not read). A further one displaces the longest silent."""
+"""Largest number of viewers (20 MB each if they do not read); one more replaces the longest silent one."""
 REQUEST_S = 10.0
 """Time limit for receiving a request, from its first byte to its last [s]."""
 
@@ -241,20 +242,20 @@ class Server:
         if surplus > 0:
             self._make_room()
         try:
-            # Thread.start would wait until the thread runs, which never happens without memory.
+            # Do not use Thread.start, which waits until the thread runs: without free memory, for ever.
             start_new_thread(self._serve, (viewer,))
         except RuntimeError:  # the system refuses further threads
             self._leave(viewer)
 
     def _make_room(self) -> None:
-        """Disconnect the viewer that has been silent longest; an attending one only if there is no other."""
+        """Disconnect the viewer that has been silent longest; an attending viewer only if no other exists."""
         with self._coming_and_going:
             viewers = sorted(
                 self._viewers.values(),
                 key=lambda each: (each.role is ConnectionRole.ATTENDING, each.request_s),
             )
         if viewers:
-            # A shutdown wakes the viewer's thread from any wait; closing alone would not.
+            # Shut the connection down: this wakes the viewer's thread from any wait, which closing does not.
             with suppress(OSError):
                 viewers[0].connection.shutdown(socket.SHUT_RDWR)
 
@@ -267,7 +268,7 @@ class Server:
         """Answer one viewer until it disconnects. A viewer that does not read blocks only this thread."""
         try:
             self._note(viewer)
-            send(viewer.connection, DONE.written(None))
+            send(viewer.connection, answer_message(None))
             while True:
                 message = receive(viewer.connection, REQUESTS, REQUEST_S)
                 self._note(viewer)

@@ -12,7 +12,7 @@ from time import monotonic
 from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, stop_path, write_stop_file
 
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import member
+from ..host.toml_file import member
 from ..stopping.program import Program, engines_folder
 from ..stopping.stop import StopLevel
 from ._client import Announcement, EngineAddress, EngineClient, announced_engines
@@ -26,7 +26,7 @@ LOOK_S = 0.02
 
 
 class AdoptedEngine(ClosedOnLeaving):
-    """Engine taken over from a parent program that has ended; it ends with its campaign or on request."""
+    """Engine taken over from a parent program that has ended; it ends with the campaign, or on request."""
 
     def __init__(self, announcement: Announcement) -> None:
         self._announcement = announcement
@@ -48,7 +48,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def unattended_engine() -> Announcement | None:
-    """Return an engine that runs a campaign although its parent program has ended; None if there is none."""
+    """Return an engine that runs a campaign although its parent program has ended, or None."""
     for announcement in announced_engines():
         with suppress(EngineGone), EngineClient.attach(announcement.address) as client:
             if client.status().is_left_alone:
@@ -90,7 +90,7 @@ class EngineProcess(ClosedOnLeaving):
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        # Close the pipes last: an engine whose input ends assumes that its parent has ended.
+        # Close the pipes last: when its input ends, an engine assumes that its parent process has ended.
         self._close_pipes()
 
     def _close_pipes(self) -> None:
@@ -135,7 +135,7 @@ class StopDelivery(StrEnum):
     UNHEEDED = "unheeded"
     """The engine accepted the stop but has not confirmed that its output is off."""
     KEPT = "kept"
-    """The engine has not accepted the stop; its process is alive and will obey when it runs again."""
+    """The engine has not accepted the stop; its process exists and will obey when it runs again."""
 
 
 def stop_engine(
@@ -146,7 +146,7 @@ def stop_engine(
     The stop is written to a file in the state folder. The program obeys within 0.05 s, or when its process
     runs again. The function returns when the program has confirmed that its output is off, or after a time
     limit. If no file can be written, or the program does not read it, the stop is sent over the engine's
-    connection. A hold (pause) is sent, never written: a hold from a file may begin late. ``engine`` is
+    connection. A hold (pause) is never written to a file, because it may then begin late. ``engine`` is
     the announcement of the program, ``level`` is the kind of stop, and ``reason`` is stored in the recording.
 
     Raises
@@ -166,8 +166,8 @@ def stop_engine(
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(
-                f"process {engine.pid} ({engine.what}) is not an engine and cannot be held. It continues; "
-                "stop it with ramp, abort or off"
+                f"process {engine.pid} ({engine.what}) is not an engine and cannot be held. That process "
+                "continues; stop it with ramp, abort or off"
             )
         _send_stop(engine, level, reason)
         return StopDelivery.TOLD
@@ -196,7 +196,7 @@ def stop_engine(
 
 
 def _runs(engine: Program) -> bool:
-    """Whether the process runs at the time of the call; it may end during a stop."""
+    """Whether the process runs at the time of the call; the process may end during a stop."""
     return engine.is_alive
 
 
@@ -214,7 +214,7 @@ def _send_stop(engine: Announcement, level: StopLevel, reason: str) -> StopDeliv
 def _has_obeyed(client: EngineClient) -> bool:
     status = client.status()
     is_silent = status.run is not None and status.run.amplitude_vpp == 0.0
-    # Nothing plays before the first run of an engine and between two runs.
+    # Nothing plays before an engine's first run, nor between two runs.
     is_between = status.state in (EngineState.RUNNING, EngineState.HELD) and status.run is None
     return is_silent or is_between or status.state not in SOUNDING
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping
 from enum import StrEnum
 
-from ..bench.result import BenchReport
+from ..bench import BenchReport
 from ..host.toml_file import FrozenModel
 from ..plan import RunState
 from ..recording import UntilNote
@@ -56,13 +56,13 @@ class ConnectionRole(StrEnum):
     ATTENDING = "attending"
     """The client in charge of the run: if it sends no more requests, the run stops."""
     VISITING = "visiting"
-    """A viewer that does not keep the run alive."""
+    """A viewer whose requests do not keep the run going."""
 
 
 VIEWER_PATIENCE_S = 0.5
 """Time for which an attended run at a limit of the rig continues without requests [s]."""
 LONGEST_PATIENCE_S = 10.0
-"""Longest time without requests that an attended run can be granted [s]."""
+"""Longest time for which an attended run can be allowed to continue without requests [s]."""
 HUNG_FACTOR = 4.0
 """Factor that multiplies the allowed time without requests if a viewer reports a blocked window."""
 
@@ -95,7 +95,7 @@ class BenchFacts(FrozenModel):
     rig_name: str
     is_simulated: bool
     identities: Mapping[str, str]
-    """Identification reported by each instrument, by its role on the bench, such as ``"generator"``."""
+    """Identification reported by each instrument, keyed by the instrument's role, such as ``"generator"``."""
     channels: tuple[ChannelFacts, ...]
     sample_rate_hz: float
 
@@ -108,7 +108,7 @@ class ArmedPlan(FrozenModel):
     lines: tuple[str, ...]
     """Lines of text about signal, level, limits, duration and folder of the campaign."""
     expires_in_s: float
-    """Time after which the engine disarms itself."""
+    """Time after which the engine disarms itself [s]."""
     attendance: Supervision
     """Whether the run needs the presence of a viewer."""
     patience_s: float
@@ -157,7 +157,7 @@ class RowStatus(FrozenModel):
 
 
 class MessageKind(StrEnum):
-    """Severity of a message to the operator."""
+    """How severe a message to the operator is."""
 
     INFO = "info"
     WARNING = "warning"
@@ -165,7 +165,7 @@ class MessageKind(StrEnum):
 
 
 class EngineMessage(FrozenModel):
-    """An event: what happened, what was done about it, and what to do next."""
+    """A message on an event: what happened, what was done about the event, and what to do next."""
 
     number: int
     """Number of the message; each engine counts its messages from 1."""
@@ -190,7 +190,7 @@ class TwinStatus(FrozenModel):
     end_sample: int = 0
     """Number of the sample after the newest sample that the twin has used."""
     step_s: float = 0.0
-    """Time step of ``p_m`` [s]; the last value of ``p_m`` is at the newest sample."""
+    """Time step of ``p_m`` [s]; the last value of ``p_m`` is for the newest sample."""
     p_m: tuple[float | None, ...] = ()
     """Relative displacement of m1 [m]; None where the twin had lost track of the motion."""
     forecast_m: tuple[float, ...] = ()
@@ -202,13 +202,13 @@ class TwinStatus(FrozenModel):
     numbers: tuple[tuple[str, str], ...] = ()
     """Parameters estimated from this run's collisions: name, and value with 95 % bounds."""
     level: float | None = None
-    """Normalised innovation over the last 0.1 s: 1 for noise alone; None if the twin has lost the motion."""
+    """Normalised innovation over the last 0.1 s: 1 for noise alone; None if the twin lost the motion."""
     limit: float | None = None
     """Innovation above which a specimen change is suspected; None while the usual level is being learnt."""
     busy_share: float = 0.0
     """Processor time of the twin divided by the time since the run began."""
     missed_s: float = 0.0
-    """Duration of motion that the twin was too slow to track [s]; the recording contains it anyway."""
+    """Duration of motion that the twin was too slow to track [s]; the motion is in the recording."""
     behind_s: float = 0.0
     """Delay of the twin behind the newest sample, at its last report [s]."""
 
@@ -228,7 +228,7 @@ class EngineStatus(FrozenModel):
     rows_number: int = 0
     """Number that changes with every change in ``rows``; viewers need not fetch unchanged rows again."""
     overloads: int = 0
-    """Number of sample ranges beyond a channel's full scale in this run."""
+    """Number of ranges of samples beyond a channel's full scale in this run."""
     lost_blocks: int = 0
     """Number of gaps in the samples of this run."""
     disk_free_bytes: int = 0
@@ -237,16 +237,16 @@ class EngineStatus(FrozenModel):
     run_id: int = 0
     """Number of the recording, counted by this engine; data with another number are out of date."""
     twin: TwinStatus | None = None
-    """The live twin's last report; None without a twin."""
+    """The live twin's last report; None if there is no twin."""
     is_left_alone: bool = False
     """Whether the parent program has ended, the campaign continues, and nobody attends the engine."""
     messages: tuple[EngineMessage, ...] = ()
     """Newest messages to the operator, from oldest to newest."""
 
 
-# The live twin's process (decision 0044), started and ended by an engine, which never waits for it. It is a
-# viewer like any other (`vibench twin`): it requests samples and reports its results, but attends no run.
-# When it is too slow, it skips samples; the recording still contains them.
+# Process of the live twin (decision 0044). The engine starts and ends this process, but never waits for it.
+# The process is a viewer like any other (`vibench twin`): it requests samples and reports results, but
+# attends no run. If the process is too slow, it skips samples; the recording still contains these samples.
 
 ENDING_S = 2.0
 
@@ -266,7 +266,7 @@ class TwinProcess:
 
     @property
     def is_on(self) -> bool:
-        """Whether the twin was started; it may have ended by itself since."""
+        """Whether the twin was started; the twin may have ended by itself since."""
         return self._process is not None
 
     def turn(self, switch: TwinSwitch) -> None:

@@ -1,7 +1,7 @@
 """Messages between engine and clients: a short binary header, a JSON text, and optional samples.
 
 Nothing executable is sent: data from another process are parsed as JSON or read as numbers, never unpickled.
-The length declared in a header allocates no memory: only received bytes are kept, and each side limits the
+The length declared in a header allocates no memory: only received bytes are stored, and each side limits the
 length of a message.
 """
 
@@ -99,8 +99,8 @@ def send(connection: socket.socket, message: Message) -> None:
 def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
     """Return the next message; waits up to the connection's timeout, then ``within_s`` after the first byte.
 
-    Raises WireError when the connection ends or the data are not a message, and TimeoutError when no message
-    comes in time.
+    Raises WireError when the connection ends or when the data are not a message, and TimeoutError when no
+    message comes in time.
     """
     incoming = IncomingMessage(bounds)
     patience_s, until_s = connection.gettimeout(), None
@@ -117,7 +117,7 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
 
 
 class EngineError(AcquisitionError):
-    """The engine refuses a request; the text states the state of the engine and what is allowed."""
+    """The engine refuses a request; the text gives the state of the engine and what is allowed."""
 
 
 class EngineGone(EngineError, ConnectionError):

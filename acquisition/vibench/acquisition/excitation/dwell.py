@@ -1,4 +1,4 @@
-"""One sine at a constant frequency and level."""
+"""One sine at a constant frequency, at a fixed setting or at a base level held by feedback."""
 
 from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..recording import SegmentLabel
-from .plan import Family, FixedSine, LeadIn
+from .plan import AbstractFeedback, BaseLevel, Family, FixedSine, LeadIn, Settling
 from .steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
@@ -16,9 +16,9 @@ MOST_LEAD_INS = 1000
 class Dwell(FixedSine):
     """A sine at one frequency, recorded after it has settled.
 
-    An impacting specimen may have several motions at one frequency; which one occurs depends on the earlier
-    motion. The tones of ``lead_in`` therefore lead to the dwell, one after another with continuous phase.
-    They are recorded as a separate segment from which no result is computed.
+    An impacting specimen may have several motions at one frequency; which motion occurs depends on the
+    earlier motion. The tones of ``lead_in`` are therefore played before the dwell, one after another with
+    continuous phase. These tones are recorded as a separate segment, from which no result is computed.
     """
 
     family: ClassVar[Family] = Family.DWELL
@@ -30,7 +30,7 @@ class Dwell(FixedSine):
     duration_s: PositiveFloat
     """Recording time of the settled motion [s]."""
     lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
-    """Tones before the dwell, in the order played; if empty, the drive starts with the dwell."""
+    """Tones played before the dwell, in this order; if empty, the drive starts with the dwell."""
     lead_s: PositiveFloat = 0.5
     """Duration of each tone of ``lead_in`` [s]."""
 
@@ -72,10 +72,40 @@ class Dwell(FixedSine):
         return self.lead_in_s + self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """Yield the tones of the lead-in, as one segment, then the dwell."""
+        """Yield the tones of the lead-in as one segment, and then the dwell."""
         way = Segment(SegmentLabel.LEAD_IN, {"tones": len(self.lead_in)})
         for tone in self.lead_in:
             level = tone.amplitude_vpp / self.amplitude_vpp
             yield Step(Tone(tone.frequency_hz, level), 0.0, self.lead_s, way)
         segment = Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
         yield Step(Tone(self.frequency_hz), self.settle_s, self.duration_s, segment)
+
+
+class HeldDwell(FixedSine, AbstractFeedback):
+    """A dwell whose base motion is held at a level by feedback, before and during the recording."""
+
+    family: ClassVar[Family] = Family.DWELL
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
+    kind: Literal["held_dwell"] = "held_dwell"
+    base_level: BaseLevel
+    """Level of the base that feedback holds."""
+    settling: Settling = Settling()
+    """Criteria by which the motion counts as settled before the recording."""
+    duration_s: PositiveFloat
+    """Recording time of the settled motion [s]."""
+    update_s: PositiveFloat = 1.0
+    """Interval at which the level is measured, and corrected if needed, during the recording [s]."""
+
+    @property
+    def playing_s(self) -> float:
+        """Longest wait for settling plus recording time [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """Segment of the recording that begins after settling."""
+        return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
+
+    def steps(self) -> Iterator[Step]:
+        """Yield one step: the recording at the largest amplitude setting, without the wait before it."""
+        yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)

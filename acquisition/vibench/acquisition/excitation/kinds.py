@@ -10,20 +10,12 @@ from pydantic import BeforeValidator, Field
 
 from ..errors import ConfigurationError
 from ..instruments import PlugInKind, missing_package, plug_in, plug_in_names
-from .dwell import Dwell
-from .held_dwell import HeldDwell
-from .held_noise import HeldNoise
-from .held_response import HeldResponse
-from .held_sweep import HeldSweep
-from .odd_multisine import OddMultisine
+from .dwell import Dwell, HeldDwell
+from .noise import HeldNoise, OddMultisine, StreamedNoise, WhiteNoise
 from .plan import AbstractExcitation, AbstractFeedback, Family
 from .resonance_tracking import ResonanceTracking
-from .settled_sine import SettledSine
-from .sine_sweep import SineSweep
-from .stepped_level import SteppedLevel
-from .stepped_sine import SteppedSine
-from .streamed_noise import StreamedNoise
-from .white_noise import WhiteNoise
+from .sine_sweep import HeldSweep, SineSweep
+from .stepped_sine import HeldResponse, SettledSine, SteppedLevel, SteppedSine
 
 _Ours: TypeAlias = (
     WhiteNoise
@@ -41,7 +33,7 @@ _Ours: TypeAlias = (
     | HeldResponse
 )
 _LACKING: dict[str, str] = {}
-"""Reason why a kind from an installed package could not be loaded, by the name of the kind."""
+"""Reason why a kind from an installed package could not be loaded, keyed by the name of the kind."""
 
 
 def _of_packages() -> Iterator[type[AbstractExcitation]]:
@@ -134,7 +126,7 @@ _PRESENT_WORDS = {word: kind.word for kind in EXCITATION_KINDS.values() for word
 
 
 def present_word(word: str) -> str:
-    """Return the present name of the kind that this or an earlier version called ``word``.
+    """Return the present name of a kind, given its name ``word`` in this or an earlier version.
     An unknown name is returned unchanged.
     """
     return _PRESENT_WORDS.get(word, word)
@@ -143,7 +135,7 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Return a table entry (row) per kind: the row in ``of_kind`` if present, else the row of its family.
+    """Return a table entry (row) per kind: its row in ``of_kind`` if present, else the row of its family.
 
     ``of_packages`` is the group of entry points through which installed packages supply rows for the kinds
     that they add. See decision 0062. Raises KeyError when a row is given for an unknown kind.

@@ -1,20 +1,20 @@
-"""Base classes of all excitations: frozen plans that list the steps the generator plays."""
+"""Base classes of all excitations: frozen plans that list the steps to play, and settings of feedback."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from math import pi
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PositiveFloat, model_validator
 
 from ..errors import ConfigurationError
 from ..host.toml_file import FrozenModel
 from ..instruments import Samples, Sweep
 from ..recording import SegmentLabel
 from ..rig import Rig
-from .feedback import BaseLevel
 from .steps import (
     Approach,
     Direction,
@@ -27,6 +27,97 @@ from .steps import (
     Tone,
     Waveform,
 )
+
+MOST_PERIODS = 100_000
+Share = Annotated[float, Field(gt=0, lt=1)]
+HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
+"""Displacement to be held [m]. The bounds only catch wrong units; no sensor or shaker reaches them."""
+HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
+"""Acceleration to be held [m/s2]. The bounds only catch wrong units; no shaker reaches 10 000 g."""
+
+
+class Settling(FrozenModel):
+    """Criteria by which the motion of the specimen counts as settled.
+
+    Amplitude and phase of the first four harmonics are measured once per drive period. The motion is settled
+    with period k if these values repeat after k drive periods. A motion that does not repeat is settled if
+    its statistics are constant.
+    """
+
+    tolerance: Share = 0.01
+    """Largest deviation between repetitions of the motion, relative to the motion's rms value."""
+    periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
+    """Number of drive periods over which the motion must repeat."""
+    longest_period: int = Field(default=8, ge=1, le=32)
+    """Longest motion period that is searched for, in drive periods."""
+    aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
+    """Number of drive periods over which a non-repeating motion must have constant statistics."""
+    shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
+    """Shortest wait for settling at every frequency [s]."""
+    longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
+    """Longest wait at every frequency [s]; after it, the motion is recorded, marked as not settled."""
+
+    @model_validator(mode="after")
+    def _waits_in_order(self) -> Self:
+        if self.shortest_wait_s > self.longest_wait_s:
+            raise ValueError(
+                f"shortest_wait_s = {self.shortest_wait_s:g} is longer than longest_wait_s = "
+                f"{self.longest_wait_s:g}; lower the first or raise the second"
+            )
+        return self
+
+
+class BaseLevel(FrozenModel):
+    """Level of the base's motion that feedback holds by adjusting the generator's amplitude.
+
+    Only the fundamental of the base motion is held; impacts add motion at other frequencies.
+    ``amplitude_vpp`` of the plan is then the largest setting that feedback may use.
+    """
+
+    acceleration_m_per_s2: HeldMetresPerS2 | None = None
+    """Peak acceleration of the fundamental [m/s2]; give either this key or ``displacement_m``."""
+    displacement_m: HeldMetres | None = None
+    """Peak displacement of the fundamental at every frequency [m]; give this or ``acceleration_m_per_s2``."""
+    tolerance: Share = 0.025
+    """Allowed deviation of the measured level from the level to be held, relative to the latter."""
+    most_change: float = Field(default=1.25, gt=1, le=4)
+    """Largest factor by which one correction changes the amplitude setting."""
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        if (self.acceleration_m_per_s2 is None) == (self.displacement_m is None):
+            raise ValueError("give either acceleration_m_per_s2 or displacement_m, and not both")
+        return self
+
+    @property
+    def quantity(self) -> str:
+        """The quantity of the base motion that is held: ``"acceleration"`` or ``"displacement"``."""
+        return "acceleration" if self.displacement_m is None else "displacement"
+
+    @property
+    def text(self) -> str:
+        """The held level as text with its unit."""
+        if self.displacement_m is not None:
+            return f"{1e6 * self.displacement_m:g} µm"
+        return f"{self.acceleration_m_per_s2:g} m/s²"
+
+    def acceleration_at(self, frequency_hz: float) -> float:
+        """Return the peak base acceleration to be held at ``frequency_hz`` [m/s2]."""
+        if self.displacement_m is not None:
+            return self.displacement_m * (2 * pi * frequency_hz) ** 2
+        assert self.acceleration_m_per_s2 is not None, "the validator requires one of the two"
+        return self.acceleration_m_per_s2
+
+
+class JumpSearch(FrozenModel):
+    """Criterion by which a change between two steps counts as a jump, and how precisely a jump is located."""
+
+    factor: float = Field(default=1.5, gt=1, le=100)
+    """A change of Response II (fundamental of m0 over base) by more than this factor counts as a jump."""
+    resolution_hz: PositiveFloat = 0.25
+    """Largest allowed spacing of the two frequencies that enclose a located jump [Hz]."""
+    most_searches: int = Field(default=6, ge=1, le=50)
+    """Largest number of searches for jumps in one pass, including searches that find only a steep slope."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +136,6 @@ class SignalPreview:
     peak_v: float
     duration_s: float
     """Duration of the whole excitation, including settling but not ramps [s]."""
-
-    @property
-    def crest_factor(self) -> float:
-        """Peak value of the signal divided by its rms value."""
-        return self.peak_v / self.rms_v
 
 
 def _sample(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
@@ -97,12 +183,12 @@ def _cycles_of(play: Play) -> float:
 AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
 """Amplitude setting [Vpp]. The bound only catches wrong units; the generator's own limits are narrower."""
 HIGHEST_FREQUENCY_HZ = 1e5
-"""Upper bound on every frequency, above the range of any shaker [Hz]."""
+"""Upper bound on every frequency of a plan [Hz], above the range of any shaker."""
 FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
 
 
 class Family(StrEnum):
-    """Families of kinds of excitation; all kinds of a family share their analysis and figures."""
+    """Families of kinds of excitation; all kinds of one family have the same analysis and figures."""
 
     NOISE = "noise"
     """Noise or a multisine, which excites the whole band at once."""
@@ -122,7 +208,7 @@ class LeadIn(FrozenModel):
 
 
 def band_around(frequency_hz: float) -> tuple[float, float]:
-    """Return the band assigned to a single sine: from one octave below it to one octave above it [Hz]."""
+    """Return the band of a single sine: from an octave below its frequency to an octave above [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
 
@@ -143,8 +229,8 @@ class AbstractExcitation(FrozenModel, ABC):
         """Yield the steps that the generator plays, in chronological order."""
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield the steps with which limits are checked. These are the planned steps, or larger signals that
-        feedback may reach.
+        """Yield the steps with which limits are checked. These steps are the planned steps, or larger signals
+        that feedback may reach.
         """
         return self.steps()
 
@@ -160,7 +246,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def lowest_amplitude_vpp(self) -> float:
-        """Lowest amplitude setting outside ramps, peak to peak [V]."""
+        """Lowest amplitude setting except during ramps, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property
@@ -195,7 +281,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at each frequency if the drive changes frequency without a pause [s]; otherwise None."""
+        """Time at each frequency [s], if the drive changes frequency without a pause; otherwise None."""
         return None
 
     @property
@@ -205,7 +291,7 @@ class AbstractExcitation(FrozenModel, ABC):
 
     @property
     def lead_in_s(self) -> float:
-        """Duration of the lead-in [s]; 0 without a lead-in."""
+        """Duration of the lead-in [s]; 0 if there is no lead-in."""
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
@@ -215,18 +301,18 @@ class AbstractExcitation(FrozenModel, ABC):
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
-        """Return this excitation with lead-in ``way``, and its own tone; None if it allows no lead-in."""
+        """Return this excitation with lead-in ``way``, and its own tone; None if lead-ins are not allowed."""
         del way, lead_s
         return None
 
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Duration of all steps, including settling but not ramps [s]; with feedback, the maximum."""
+        """Duration of all steps, with settling, without ramps [s]; with feedback, the longest duration."""
 
     @property
     def stretches(self) -> int:
-        """Number of times the drive starts from silence: one for sines, one per waveform for noise."""
+        """Number of times the drive starts from silence: once for sines, once per waveform for noise."""
         return 1
 
     @property
@@ -293,7 +379,7 @@ class AbstractFeedback(AbstractExcitation):
     def held_levels(self) -> tuple[BaseLevel, ...]:
         """Levels of the base to be held, in the order played; empty if feedback holds no level of a sine.
 
-        Here: the field ``base_level``, if the excitation has it.
+        Here: the field ``base_level``, if the excitation has this field.
         """
         level: BaseLevel | None = getattr(self, "base_level", None)
         return () if level is None else (level,)
@@ -306,7 +392,7 @@ class AbstractFeedback(AbstractExcitation):
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Return the highest base level that is held, or the amplitude setting if none is held."""
+        """Return the highest base level that is held, or the amplitude setting if no level is held."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 

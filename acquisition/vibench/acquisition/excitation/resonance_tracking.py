@@ -8,20 +8,28 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import PhaseReference
 
 from ..recording import SegmentLabel
-from .feedback import MOST_PERIODS, BaseLevel, HeldMetresPerS2, Settling, Share
-from .plan import AbstractFeedback, Family, FrequencyHz
+from .plan import (
+    MOST_PERIODS,
+    AbstractFeedback,
+    BaseLevel,
+    Family,
+    FrequencyHz,
+    HeldMetresPerS2,
+    Settling,
+    Share,
+)
 from .steps import Segment, Step, Tone
 
 _MOST_CHANGE = 1.6
-"""Largest factor per change of the amplitude setting; large, because a level has only 150 loop periods."""
+"""Largest factor for one change of the amplitude setting; large, as a level has only 150 loop periods."""
 
 
 class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: the mode's backbone.
 
     At resonance the motion of m0, relative or absolute, lags the base by a quarter of a period. At the first
-    level, the resonance is searched for in settled motion. Then a phase-locked loop, which acts every ten
-    periods, follows the resonance from level to level; if it loses the resonance, the search is repeated.
+    level, the resonance is searched for in settled motion. A phase-locked loop, which acts every ten periods,
+    then follows the resonance from level to level; if the loop loses the resonance, the search is repeated.
     Other modes shift the phase a little. While the motion is linear, measurements on both flanks give the
     natural frequency and the damping without this shift.
 
@@ -41,17 +49,17 @@ class ResonanceTracking(AbstractFeedback):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.RESONANCE,)
     kind: Literal["resonance_tracking"] = "resonance_tracking"
     start_hz: FrequencyHz
-    """Frequency at which the search starts [Hz]; it must be nearer to the tracked mode than to any other."""
+    """Frequency at which the search starts [Hz]; the tracked mode must be the nearest mode."""
     low_hz: FrequencyHz
     """Lowest frequency of the search [Hz]."""
     high_hz: FrequencyHz
     """Highest frequency of the search [Hz]."""
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
-    """Phase of m0 relative to the base that defines resonance, from displacements [degrees]."""
+    """Phase of m0's displacement relative to the base displacement that defines resonance [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 whose phase is used: relative to the base, or absolute."""
     harmonic: Literal[1, 2, 3] = 1
-    """Harmonic n of m0 whose phase is used. For n > 1 it is the phase of the absolute motion minus n times
+    """Harmonic n of m0 whose phase is used. For n > 1, this is the phase of the absolute motion minus n times
     the phase of the base."""
     subharmonic: Literal[1, 2, 3] = 1
     """Number n of drive periods in one period of m0. For n > 1, n times the phase of the absolute motion is
@@ -61,8 +69,8 @@ class ResonanceTracking(AbstractFeedback):
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
     sensor_gain: Share = 0.01
-    """Relative standard uncertainty of the ratio of the two sensors' sensitivities. It affects the phase of
-    the relative motion."""
+    """Relative standard uncertainty of the ratio of the two sensors' sensitivities. This uncertainty affects
+    the phase of the relative motion."""
     accelerations_m_per_s2: tuple[HeldMetresPerS2, ...] = Field(min_length=1, max_length=100)
     """Peak accelerations of the fundamental of the base motion, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
@@ -70,13 +78,13 @@ class ResonanceTracking(AbstractFeedback):
     settling: Settling = Settling()
     """Criteria by which the motion counts as settled."""
     widest_step_hz: PositiveFloat = 1.0
-    """Largest frequency step of the search [Hz]; must be below the distance to the next antiresonance."""
+    """Largest frequency step of the search [Hz]; smaller than the distance to the next antiresonance."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """Largest number of frequencies at which one level's search may measure."""
     most_periods: int = Field(default=150, ge=30, le=MOST_PERIODS)
     """Largest number of drive periods of the phase-locked loop for one level."""
     flank_pairs: int = Field(default=3, ge=0, le=10)
-    """Pairs of frequencies, one on each flank, to measure the mode's natural frequency and damping."""
+    """Number of frequency pairs (one on each flank) that measure natural frequency and damping."""
     record_s: PositiveFloat = 1.0
     """Recording time at each resonance [s]."""
 
@@ -106,12 +114,12 @@ class ResonanceTracking(AbstractFeedback):
     def motion(self, harmonics: Sequence[complex]) -> complex:
         """Return the complex motion whose phase is compared with ``phase_deg``.
 
-        The first of ``harmonics`` (m0 over base) has m0's period, which is longer for a subharmonic.
+        The first of ``harmonics`` (m0 over base) has the period of m0, which is longer for a subharmonic.
         """
         if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])
         moved = harmonics[self.harmonic - 1]
-        # The cube of a sine has a sine at three times its phase; the square has a cosine at twice its phase.
+        # The cube of a sine contains a sine of triple phase; the square, a cosine of double phase.
         turned = -1j if 2 in (self.harmonic, self.subharmonic) else 1.0
         return turned * moved * (moved / max(abs(moved), 1e-300)) ** (self.subharmonic - 1)
 
@@ -122,7 +130,7 @@ class ResonanceTracking(AbstractFeedback):
 
     @property
     def playing_s(self) -> float:
-        """Duration of all levels if each search takes its longest time [s]."""
+        """Duration of all levels if every search takes the longest time [s]."""
         tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
         return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 

@@ -9,15 +9,15 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..instruments import Spacing, Sweep
 from ..recording import SegmentLabel
-from .plan import AbstractExcitation, Family, FrequencyHz
+from .plan import AbstractExcitation, AbstractFeedback, BaseLevel, Family, FrequencyHz, Settling
 from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 
 
 class Hold(StrEnum):
     """Quantity of the base motion whose amplitude stays about constant along a sweep, without feedback.
 
-    Above the suspension resonance, a shaker's acceleration is proportional to its voltage. The motion is
-    only as constant as this assumption is accurate; the recording contains the real motion of the base.
+    Above the suspension resonance, a shaker's acceleration is proportional to its voltage. The motion is only
+    as constant as this proportionality is exact; the recording contains the real motion of the base.
     """
 
     ACCELERATION = "acceleration"
@@ -25,7 +25,7 @@ class Hold(StrEnum):
     VELOCITY = "velocity"
     """The amplitude setting grows in proportion to frequency."""
     DISPLACEMENT = "displacement"
-    """The setting grows with the square of the frequency, as for the model in the paper."""
+    """The amplitude setting grows with the square of the frequency, as for the model in the paper."""
 
     @property
     def power(self) -> int:
@@ -49,7 +49,7 @@ MOST_SWEEP_STEPS = 1_000_000
 class MovingSine(AbstractExcitation):
     """A sine sweep, up or down, whose frequency the computer changes in steps.
 
-    Each step plays the ideal sweep's mean frequency over that step. The phase at the end of every step
+    Each step plays the mean frequency of the ideal sweep during that step. The phase at the end of every step
     therefore equals the phase of the ideal sweep. The recorded drive shows what the generator really played.
     """
 
@@ -81,7 +81,7 @@ class MovingSine(AbstractExcitation):
         if self.duration_s / self.step_s > MOST_SWEEP_STEPS:
             raise ValueError(
                 f"a sweep of {self.duration_s:g} s with step_s = {self.step_s:g} has "
-                f"{self.duration_s / self.step_s:.3g} steps, at most {MOST_SWEEP_STEPS} are allowed; give a "
+                f"{self.duration_s / self.step_s:.3g} steps (at most {MOST_SWEEP_STEPS} are allowed); give a "
                 "longer step_s"
             )
         return self
@@ -123,8 +123,8 @@ class MovingSine(AbstractExcitation):
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
         """Yield mean frequency [Hz] and duration [s] of each step, in chronological order."""
-        # The factor 1 - 1e-9 prevents an extra tiny step if rounding errors make the number of steps slightly
-        # larger than a whole number.
+        # If rounding errors make the number of steps slightly larger than a whole number, the factor 1 - 1e-9
+        # prevents an extra tiny step.
         count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         for number in range(count):
             begin_s = number * self.step_s
@@ -153,18 +153,18 @@ class SineSweep(MovingSine):
         if self.swept_by is SweptBy.GENERATOR and self.hold is not Hold.ACCELERATION:
             raise ValueError(
                 f"hold = {self.hold.value!r} changes the amplitude during the sweep, but the generator's own "
-                "sweep keeps its amplitude; use swept_by = 'computer', or hold = 'acceleration'"
+                "sweep keeps the amplitude constant; use swept_by = 'computer', or hold = 'acceleration'"
             )
         return self
 
     @property
     def own_sweep_s(self) -> float | None:
-        """Duration of the generator's own sweep [s]; None if the computer changes the frequency."""
+        """Duration of the generator's internal sweep [s]; None if the computer changes the frequency."""
         return self.duration_s if self.swept_by is SweptBy.GENERATOR else None
 
     @property
     def glide_step_s(self) -> float | None:
-        """Time at one frequency [s]; None for the generator's own sweep."""
+        """Time at one frequency [s]; None for the generator's internal sweep."""
         return self.step_s if self.swept_by is SweptBy.COMPUTER else None
 
     @property
@@ -186,14 +186,14 @@ class SineSweep(MovingSine):
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """Return one step per ``step_s``, all in one segment; the generator's own sweep is one step."""
+        """Return one step per ``step_s``, all in one segment; the generator's internal sweep is one step."""
         if self.swept_by is SweptBy.GENERATOR:
             segment = self.segment_with(self.hold.value)
             return iter((Step(self.course, self.settle_s, self.duration_s, segment),))
         return self.loudest_steps()
 
     def loudest_steps(self) -> Iterator[Step]:
-        """Yield one step per ``step_s``, even for the generator's own sweep."""
+        """Yield one step per ``step_s``, even for the generator's internal sweep."""
         segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():
@@ -203,3 +203,35 @@ class SineSweep(MovingSine):
     def shown_steps(self) -> Iterator[Step]:
         """Yield the whole sweep, without the wait before it."""
         return (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())
+
+
+class HeldSweep(MovingSine, AbstractFeedback):
+    """A sweep whose amplitude setting is corrected after every step from the measured base motion.
+
+    A sweep does not wait for the level to settle. If the gain from the setting to the base motion changes
+    within a few steps, the level is wrong during these steps; the recording states where.
+    """
+
+    kind: Literal["held_sweep"] = "held_sweep"
+    base_level: BaseLevel
+    """Level of the base that feedback holds."""
+    average_s: PositiveFloat = 0.5
+    """Averaging time of the level, to reduce random errors [s]; a lasting change is tracked faster."""
+    settling: Settling = Settling()
+    """Criteria by which the motion counts as settled before the sweep."""
+
+    @property
+    def playing_s(self) -> float:
+        """Longest wait at the start plus duration of the sweep [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """The segment of the sweep."""
+        return self.segment_with(f"measured {self.base_level.quantity}")
+
+    def steps(self) -> Iterator[Step]:
+        """Yield one step for every ``step_s``, all in one segment and at the largest amplitude setting."""
+        segment = self.segment
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz), 0.0, duration_s, segment)

@@ -11,7 +11,7 @@ from ..stopping.stop import MEMORY_RESERVE
 
 
 class Beside:
-    """Thread that runs jobs in order; it is started before any signal is played.
+    """Thread that runs jobs in order. The thread is started before any signal is played.
 
     A later start could hang: if memory runs out while a thread starts, CPython waits forever for the thread.
     """
@@ -21,7 +21,7 @@ class Beside:
         self.is_busy = self._is_closing = False
         """Whether a job is running or queued in the helper thread."""
         self._changed = Condition()
-        with suppress(RuntimeError):  # if the system refuses a thread, no job is done
+        with suppress(RuntimeError):  # if the system refuses the thread, jobs are not done
             Thread(target=self._run, name=name, daemon=True).start()
 
     def do(self, job: Callable[[], None]) -> None:

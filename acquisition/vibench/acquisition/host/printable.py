@@ -22,7 +22,7 @@ def printable(text: str) -> str:
 
 
 def shorten(text: str, longest: int = LONGEST_CLAUSE) -> str:
-    """Return the text, with three dots in place of the middle if it is long.
+    """Return the text, with three dots in place of its middle if the text is long.
 
     >>> shorten("0123456789", 7)
     '01...89'

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from ..errors import ConfigurationError
 
 VERSION = 1
-"""Version of all schemas; it changes when old files become invalid."""
+"""Version of all schemas; the version changes when old files become invalid."""
 FORMAT = "format_version"
 """Key of a file's version; a file without this key has the current version."""
 DRAFT = "http://json-schema.org/draft-04/schema#"
@@ -100,7 +100,7 @@ SCHEMAS: Mapping[str, _Kind] = {
     "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
     "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
 }
-"""Schemas by kind of file. Models are imported when needed, because they are in higher packages."""
+"""Schemas by kind of file. Models are imported only when needed, because they belong to higher packages."""
 
 
 def json_schema(kind: str) -> Json:
@@ -128,7 +128,7 @@ def schema_line(model: BaseModel, schemas: Path) -> str:
 
 
 def _draft_4(part: Any) -> Any:
-    """Convert a schema of pydantic (draft 2020-12) to draft 4, without null, which TOML lacks."""
+    """Convert a schema of pydantic (draft 2020-12) to draft 4; omit null, which TOML does not have."""
     match part:
         case list():
             return [_draft_4(each) for each in part]

@@ -2,9 +2,11 @@
 
 import json
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
+from enum import StrEnum
 from itertools import compress
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -20,19 +22,19 @@ from vibench.sim import (
 from vibench.sim.operating_system.this import replace_file
 
 from ..errors import ConfigurationError
+from .installation import shipped_folder
 from .printable import leading, shorten
 from .schema import FORMAT, VERSION, schema_line
-from .shipped import shipped_folder
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
-    """Read a TOML file as an instance of ``model``; paths in it are relative to its folder.
+    """Read a TOML file as an instance of ``model``; paths in the file are relative to the file's folder.
 
     Validators receive the file's folder as ``folder`` in their context.
 
-    Raises ConfigurationError when the file is missing, is not TOML, or contains something that the model does
+    Raises ConfigurationError when the file is missing, is not TOML, or contains anything that the model does
     not allow.
     """
     try:
@@ -50,14 +52,14 @@ def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
         raise ConfigurationError(
-            f"{path}: {FORMAT} = {_text_of(written)} cannot be read; this version of vibench reads 1 to "
-            f"{VERSION}: install a later vibench"
+            f"{path}: {FORMAT} = {_text_of(written)} cannot be read; this version of vibench reads versions "
+            f"1 to {VERSION}: install a later version"
         )
     return validate(content, model, str(path), path.absolute().parent)
 
 
 def validate(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
-    """Validate ``content`` of TOML or JSON as ``model``; paths in it are relative to ``folder``.
+    """Validate ``content`` of TOML or JSON as ``model``; paths in the content are relative to ``folder``.
 
     Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow the content.
     """
@@ -67,7 +69,7 @@ def validate(content: dict[str, Any], model: type[Model], origin: str, folder: P
         raise ConfigurationError(f"{origin}: {complaints(error, content, model)}") from error
     except ArithmeticError as error:
         raise ConfigurationError(
-            f"{origin}: a number is too large or too small to compute with ({error}); correct it"
+            f"{origin}: a number is too large or too small to compute with ({error}); correct this number"
         ) from error
 
 
@@ -81,7 +83,7 @@ Place = tuple[str | int, ...]
 
 
 def complaints(error: ValidationError, content: object, model: type[BaseModel], within: Place = ()) -> str:
-    """Return one clause for each fault, one for all missing keys, and one for all unknown keys.
+    """Return one clause for each fault, one clause for all missing keys, and one clause for all unknown keys.
 
     The ``content`` of the file serves to distinguish keys from the type names that pydantic adds to paths.
     Faults outside the path ``within`` are left out.
@@ -150,7 +152,7 @@ def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
-    """Return, for each part of the path to a fault, True if it is a key of the file, False if it is a type.
+    """For each part of the path to a fault, return whether the part is a key of the file (else a type).
 
     pydantic adds the type after a key with several types: ``frequency_hz``, ``Range``, ``step``. A key of the
     file may have the name of a type.
@@ -170,7 +172,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _closeness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Return how well a value fits a type: a fault in its content or size counts less than a wrong type."""
+    """Return how well a value fits a type: a fault in content or size counts less than a wrong type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
@@ -187,14 +189,14 @@ def _complaint(detail: Any) -> str:
     reason = shorten(fault_in_words(detail))
     if not detail["loc"]:
         return reason
-    # A table is too long to show; the reason names the wrong entry.
+    # Do not show a whole table, which is too long; the reason names the wrong entry.
     given = "" if _is_nested(detail["input"]) else f" = {_text_of(detail['input'])}"
     return f"{_key(detail['loc'])}{given}: {reason[0].lower()}{reason[1:]}"
 
 
 def _text_of(value: object) -> str:
     longest = 60
-    # Formatting a whole list of a million numbers would take too long.
+    # Shorten lists while formatting: a whole list of a million numbers would take too long.
     match value:
         case list() | tuple() | dict():
             text = reprlib.repr(value)
@@ -233,7 +235,7 @@ def save_toml(model: BaseModel, path: Path) -> None:
             coming.write_text(schema + toml_text(model), encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(
-            f"{path}: cannot be written ({error.strerror}); save it elsewhere"
+            f"{path}: cannot be written ({error.strerror}); save the file elsewhere"
         ) from error
 
 
@@ -258,7 +260,7 @@ def _is_nested(value: Value) -> bool:
 def _value(value: Value) -> str:
     match value:
         case str():
-            # JSON's escapes are valid in TOML, which also requires DEL to be escaped.
+            # JSON's escapes are valid in TOML. TOML also requires an escape for DEL.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case bool():
             return "true" if value else "false"
@@ -268,3 +270,29 @@ def _value(value: Value) -> str:
             return f"[{', '.join(_value(element) for element in value)}]"
         case dict():
             return f"{{ {', '.join(f'{key} = {_value(element)}' for key, element in value.items())} }}"
+
+
+Choice = TypeVar("Choice", bound=StrEnum)
+
+
+def member(kind: type[Choice], given: Choice | str) -> Choice:
+    """Return the given member, or the member with the given value; ConfigurationError if there is none.
+
+    >>> from enum import StrEnum
+    >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])
+    >>> member(Ground, "clay")
+    <Ground.CLAY: 'clay'>
+    """
+    try:
+        return kind(given)
+    except ValueError as unknown:
+        raise ConfigurationError(
+            f"{given!r} is not a value of {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
+        ) from unknown
+
+
+@dataclass(frozen=True)
+class ChosenFrom:
+    """Marker in the ``Annotated`` type of a text field whose value is usually chosen from a list."""
+
+    texts: Callable[[], Iterable[str]]

@@ -1,4 +1,4 @@
-"""Guard for plug-ins: it turns an exception or value that violates the protocol into a short error.
+"""Guard for plug-ins: it turns an exception, or a value that violates the protocol, into a short error.
 
 Vibench's own drivers are not guarded: an unexpected exception is a bug and needs its traceback.
 """
@@ -35,14 +35,14 @@ class PlugInKind(StrEnum):
     DRIVE = "vibench.drives"
     """Source that plays instead of the generator, named after its table in the hardware configuration."""
     VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
-    """Simulation of such a source, named after the same table of the hardware configuration, or of a USB
-    generator, named after its vendor number: ``0x0699``."""
+    """Simulation of such a source, named after the same table of the hardware configuration; or simulation of
+    a USB generator, named after its vendor number: ``0x0699``."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
 _SENSORS = "vibench.acquisition.rig"
-# Listed here, not in package metadata: a checkout with other drivers then needs no new installation
-# (docs/decisions/0053-instruments-by-plug-in.md).
+# The package metadata do not list these plug-ins: a checkout with other drivers then needs no new
+# installation (docs/decisions/0053-instruments-by-plug-in.md).
 OURS = tuple(
     EntryPoint(name, target, kind)
     for kind, name, target in (
@@ -70,7 +70,7 @@ def missing_package(name: str) -> str | None:
     """Return a sentence that names the package to install for a name such as ``"branch_continuation"``.
 
     ``name`` is a word in a plan or hardware configuration. Returns None if no extension of vibench provides
-    it, or the extension is installed.
+    it, or if the extension is installed.
     """
     folder = FOUND_IN.get(name)
     installed = (row.module for rows in _installed_plug_ins(tuple(sys.path)).values() for row in rows)
@@ -91,7 +91,7 @@ def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
 def require_plug_in(kind: PlugInKind, name: str, given: str = "") -> None:
     """Check that an installed package provides ``name``, a plug-in of this ``kind``.
 
-    Raises ConfigurationError when none does; ``given`` begins its sentence.
+    Raises ConfigurationError when no package does; ``given`` begins the text of the error.
     """
     if name not in (names := plug_in_names(kind)):
         absent = (
@@ -155,7 +155,7 @@ class PlugInGuard:
     """Wrapper of an instrument or driver that passes on only values that its protocol allows."""
 
     def __init__(self, held: Any, promise: type, name: str) -> None:
-        """Wrap ``held``, which errors call ``name``: ``"'plain_scpi' of vibench.generators"``."""
+        """Wrap the object ``held``, which errors call ``name``: ``"'plain_scpi' of vibench.generators"``."""
         self._held = held
         self._promise = promise
         self._name = name

@@ -21,7 +21,7 @@ Counts = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Identity:
-    """Identity that an instrument reports; it is stored with every recording."""
+    """Identity that an instrument reports; every recording contains this identity."""
 
     maker: str
     model: str
@@ -30,11 +30,11 @@ class Identity:
     reply: str
     """The instrument's whole reply, unchanged."""
     origin: str = ""
-    """Origin of the samples, if the instrument reports ``"simulated"`` or ``"imported"``; otherwise empty."""
+    """Origin of the samples as reported by the instrument, ``"simulated"`` or ``"imported"``; else empty."""
 
 
 class Knob(FrozenModel):
-    """Setting made by hand that no instrument reports; the operator must confirm it."""
+    """Setting made by hand that no instrument reports; the operator must confirm the setting."""
 
     instrument: str
     setting: str
@@ -68,7 +68,7 @@ class Overload:
 
 @dataclass(frozen=True)
 class Block:
-    """Samples of all channels from one read; there is no gap after the previous block."""
+    """Samples of all channels from one read, which follow those of the previous block without a gap."""
 
     first_sample: int
     """Number of the block's first sample in the run."""
@@ -76,8 +76,8 @@ class Block:
     """Voltages at the converter's input, shape (channels, samples) [V]."""
     overloads: tuple[Overload, ...] = ()
     counts: Counts | None = None
-    """Integers of the converter, recorded unchanged; multiply by `Digitizer.volts_per_count` to get volts.
-    None if the converter gives only volts."""
+    """Integers of the converter, recorded unchanged; multiply them by `Digitizer.volts_per_count` to get
+    volts. None if the converter gives only volts."""
 
 
 def _not_zero(units: float) -> float:
@@ -166,14 +166,14 @@ class FunctionGenerator(Protocol):
 
     @property
     def unconfirmed(self) -> tuple[Knob, ...]:
-        """Settings that could be neither made nor read remotely: the operator must confirm them."""
+        """Settings that could be neither made nor read remotely; the operator must confirm these settings."""
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
         """Smallest and largest amplitude that this bench allows, peak to peak [V]."""
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Set up a sine. The output stays on if it was on, and off if it was off."""
+        """Set up a sine. The output keeps its state: on or off."""
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Load one period of values and select it; -1 and 1 are the two ends of ``amplitude_vpp``."""
@@ -291,7 +291,7 @@ class AnalogOutput(Protocol):
         """
 
     def arm(self) -> None:
-        """Prepare to start with the digitizer, after the first samples were written; both share sample 0."""
+        """After the first samples were written, prepare to start with the digitizer; both share sample 0."""
 
     def stop(self) -> None:
         """Go to zero volts at once. May be called at any time; the next `write` begins a new stream."""
@@ -332,7 +332,7 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
     if block.volts.ndim != 2 or block.volts.shape[0] != rows or block.volts.shape[1] == 0:
         raise InstrumentError(
             f"the converter returned a block of shape {block.volts.shape}, but {samples} samples of "
-            f"{rows} channels were requested; its driver must wait for all of them, or raise "
+            f"{rows} channels were requested; its driver must wait for all samples, or raise "
             "InstrumentLost"
         )
     if not np.isfinite(block.volts).all():
@@ -342,7 +342,7 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
         )
     if unknown := {each.channel for each in block.overloads} - set(digitizer.roles):
         raise InstrumentError(
-            f"the converter reports overloads of channels {shorten(repr(sorted(unknown)))}; it has "
+            f"the converter reports overloads of channels {shorten(repr(sorted(unknown)))}; its channels are "
             f"{', '.join(digitizer.roles)}. Check that no other program changed its task"
         )
     return block

@@ -1,11 +1,11 @@
 """Plans (excitations, measurements, sweeps, campaigns) and their predicted effect on the rig.
 
-A `Measurement` is one excitation with its ramps and the limits during its run. A `Campaign` is an ordered
-list of measurements and nested sweeps, read from TOML. Before any motion, a model of the rig predicts the
-loads of a plan (`predicted_loads`). `MeasurementPreview` compares the loads with the rig's limits. Plans are
-frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
-no instrument and does not depend on bench or run. Chains of points:
-docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
+A `Measurement` is one excitation with its ramps and with the limits during the run. A `Campaign` is an
+ordered list of measurements and nested sweeps, read from TOML. Before any motion, a model of the rig predicts
+the loads of a plan (`predicted_loads`). `MeasurementPreview` compares the loads with the rig's limits. Plans
+are frozen and validated. Frequencies are in Hz, times in s, amplitudes peak to peak in V. This package opens
+no instrument and does not depend on bench or run. Chains of points: docs/decisions/0014-chains-of-points.md.
+Feedback: docs/feedback.md.
 
 >>> from vibench.acquisition.plan import Measurement, SineSweep, duration_s
 >>> sweep = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=6)
@@ -13,11 +13,7 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 11.0
 """
 
-from ..excitation.dwell import Dwell as Dwell
-from ..excitation.held_dwell import HeldDwell as HeldDwell
-from ..excitation.held_noise import HeldNoise as HeldNoise, SpectrumPoint as SpectrumPoint
-from ..excitation.held_response import HeldResponse as HeldResponse
-from ..excitation.held_sweep import HeldSweep as HeldSweep
+from ..excitation.dwell import Dwell as Dwell, HeldDwell as HeldDwell
 from ..excitation.kinds import (
     EXCITATION_KINDS as EXCITATION_KINDS,
     Excitation as Excitation,
@@ -26,7 +22,13 @@ from ..excitation.kinds import (
     present_word as present_word,
     rows_by_kind as rows_by_kind,
 )
-from ..excitation.odd_multisine import OddMultisine as OddMultisine
+from ..excitation.noise import (
+    HeldNoise as HeldNoise,
+    OddMultisine as OddMultisine,
+    SpectrumPoint as SpectrumPoint,
+    StreamedNoise as StreamedNoise,
+    WhiteNoise as WhiteNoise,
+)
 from ..excitation.plan import (
     AbstractExcitation as AbstractExcitation,
     Family as Family,
@@ -34,13 +36,15 @@ from ..excitation.plan import (
     SignalPreview as SignalPreview,
 )
 from ..excitation.resonance_tracking import ResonanceTracking as ResonanceTracking
-from ..excitation.settled_sine import SettledSine as SettledSine
-from ..excitation.sine_sweep import Hold as Hold, SineSweep as SineSweep
-from ..excitation.stepped_level import SteppedLevel as SteppedLevel
-from ..excitation.stepped_sine import FrequencySteps as FrequencySteps, SteppedSine as SteppedSine
+from ..excitation.sine_sweep import HeldSweep as HeldSweep, Hold as Hold, SineSweep as SineSweep
+from ..excitation.stepped_sine import (
+    FrequencySteps as FrequencySteps,
+    HeldResponse as HeldResponse,
+    SettledSine as SettledSine,
+    SteppedLevel as SteppedLevel,
+    SteppedSine as SteppedSine,
+)
 from ..excitation.steps import Approach as Approach, Direction as Direction, Segment as Segment, Step as Step
-from ..excitation.streamed_noise import StreamedNoise as StreamedNoise
-from ..excitation.white_noise import WhiteNoise as WhiteNoise
 from ._campaign import (
     BYTES_PER_SAMPLE as BYTES_PER_SAMPLE,
     Campaign as Campaign,
@@ -66,17 +70,20 @@ from ._loads import (
     needed_vpp as needed_vpp,
     predicted_loads as predicted_loads,
 )
-from ._loop_time import LOOK_PERIODS as LOOK_PERIODS, look_s as look_s, loop_time_s as loop_time_s
 from ._measurement_preview import (
     MeasurementPreview as MeasurementPreview,
     preview_measurement as preview_measurement,
+    preview_signal as preview_signal,
 )
 from ._schedule import (
     CHECK_FREQUENCY_HZ as CHECK_FREQUENCY_HZ,
     CHECK_QUIET_S as CHECK_QUIET_S,
     CHECK_S as CHECK_S,
+    FEWEST_REALISATIONS as FEWEST_REALISATIONS,
     FEWEST_STAIRS as FEWEST_STAIRS,
     HUSH_S as HUSH_S,
+    LOOK_FACTOR as LOOK_FACTOR,
+    LOOK_PERIODS as LOOK_PERIODS,
     DriveSource as DriveSource,
     InRunLimits as InRunLimits,
     Measurement as Measurement,
@@ -86,11 +93,14 @@ from ._schedule import (
     Point as Point,
     RunState as RunState,
     ScanPoint as ScanPoint,
+    Until as Until,
     drive_source_of as drive_source_of,
     duration_s as duration_s,
     half_cosine as half_cosine,
     known_phases as known_phases,
     lead_in_s as lead_in_s,
+    look_s as look_s,
+    loop_time_s as loop_time_s,
     lowest_setting_vpp as lowest_setting_vpp,
     measuring_s as measuring_s,
     phases as phases,
@@ -99,6 +109,5 @@ from ._schedule import (
     stairs as stairs,
 )
 from ._sweep import Range as Range, RangeSpacing as RangeSpacing, SweepAxis as SweepAxis
-from ._until import FEWEST_REALISATIONS as FEWEST_REALISATIONS, LOOK_FACTOR as LOOK_FACTOR, Until as Until
 
 __all__ = [name for name in globals() if not name.startswith("_")]

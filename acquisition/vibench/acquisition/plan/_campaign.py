@@ -1,15 +1,16 @@
 """Campaigns: an ordered list of measurements and nested sweeps, its TOML file, and rules for retries."""
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveInt, ValidationInfo, model_validator
 
 from ..excitation.kinds import EXCITATION_KINDS, present_word
-from ..host.shipped import file_path
+from ..host.installation import file_path
 from ..host.toml_file import FrozenModel, load_toml
 from ._schedule import Measurement, Name, Point, ScanPoint, measuring_s
 from ._sweep import LONGEST_NAME, Sweep
@@ -23,7 +24,7 @@ class Retryable(StrEnum):
     INSTRUMENT_LOST = "instrument_lost"
     """Cable, power or server failed; the bench is closed and opened again before the next attempt."""
     INSTRUMENT_FAULT = "instrument_fault"
-    """An instrument refused a command or is used by another program; the bench is reopened before a retry."""
+    """An instrument refused a command, or another program uses it; the bench is reopened before a retry."""
     CHECK_FAILED = "check_failed"
     """The check at low level before the recording failed."""
     LIMIT = "limit"
@@ -45,7 +46,10 @@ class RetryPolicy(FrozenModel):
 
 
 BYTES_PER_SAMPLE = 4
-"""Size of one sample, a 32-bit count, in a growing recording [bytes]; less in a finished recording."""
+"""Size of one sample, a 32-bit count, in a growing recording [bytes]; smaller in a finished recording."""
+
+_WINDOWS_DEVICE = r"con|prn|aux|nul|com\d|lpt\d"
+"""File names, without suffix, that Windows reserves."""
 
 
 class Campaign(FrozenModel):
@@ -113,15 +117,24 @@ class Campaign(FrozenModel):
         return self
 
     @model_validator(mode="after")
-    def _has_points_of_different_names(self) -> Self:
+    def _has_names_of_different_files(self, info: ValidationInfo) -> Self:
         names = Counter(name.lower() for name in self.recording_names())
         if not names:
             raise ValueError("a campaign needs at least one of [[measurements]] and [[sweeps]]")
         twice = sorted(name for name, count in names.items() if count > 1)
         if twice:
             raise ValueError(
-                f"two measurements would be recorded as {twice[0]!r}; give each measurement and sweep "
-                "a different name, and each axis different values (A and a count as the same letter)"
+                f"two measurements would be recorded as {twice[0]!r}; give each measurement and sweep a "
+                "different name, and each axis different values (upper and lower case are not distinguished)"
+            )
+        reserved = next(
+            (name for name in (*names, self.name) if re.fullmatch(_WINDOWS_DEVICE, name.lower())), ""
+        )
+        if (
+            reserved and info.mode == "python"
+        ):  # a plan stored by an earlier version is JSON; keep it readable
+            raise ValueError(
+                f"the name {reserved!r} is reserved by Windows for a device; choose another name"
             )
         return self
 
@@ -152,7 +165,7 @@ class Campaign(FrozenModel):
 
     @property
     def duration_s(self) -> float:
-        """Duration of all measurements with ramps, bench checks and the pauses in between [s]."""
+        """Duration of all measurements, with ramps, bench checks and the pauses between measurements [s]."""
         points = self.points()
         return _recorded_s(points) + self.rest_s * (len(points) - 1)
 
@@ -169,7 +182,7 @@ def _point_at(place: ScanPoint, point: Point) -> Point:
 
 
 def distinct_drives(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Return one point for each distinct drive; its limit checks apply to all points with this drive."""
+    """Return one point for each distinct drive; its limit checks apply to all points with the same drive."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats", "point"}), point)

@@ -53,7 +53,7 @@ _PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
 def require_own_plan(measurement: Measurement, rig: Rig) -> None:
     """Refuse to play back a recording with a plan other than the one in the recording.
 
-    Raises ConfigurationError. Imported recordings, and plans of another version, are not checked.
+    Raises ConfigurationError. Imported recordings and plans of another version are not checked.
     """
     path = rig.daq.options.get("recording")
     if not rig.plays_back or not isinstance(path, str):
@@ -115,7 +115,7 @@ class LimitCheck:
 
     @property
     def use(self) -> float:
-        """Used fraction of the limit; above 1, the limit is exceeded."""
+        """Used fraction of the limit; if it is above 1, the limit is exceeded."""
         if self.side is LimitSide.AT_LEAST:
             return self.limit / self.value
         return self.value / self.limit if self.limit else math.inf
@@ -143,13 +143,13 @@ def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
     loads = predicted_loads(measurement.excitation, rig)
     return (
         *_settings(measurement, rig),
-        *_loads(measurement, rig, loads),
-        *_specimen(measurement, rig, loads),
+        *_loads(rig, loads),
+        *_inputs(measurement, rig, loads),
     )
 
 
 def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
-    """Refuse a measurement that would exceed a limit of the rig; return all checks if it is allowed.
+    """Refuse a measurement that would exceed a limit of the rig; otherwise return all limit checks.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         measurement.ramp_s,
         shortest_ramp_s(rig),
         "s",
-        f"{RAMP_PERIODS:g} periods of the shaker's suspension",
+        f"{RAMP_PERIODS:g} periods of the shaker's suspension resonance",
         "lengthen ramp_s",
         LimitSide.AT_LEAST,
     )
@@ -300,7 +300,7 @@ def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iter
     )
 
 
-def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
+def _loads(rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
     limits = rig.shaker.limits
     less = "lower amplitude_vpp"
     gentler = "lower amplitude_vpp or raise the lowest frequency"
@@ -325,68 +325,59 @@ def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCh
         name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain",
         load=BaseQuantity.AMPLIFIER_VOLTAGE,
     )  # fmt: skip
-    yield from _inputs(rig, measurement.excitation.highest_amplitude_vpp, loads)
-
-
-def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
-    """Compare the estimated motion of the specimen with the limits of its springs and of the m0 sensors."""
     amplitude = loads[BaseQuantity.AMPLITUDE]
     limit = rig.specimen.amplitude_limit_m
+    name = f"the specimen's amplitude (estimated, {amplitude.cause})"
+    remedy = "lower amplitude_vpp or avoid the resonance"
     yield LimitCheck(
-        f"the specimen's amplitude (estimated, {amplitude.cause})",
-        amplitude.peak,
-        limit.value,
-        "m",
-        limit.source,
-        "lower amplitude_vpp or avoid the resonance",
-        load=BaseQuantity.AMPLITUDE,
+        name, amplitude.peak, limit.value, "m", limit.source, remedy, load=BaseQuantity.AMPLITUDE
     )
-    flagged = measurement.limits.on_overload is OnOverload.FLAG
-    for channel in channels_of(rig):
-        if channel.role in RESPONSE_ROLES:
-            moved = loads[BaseQuantity(channel.role.value)]
-            yield LimitCheck(
-                f"the {channel.quantity} of m0 (estimated, {moved.cause})",
-                moved.peak,
-                channel.full_scale_v * channel.units_per_volt,
-                channel.unit,
-                f"range of {channel.physical} and of its sensor",
-                "lower amplitude_vpp or widen the range",
-                consequence=Consequence.TOLD if flagged else Consequence.REFUSED,
-            )
 
 
-def _inputs(rig: Rig, amplitude_vpp: float, loads: Loads) -> Iterator[LimitCheck]:
+def _inputs(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
     """Compare the predicted signals with the ranges of the sensors and of the converter's inputs."""
+    highest_vpp = measurement.excitation.highest_amplitude_vpp
     peaks = {
-        Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
+        Role.DRIVE_VOLTAGE: 0.5 * highest_vpp * rig.generator.terminal_factor(),
         Role.AMPLIFIER_VOLTAGE: loads[BaseQuantity.AMPLIFIER_VOLTAGE].peak,
         Role.BASE_ACCELERATION: loads[BaseQuantity.ACCELERATION].peak,
         Role.BASE_VELOCITY: loads[BaseQuantity.VELOCITY].peak,
         Role.BASE_DISPLACEMENT: loads[BaseQuantity.STROKE].peak,
+        **{role: loads[BaseQuantity(role.value)].peak for role in RESPONSE_ROLES},
     }
+    flagged = measurement.limits.on_overload is OnOverload.FLAG
     for channel in channels_of(rig):
-        if channel.role in peaks:
-            yield LimitCheck(
-                f"the {channel.role.value.replace('_', ' ')} at the converter",
-                peaks[channel.role],
-                channel.full_scale_v * channel.units_per_volt,
-                channel.unit,
-                f"range of {channel.physical} and its sensor",
-                "lower amplitude_vpp or widen the range",
-            )
+        if channel.role not in peaks:
+            continue
+        what, consequence = (
+            f"the {channel.role.value.replace('_', ' ')} at the converter",
+            Consequence.REFUSED,
+        )
+        if channel.role in RESPONSE_ROLES:
+            moved = loads[BaseQuantity(channel.role.value)]
+            what = f"the {channel.quantity} of m0 (estimated, {moved.cause})"
+            consequence = Consequence.TOLD if flagged else Consequence.REFUSED
+        yield LimitCheck(
+            what,
+            peaks[channel.role],
+            channel.full_scale_v * channel.units_per_volt,
+            channel.unit,
+            f"range of {channel.physical} and of its sensor",
+            "lower amplitude_vpp or widen the range",
+            consequence=consequence,
+        )
 
 
 TOUCH_SHARE = 0.25
 """Largest p in a check, relative to the gap: a sine without a ramp overshoots, and impacts might persist."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
-"""Frequencies within 3 % of the check's sine [Hz]; the model's resonances may err by 3 % (decision 0072)."""
+"""Frequencies within 3 % of the check's sine [Hz]; the model's resonances may be 3 % off (decision 0072)."""
 
 
 def check_amplitude_vpp(wanted_vpp: float, rig: Rig) -> float:
     """Return the setting of a check [Vpp]: ``wanted_vpp``, or less to keep p within a quarter of the gap.
 
-    It is not lowered below 10 mVpp. The model of ``rig`` includes the specimen on the table.
+    The setting is not lowered below 10 mVpp. The model of ``rig`` includes the specimen on the table.
     """
     model = RigModel(rig)
     per_vpp = 0.5 * rig.generator.terminal_factor()
@@ -400,7 +391,7 @@ def run_check_vpp(planned_vpp: float, rig: Rig) -> float:
 
 
 def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phase]:
-    """Return the phases of the check: measure silence, let a small sine settle, measure the sine."""
+    """Return the phases of the check: measure the silence, let a small sine settle, and measure the sine."""
     planned_vpp = measurement.excitation.amplitude_vpp
     amplitude_vpp = run_check_vpp(planned_vpp, rig)
     tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)

@@ -1,7 +1,7 @@
 """Predict the peak loads of a plan on the rig, with the rig's model.
 
 The prediction is exact while p stays inside the gap. Otherwise it gives the fundamental of a motion with p
-limited to the gap. Impacts add to this fundamental (for the amounts, see
+limited to the gap. Impacts add to this fundamental (for how much they add, see
 tests/acquisition/plan/test_specimen_loads.py). The real motion is monitored during the run.
 """
 
@@ -13,10 +13,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation.gaussian_band import CREST_FACTOR, GaussianBand
 from ..excitation.kinds import Excitation
-from ..excitation.multisine import held_lines
+from ..excitation.noise import held_lines
 from ..excitation.steps import (
+    CREST_FACTOR,
+    GaussianBand,
     HeldAcceleration,
     Play,
     RelativeSetting,
@@ -29,7 +30,7 @@ from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
 """Number of spans, each of half the playback rate, for which the spectrum of a held waveform is computed.
-Higher images are below 1/20 of the level of the band, and the table responds to them less.
+Higher images are below 1/20 of the level of the band, and the table responds less to these images.
 """
 PASSED_LEVELS = np.arange(1, 17) / 16
 """Fractions of a tone's level at which loads are computed. Ramps pass through these levels, and with stops a
@@ -68,7 +69,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
-    # All different tones, waveforms and stream sources of the plan, each at its highest level.
+    # Every tone, waveform and stream source of the plan once, at its highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(
@@ -134,7 +135,7 @@ class _BroadPlay:
         if not self._touches:
             return self._load(self._model.transfer, quantity)
         stuck = self._load(self._model.stuck_transfer, quantity)
-        # Add the effect of a motion p whose amplitude equals the gap, averaged over the band.
+        # Add the effect of a motion p with the amplitude of the gap, as an rms value over the band.
         lever = self._model.lever(quantity, self._band_hz)
         pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
@@ -150,13 +151,13 @@ def _band_hz(source: GaussianBand) -> Floats:
 def _of_waveform(lines: ComplexArray, repetition_hz: float, number: int, transfer: Transfer) -> Load:
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(repetition_hz)
     answer = lines * transfer(frequency_hz)
-    # Take twice as many samples as the highest spectral line needs, so that no peak between them is missed.
+    # Take twice as many samples as the highest spectral line needs, to miss no peak between samples.
     points = 4 * len(lines)
     one_sided = np.zeros(points // 2 + 1, dtype=np.complex128)
     one_sided[: len(lines)] = answer * (points / 2)
     one_sided[0] *= 2
     time_signal = np.fft.irfft(one_sided, points)
-    peak, rms = float(np.max(np.abs(time_signal))), float(np.sqrt(np.mean(time_signal**2)))
+    peak, rms = float(np.max(np.abs(time_signal))), float(np.linalg.norm(time_signal)) / points**0.5
     return Load(peak, rms, f"in realisation {number}")
 
 
@@ -170,8 +171,8 @@ def needed_vpp(
 ) -> float:
     """Return the setting at which the base reaches ``acceleration`` [m/s2], peak to peak [V].
 
-    ``on_table`` describes what is mounted on the table in the rig's model. Feedback assumes a bare table
-    (smooth response), and corrects the difference.
+    ``on_table`` describes what is mounted on the table in the rig's model. Feedback assumes a bare table,
+    whose response is smooth, and corrects the difference.
     """
     terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
     return 2 * terminal_v / rig.generator.terminal_factor()
@@ -187,7 +188,7 @@ class BaseMotion:
 
 
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
-    """Return the predicted base amplitude at each of ``frequency_hz``; exact for levels held by feedback.
+    """Return the predicted base amplitude at each of ``frequency_hz``; exact if feedback holds the level.
 
     For other plans, the amplitude follows from the rig's model with specimen (noise: a sine of equal rms).
     """

@@ -6,14 +6,13 @@ import numpy as np
 
 from vibench.sim.branches import least_growth_time_s
 
-from ..excitation.kinds import EXCITATION_KINDS
+from ..excitation.kinds import EXCITATION_KINDS, Excitation
 from ..excitation.plan import SignalPreview
 from ..instruments import Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks
-from ._loop_time import loop_time_s
-from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
+from ._schedule import DriveSource, Measurement, drive_source_of, duration_s, loop_time_s
 
 MOST_SAMPLES = 1_000_000
 """Largest number of displayed samples of the signal; a long sweep is displayed at a lower sample rate."""
@@ -31,7 +30,7 @@ class MeasurementPreview:
     """Signal as set at the generator's panel, shape (samples,) [V]."""
     sample_rate_hz: float
     spectrum_hz: Samples
-    """Frequency of the strongest spectral line of each interval [Hz]; at most `SPECTRUM_POINTS` intervals."""
+    """Frequency of the strongest spectral line in each of at most `SPECTRUM_POINTS` intervals [Hz]."""
     spectrum_v: Samples
     """Peak amplitude of the sine at each of ``spectrum_hz`` [V]."""
     rms_v: float
@@ -50,18 +49,17 @@ class MeasurementPreview:
         """Whether the limits of the rig allow the measurement."""
         return not any(check.forbids for check in self.checks)
 
-    @property
-    def crest_factor(self) -> float:
-        """Peak value of the signal divided by its rms value."""
-        return self.peak_v / self.rms_v
+
+def preview_signal(excitation: Excitation, rig: Rig) -> tuple[SignalPreview, float]:
+    """Return the signal and its sample rate [Hz]; raises ConfigurationError when it cannot be sampled."""
+    affordable = MOST_SAMPLES / max(excitation.playing_s, 1.0)
+    rate_hz = max(min(rig.daq.sample_rate_hz, affordable), _LOWEST_RATE * excitation.highest_frequency_hz)
+    return excitation.preview(rate_hz), rate_hz
 
 
 def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPreview:
     """Return the preview of a measurement; raises ConfigurationError when the signal cannot be sampled."""
-    excitation = measurement.excitation
-    affordable = MOST_SAMPLES / max(excitation.playing_s, 1.0)
-    rate_hz = max(min(rig.daq.sample_rate_hz, affordable), _LOWEST_RATE * excitation.highest_frequency_hz)
-    preview = excitation.preview(rate_hz)
+    preview, rate_hz = preview_signal(measurement.excitation, rig)
     spectrum_hz, spectrum_v = _highest_lines(preview)
     length_s = duration_s(measurement)
     checks = sorted(limit_checks(measurement, rig), key=lambda check: check.use, reverse=True)
@@ -85,7 +83,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
     if not EXCITATION_KINDS[excitation.kind].is_feedback:
         return None
     if drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
-        # What a real-time loop can hold depends on its gains and the plant; see `require_holdable`.
+        # Which motions a real-time loop can hold depends on gains and plant: `require_holdable`.
         return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 

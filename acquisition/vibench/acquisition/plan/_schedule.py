@@ -10,6 +10,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_validator
 
+from vibench.sim import NumberWith
+
 from ..errors import ConfigurationError
 from ..excitation.kinds import Excitation
 from ..excitation.plan import AbstractFeedback
@@ -18,9 +20,74 @@ from ..host.toml_file import FrozenModel
 from ..instruments import Sweep
 from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, Role, generator_driver
-from ._until import SHORTEST_S, Until
 
-# A measurement is a plan: excitation, ramps, limits during the run. A point is one recording in a campaign.
+# The longer the delay of the feedback, the fewer unstable motions can be held (decision 0065).
+
+LOOK_S = 0.2
+"""Averaging time of one measurement by the feedback loop [s]; longer if ten periods last longer."""
+LOOK_PERIODS = 10
+_COMMANDS = 2
+"""Number of generator commands per change of the drive: amplitude and frequency."""
+
+
+def look_s(frequency_hz: float) -> float:
+    """Return the averaging time of one measurement by the feedback loop [s]."""
+    return max(LOOK_S, LOOK_PERIODS / frequency_hz)
+
+
+def loop_time_s(rig: Rig, frequency_hz: float) -> float:
+    """Return the delay from a motion to the corrected drive, due to averaging and generator commands [s]."""
+    return look_s(frequency_hz) + _COMMANDS * rig.generator.settle_s
+
+
+FEWEST_REALISATIONS = 4
+"""Number of realisations before the first analysis; fewer would not suffice to estimate the scatter."""
+SHORTEST_S = 2.0
+"""Default time before the first analysis [s]; a shorter recording is analysed only at its end."""
+LOOK_FACTOR = 2.0**0.5
+"""Ratio of the recorded time at one analysis to the recorded time at the previous analysis."""
+
+
+Wish = Annotated[float, Field(gt=0, lt=1), NumberWith("%")]
+"""Required accuracy of a result: half the width of the result's 95 % interval, relative to the result."""
+
+
+class Until(FrozenModel):
+    """Record until the bound on the error of every result named here is small enough.
+
+    The planned time is never exceeded. The bounds hold in 95 % of recordings, including those that end early.
+    They include noise and scatter, which a longer recording reduces, but no calibration uncertainty.
+    """
+
+    resonance_hz: Wish | None = None
+    """Required uncertainty of the frequency of every resonance under noise excitation: ``"0.1 %"``."""
+    transmissibility: Wish | None = None
+    """Required error bound of the transmissibility at every resonance found in noise: ``"2 %"``."""
+    response_i: Wish | None = None
+    """Required error bound of Response I of a dwell or of each step: ``"1 %"``."""
+    response_ii: Wish | None = None
+    """Required error bound of Response II of a dwell or of each step: ``"1 %"``."""
+    shortest_s: PositiveFloat = SHORTEST_S
+    """Recorded time before the first analysis of a dwell, a step or streamed noise [s]; at most the planned
+    time."""
+
+    @model_validator(mode="after")
+    def _wants_something(self) -> "Until":
+        if not self.required_bounds:
+            raise ValueError("'until' names no result; give a result, such as response_i = '1 %'")
+        return self
+
+    @property
+    def required_bounds(self) -> dict[str, float]:
+        """Required relative bounds by name of the result."""
+        return {name: wish for name in WISHES if (wish := getattr(self, name)) is not None}
+
+
+WISHES = ("resonance_hz", "transmissibility", "response_i", "response_ii")
+"""Names of the results that `Until` may require."""
+
+
+# A measurement is a plan: excitation, ramps and limits during the run. A campaign's point is one recording.
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
@@ -39,7 +106,7 @@ LONGEST_S = 30 * 86400.0
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 FEWEST_STAIRS = 4
-"""Smallest number of steps (stairs) in a ramp; fewer would act as one large step."""
+"""Smallest number of steps (stairs) in a ramp; with fewer steps, the ramp would act as one large step."""
 
 
 class OnOverload(StrEnum):
@@ -78,7 +145,7 @@ class InRunLimits(FrozenModel):
     """Fraction of the coil's peak current limit and of the amplifier's rms limiter. The current is computed
     as amplifier voltage minus induced voltage of the moving coil, divided by the coil's resistance."""
     specimen_amplitude: Fraction = 1.0
-    """Fraction of the specimen's amplitude limit: m0 relative to the base, from the sensor of m0."""
+    """Fraction of the specimen's amplitude limit: motion of m0 relative to the base, from its sensor."""
     on_overload: OnOverload = OnOverload.FLAG
     on_changed_specimen: OnChange = OnChange.NOTE
 
@@ -87,7 +154,7 @@ class ScanPoint(FrozenModel):
     """Point on the specimen at which the vibrometer's beam measures."""
 
     name: Name
-    """Name of the point; it is appended to the names of its recordings."""
+    """Name of the point; this name is appended to the names of the point's recordings."""
     body: Literal["m0", "m1", "m2"]
     """Mass on which the point lies."""
     node: PositiveInt | None = Field(default=None, le=999_999_999)
@@ -126,7 +193,7 @@ class Measurement(FrozenModel):
     limits: InRunLimits = InRunLimits()
     notes: str = ""
     until: Until | None = None
-    """Accuracy of results at which the recording ends; if absent, the planned time is recorded."""
+    """Accuracy of the results at which the recording ends; if absent, the planned time is recorded."""
     point: ScanPoint | None = None
     """Point of a scan at which the vibrometer measures; if absent, m0."""
 
@@ -153,7 +220,7 @@ class Measurement(FrozenModel):
         if self.ramp_step_s * FEWEST_STAIRS > self.ramp_s * (1 + 1e-9):
             raise ValueError(
                 f"ramp_step_s = {self.ramp_step_s:g} gives fewer than {FEWEST_STAIRS} steps in a ramp of "
-                f"{self.ramp_s:g} s; give at most {self.ramp_s / FEWEST_STAIRS:g}"
+                f"{self.ramp_s:g} s; give at most {self.ramp_s / FEWEST_STAIRS:g} s"
             )
         return self
 
@@ -176,7 +243,7 @@ class Point:
     """Name of the recording, without ``.h5``; unique in the campaign."""
     measurement: Measurement
     chain: str = ""
-    """Name of the chain (a series of points on one branch) to which the point belongs; empty for none."""
+    """Name of the chain (a series of points on one branch) to which the point belongs; empty if none."""
 
 
 class RunState(StrEnum):
@@ -213,7 +280,7 @@ CHECK_FREQUENCY_HZ = 160.0
 CHECK_FRACTION = 0.02
 """Amplitude of the bench check relative to the planned amplitude."""
 CHECK_LOWEST_VPP = 0.01
-"""Smallest setting of a check, above the hum [Vpp]; a plan's lower setting is used unchanged."""
+"""Smallest setting of a check, above the hum [Vpp]; if a plan has a lower setting, that setting is used."""
 CHECK_QUIET_S = 0.1
 """Duration of the silence that a check measures before the first signal [s]."""
 CHECK_SETTLE_S = 0.2
@@ -244,8 +311,8 @@ class Phase:
 def phases(measurement: Measurement) -> Iterator[Phase]:
     """Yield the phases from the first ramp up to the last ramp down, without the bench check.
 
-    A waveform is changed in silence, between a ramp down and a ramp up. A frequency is changed without a
-    ramp, with continuous phase.
+    The waveform changes in silence, between a ramp down and a ramp up. The frequency changes without a ramp,
+    with continuous phase.
     """
     previous: Step | None = None
     for step in measurement.excitation.steps():
@@ -330,7 +397,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; an analogue output is returned even if the rig lacks it."""
+    """Return the source that plays a measurement; an analogue output is returned even if the rig has none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -338,7 +405,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Return the source that plays a measurement; raises ConfigurationError if the rig lacks this source."""
+    """Return the source that plays a measurement; raises ConfigurationError if the rig has no such source."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
@@ -356,7 +423,7 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 LEAST_SHARE = 1e-4
-"""Ratio of smallest to largest setting of an analogue output; the smallest spans some tens of counts."""
+"""Ratio of smallest to largest setting of an analogue output; the smallest setting spans tens of counts."""
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:

@@ -34,7 +34,7 @@ class Range(FrozenModel):
 
     start: PositiveFloat
     stop: PositiveFloat
-    """Upper bound of the values, included if whole steps reach it."""
+    """Upper bound of the values; included if whole steps reach it."""
     step: PositiveFloat | None = None
     count: PositiveInt | None = Field(default=None, ge=2, le=MOST_VALUES)
     spacing: RangeSpacing = RangeSpacing.LINEAR
@@ -69,7 +69,7 @@ class Range(FrozenModel):
     def _count(self) -> int:
         if self.step is None:
             return self.count or 0
-        # The tolerance 1e-9 keeps a last value that the steps miss only by rounding.
+        # With the tolerance 1e-9, the last value is included if the steps miss it only by rounding.
         return floor((self.stop - self.start) / self.step + 1e-9) + 1
 
 
@@ -78,7 +78,7 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values | None) -> tuple[float, ...]:
-    """Return an axis's values: a range in ascending order, a list in the given order; no values for None."""
+    """Return an axis's values: of a range in ascending order, of a list in the given order; none for None."""
     return given.values if isinstance(given, Range) else given or ()
 
 
@@ -90,7 +90,7 @@ LONGEST_NAME = 64
 class SweepAxis(StrEnum):
     """Axes of a sweep, named as in ``order``."""
 
-    # The axes are in the usual order of nesting, from the outermost (slowest) to the innermost.
+    # The axes are ordered like nested loops: the first (outermost) axis changes slowest.
 
     REPETITION = "repetition"
     EXCITATION = "excitation"
@@ -119,15 +119,15 @@ class Sweep(FrozenModel):
     """All combinations of values on the given axes; each is a measurement based on ``measurement``.
 
     A point is named after the sweep and its values: ``line-0p5vpp-up-205hz``. With ``continue_from_previous``
-    the points along that axis form a chain. Each is a dwell that starts by playing all earlier points. The
-    specimen thus stays on its branch, even if a point is repeated days later.
+    the points along that axis form a chain. Each point is a dwell that starts by playing all earlier points.
+    The specimen thus stays on its branch, even if a point is repeated days later.
     """
 
     name: Name
     measurement: dict[str, Any]
     """Template of all points: the values of a measurement, without its name."""
     excitations: tuple[dict[str, Any], ...] = ()
-    """Excitations used one after another; their values have priority over those of the template."""
+    """Excitations used one after another; their values have priority over the template's values."""
     repetitions: PositiveInt = Field(default=1, le=1000)
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
@@ -135,8 +135,8 @@ class Sweep(FrozenModel):
     order: tuple[SweepAxis, ...] = Field(default=tuple(SweepAxis), min_length=1)
     """Axes of the sweep, from the outermost (slowest) to the innermost."""
     continue_from_previous: SweepAxis | None = None
-    """Axis along which the specimen stays on its branch: ``frequency_hz`` or ``amplitude_vpp``. It must be
-    the innermost axis."""
+    """Axis along which the specimen stays on its branch: ``frequency_hz`` or ``amplitude_vpp``. This axis
+    must be the innermost axis."""
     lead_s: PositiveFloat = 0.5
     """Time at each earlier point of the chain in a lead-in [s]."""
 
@@ -150,7 +150,7 @@ class Sweep(FrozenModel):
             raise ValueError(f"order = {_words(self.order)} contains an axis twice; give each axis once")
         missing = [axis for axis in self._axes() if axis not in self.order]
         if missing:
-            raise ValueError(f"order lacks {_words(missing)}; it must contain every axis of the sweep")
+            raise ValueError(f"order is missing {_words(missing)}; it must contain every axis of the sweep")
         return self
 
     @model_validator(mode="after")
@@ -166,8 +166,8 @@ class Sweep(FrozenModel):
         given = [each for each in self.order if each in self._axes() and each is not SweepAxis.DIRECTION]
         if not given or given[-1] is not axis:
             raise ValueError(
-                f"continue_from_previous = {axis.value!r} must be the innermost axis of the sweep; "
-                f"its order is {_words(given)}"
+                f"continue_from_previous = {axis.value!r} must be the innermost axis of the sweep; the order "
+                f"of the sweep is {_words(given)}"
             )
         passed = len(self._axes()[axis]) * (2 if _TURNING & set(self.direction) else 1)
         longest = passed if self.lead_points is None else min(passed, self.lead_points)
@@ -228,7 +228,7 @@ class Sweep(FrozenModel):
             yield Point(name, measurement)
 
     def _chain_points(self) -> Iterator[Point]:
-        """Yield the points of each chain; earlier points are the lead-in of later ones."""
+        """Yield the points of each chain; earlier points are the lead-in of later points."""
         axes = self._axes()
         along = SweepAxis(str(self.continue_from_previous))
         rising = tuple(sorted(axes.pop(along)))

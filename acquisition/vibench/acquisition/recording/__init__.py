@@ -1,10 +1,10 @@
 """HDF5 recordings: layout, writing, finishing, recovery and reading.
 
 During the run the file is ``NAME.h5.part``. A writer thread writes the samples, syncs the disk, then updates
-the counters of valid samples. A killed process or a power cut loses at most the last second. The finished
-``NAME.h5`` is compressed and has checksums; no existing file is overwritten. Samples are int32 counts of the
-A/D converter, with scale factors to SI units; lost samples are marked. Format: docs/recording-format.md;
-reasons: docs/decisions/0003-recording-format.md and 0020.
+the counters of valid samples. If the process is killed or the power is cut, at most the last second is lost.
+The finished ``NAME.h5`` is compressed and has checksums; no existing file is overwritten. Samples are int32
+counts of the A/D converter, with scale factors to SI units; lost samples are marked. Format:
+docs/recording-format.md; reasons: docs/decisions/0003-recording-format.md and 0020.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

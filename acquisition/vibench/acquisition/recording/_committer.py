@@ -23,16 +23,16 @@ from ._layout import cell, json_text
 from ._preallocate import TablePlaces
 
 COMMIT_INTERVAL_S = 0.5
-"""Commit interval [s]: half of the one second that a crash may lose. The other half is for a slow disk."""
+"""Commit interval [s]: half of the one second that a crash may lose; the other half is for slow disks."""
 CLOSING_PATIENCE_S = 30.0
 """Time limit of the last commit [s]; writes to a disconnected network folder may hang forever."""
 QUEUE_PATIENCE_S = 2.0
-"""Longest wait while the queue is full [s]; then the disk counts as too slow."""
+"""Longest wait while the queue is full [s]; after this time, the disk counts as too slow."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Batch of writes, and of counters that are written afterwards to mark the data as valid."""
+    """Batch of writes, and of counters that are written after the data to mark the data as valid."""
 
     writes: tuple[tuple[int, Buffer], ...] = ()
     """File offset and data of each write."""
@@ -41,7 +41,7 @@ class Batch:
     reservations: tuple[tuple[int, int], ...] = ()
     """Offset and size of each range to reserve before writing [bytes]."""
     samples: int = 0
-    """Number of samples per channel in this batch; the queue limits the sum over all its batches."""
+    """Number of samples per channel in this batch; the sum over all batches in the queue is limited."""
 
 
 class Committer:
@@ -60,7 +60,7 @@ class Committer:
         self._is_closing = False
         self._is_abandoned = False
         self.failure: OSError | None = None
-        """Disk error that ended the writing; None without an error."""
+        """Disk error that ended the writing; None if there was no error."""
         self._is_failure_seen = False
         self._counters: dict[int, int] = {}
         self._written_samples = 0
@@ -85,7 +85,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. May be called at any time.
 
-        Raises RecordingError when the disk does not respond; then no further access to the disk is allowed.
+        Raises RecordingError when the disk does not respond; no further access to the disk is then allowed.
         """
         with self._changed:
             self._is_closing = True
@@ -94,9 +94,9 @@ class Committer:
         self._is_abandoned = self._thread.is_alive()
         if self._is_abandoned:
             raise RecordingError(
-                f"The disk has not responded for {self._closing_patience_s:g} s (is a network folder"
-                f" disconnected?). The {self.committed_samples} samples committed before are kept there;"
-                " recover the recording when the disk responds again."
+                f"The disk has not responded for {self._closing_patience_s:g} s (is a network folder "
+                f"disconnected?). The {self.committed_samples} samples committed so far are kept on the "
+                "disk; recover the recording when the disk responds again."
             )
 
     def raise_unseen_failure(self) -> None:
@@ -111,12 +111,12 @@ class Committer:
     def _require_health(self, has_room: bool) -> None:  # noqa: FBT001 - the answer of a wait
         if self.failure is not None:
             self._is_failure_seen = True
-            kept = f"the {self.committed_samples} samples saved before are kept"
+            kept = f"the {self.committed_samples} samples saved so far are kept"
             if isinstance(self.failure, FileNotFoundError):
-                kept = "the samples saved before are lost with the file"
+                kept = "the samples saved so far are lost with the file"
             raise RecordingError(
-                f"Writing to the disk failed: {self.failure}. The recording has ended; {kept}. Make room or"
-                " change the disk, and measure again."
+                f"Writing to the disk failed: {self.failure}. The recording has ended; {kept}. Make room, or "
+                "use another disk, and measure again."
             ) from self.failure
         if not self._thread.is_alive():
             raise RecordingError(
@@ -126,7 +126,7 @@ class Committer:
         if not has_room:
             raise RecordingError(
                 f"The disk is too slow: {self._waiting_samples} samples per channel wait to be written"
-                f" (room for {self._queue_samples}); none was written within {QUEUE_PATIENCE_S:g} s."
+                f" (there is room for {self._queue_samples}); none was written within {QUEUE_PATIENCE_S:g} s."
                 " The block was not recorded; record to a faster or a local disk."
             )
 
@@ -139,7 +139,7 @@ class Committer:
         finally:
             with self._changed:
                 self._changed.notify_all()
-            if self._is_abandoned:  # the disk responds again, but the caller no longer waits
+            if self._is_abandoned:  # when the disk responded again, the caller had stopped waiting
                 with suppress(OSError):
                     self._disk.close()
 
@@ -154,7 +154,7 @@ class Committer:
     def _next(self) -> tuple[Batch | None, bool]:
         """Return the next batch (None if a commit is due or no batch is left), and whether all is written."""
         with self._changed:
-            # If there is nothing to commit, wait for the next batch without a time limit.
+            # If no commit is due, wait for the next batch without a time limit.
             timeout_s = max(self._commit_due_s - time.monotonic(), 0.0) if self._counters else None
             self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)
             if not self._queue:
@@ -186,7 +186,7 @@ class Committer:
 
 
 class TableWriter:
-    """Encoder that turns the rows of one table into writes to their reserved offsets in the file."""
+    """Encoder that turns the rows of one table into writes to the rows' reserved offsets in the file."""
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
@@ -223,20 +223,6 @@ Number = int | float | str
 """Value stored with a segment: ``realisation=3``, ``frequency_hz=260.0``, ``direction="up"``."""
 
 
-@dataclass(frozen=True)
-class OpenSegment:
-    """A segment that has started but not ended."""
-
-    row: int
-    label: str
-    first_sample: int
-    numbers_json: str
-
-    def cells(self, last_sample: int, is_complete: int) -> tuple[str | float, ...]:
-        """Return the values of the segment's row in the table of segments."""
-        return (self.first_sample, last_sample, is_complete, self.label, self.numbers_json)
-
-
 class Journal:
     """Tables of events, segments, overloads and gaps; each method returns the writes to be queued."""
 
@@ -245,7 +231,8 @@ class Journal:
         self._segments = TableWriter(places[layout.SEGMENTS.name])
         self._overloads = TableWriter(places[layout.OVERLOADS.name])
         self._gaps = TableWriter(places[layout.GAPS.name])
-        self._open: OpenSegment | None = None
+        self._open: tuple[int, str, str] | None = None
+        """First sample, label and numbers (JSON) of a segment that has started but not ended."""
         self._last_overload: dict[str, tuple[int, Overload]] = {}
         self._roles = roles
         self._dropped_events = 0
@@ -264,7 +251,7 @@ class Journal:
         """Begin a segment: a named range of samples."""
         if self._open is not None:
             raise RecordingError(
-                f"The segment {label!r} cannot begin: {self._open.label!r} is open. End that segment first."
+                f"The segment {label!r} cannot begin: {self._open[1]!r} is open. End that segment first."
             )
         numbers_json = json_text(f"The numbers of segment {label!r}", numbers)
         if len(numbers_json) > layout.NUMBERS_WIDTH:
@@ -272,18 +259,16 @@ class Journal:
                 f"The numbers of segment {label!r} take {len(numbers_json)} bytes as JSON; at most"
                 f" {layout.NUMBERS_WIDTH} fit. Keep only what the analysis needs; put the rest in the plan."
             )
-        opened = OpenSegment(self._segments.rows, label, first_sample, numbers_json)
-        batch = self._segments.append(opened.cells(layout.OPEN_SEGMENT, is_complete=0))
-        self._open = opened
+        batch = self._segments.append((first_sample, layout.OPEN_SEGMENT, 0, label, numbers_json))
+        self._open = first_sample, label, numbers_json
         return batch
 
     def end_segment(self, last_sample: int) -> Batch:
         """End the segment that has started."""
         if self._open is None:
             raise RecordingError("No segment is open. Begin a segment before ending it.")
-        batch = self._segments.replace(self._open.row, self._open.cells(last_sample, is_complete=1))
-        self._open = None
-        return batch
+        (first_sample, *named), self._open = self._open, None
+        return self._segments.replace(self._segments.rows - 1, (first_sample, last_sample, 1, *named))
 
     def gap(self, first_sample: int, last_sample: int) -> Batch:
         """Add a range of lost samples to the table of gaps."""
@@ -297,12 +282,12 @@ class Journal:
         """
         if overload.channel not in self._roles:
             raise RecordingError(
-                f"An overload of the unknown channel {overload.channel!r} was given;"
-                f" the recording has {', '.join(self._roles)}."
+                f"An overload of the unknown channel {overload.channel!r} was given; the channels of the "
+                f"recording are {', '.join(self._roles)}."
             )
         row, last = self._last_overload.get(overload.channel, (-1, overload))
         continues = row >= 0 and overload.first_sample <= last.last_sample + 1
-        # Keep one row free for each channel without overload, so that its first overload has a row to extend.
+        # Keep one row free for the first overload of each channel; later overloads can extend this row.
         untouched = len(self._roles) - len(self._last_overload)
         must_grow = row >= 0 and self._overloads.free_rows <= untouched
         if continues or must_grow:

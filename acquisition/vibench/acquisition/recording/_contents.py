@@ -24,7 +24,7 @@ from ._layout import (
 )
 
 DEEPEST_JSON = 40
-"""Deepest nesting of JSON that is accepted; a plan has about five levels."""
+"""Deepest nesting of JSON that is accepted; a plan has about five levels of nesting."""
 SAME_SCALE = 1e-9
 """Allowed relative difference of ``scale_factor`` and ``add_offset`` from their recomputed values."""
 
@@ -91,7 +91,7 @@ class ChannelFacts(_AbstractFacts):
 
     physical_channel: str
     quantity: str
-    units: str
+    unit: str = Field(alias="units")
     physical_per_volt: Finite
     range_v: Positive
     volts_per_count: Annotated[Positive | None, Unknown]
@@ -120,7 +120,7 @@ class ConfigurationFacts(_AbstractFacts):
     confirmations: dict[str, str | float] = Field(alias="confirmations_json")
     provenance: dict[str, JsonValue] = Field(alias="provenance_json")
     bench_check: dict[str, JsonValue] = Field(default_factory=dict, alias="bench_check_json")
-    """Result of the last bench check; empty for files of earlier versions, which do not contain it."""
+    """Result of the last bench check; empty for files of earlier versions, which contain no result."""
 
 
 def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
@@ -133,13 +133,11 @@ def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
 
     Raises RecordingError when an attribute is missing, has a wrong type or value, or contradicts another.
     """
-    attributes = read_attributes(dataset)
-    facts = _read(f"the channel {role!r}", ChannelFacts, attributes)
-    header = ChannelHeader.from_attributes(role, attributes)
-    for name, value, follows in (
-        ("scale_factor", facts.scale_factor, header.scale_factor),
-        ("add_offset", facts.add_offset, header.add_offset),
-    ):
+    stated = dict(_read(f"the channel {role!r}", ChannelFacts, read_attributes(dataset)))
+    scale = {name: stated.pop(name) for name in ("scale_factor", "add_offset")}
+    header = ChannelHeader(role=role, **stated)
+    for name, value in scale.items():
+        follows = getattr(header, name)
         if not math.isclose(value, follows, rel_tol=SAME_SCALE):
             raise RecordingError(
                 f"the channel {role!r} has {name} = {value:g}, but its other attributes give {follows:g}"

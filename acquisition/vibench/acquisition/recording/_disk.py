@@ -1,4 +1,4 @@
-"""Access to a recording's file on a disk that may be full or lose power, and simulated disk faults."""
+"""Access to a recording's file on a disk that may fill up or lose power, and simulated disk faults."""
 
 import errno
 import os
@@ -82,7 +82,7 @@ class DiskTrouble:
     def apply(self) -> None:
         """Apply the current fault: wait for a slow disk; raises OSError (ENOSPC) for a full disk."""
         with self._changed:
-            # Wait for a slow disk; stop waiting as soon as the fault ends.
+            # Wait as long as a slow disk would, but stop waiting when the fault ends.
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
             is_refused = self._refusals > 0
             self._refusals -= is_refused
@@ -123,7 +123,7 @@ class TroubledDisk(PositionedFile):
 
 
 _installed: list[DiskTrouble] = []
-"""Simulated faults that are active in this process; each affects all recordings."""
+"""Simulated faults that are active in this process; each fault affects all recordings."""
 
 
 @contextmanager

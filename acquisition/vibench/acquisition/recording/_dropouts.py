@@ -1,8 +1,8 @@
 """Find drop-outs in the vibrometer's velocity, and bridge them from the samples on both sides.
 
-Speckle interrupts the laser's signal for a fraction of a millisecond, and the decoder shows an arbitrary
-velocity. A drop-out jumps away from the motion within one sample and later returns to it. Real motion looks
-different: an impact changes the velocity permanently, and ringing oscillates.
+Speckle interrupts the laser's signal for a fraction of a millisecond; the decoder then outputs an arbitrary
+velocity. In a drop-out, the signal jumps away from the motion within one sample and later returns to it. Real
+motion looks different: an impact changes the velocity permanently, and ringing oscillates.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,8 +11,8 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import lstsq, toeplitz
 
 from ..instruments import Samples
 from ._reader import Recording
@@ -22,7 +22,7 @@ Places = NDArray[np.int64]
 LONGEST_S = 4e-3
 """Longest drop-out that can be bridged [s]."""
 LOWEST_RATE_HZ = 20_000.0
-"""Lowest sample rate of the search [Hz]; at lower rates, an impact may take as few samples as a drop-out."""
+"""Lowest sample rate of the search [Hz]; at lower rates, an impact may be as short as a drop-out."""
 _FAR = 60.0
 """Smallest fourth difference at the edge of a drop-out, relative to the median fourth difference."""
 _DETECTED = 6.0
@@ -37,7 +37,7 @@ _FLANK_S = 1e-3
 _LEAST_HELD = 8
 """Smallest number of equal samples that indicate a drop-out, if both ends are steep (`_QUANTA`)."""
 _QUANTA = 4.0
-"""Smallest change at both ends of equal samples, relative to the smallest change in the channel."""
+"""Smallest change at both ends of such equal samples, relative to the channel's smallest change."""
 _LEAST_OF_FLANK = 0.25
 """Smallest fraction of a flank that must be free of other drop-outs."""
 DROPOUT_DELAY_S = LONGEST_S + 2.0 * _FLANK_S
@@ -47,7 +47,7 @@ _OUTSTANDING = 8.0
 _JUMP = 4.0
 """Smallest change between samples at the edge of a drop-out, relative to the largest change in the flanks."""
 _STEEP = 0.2
-"""Smallest change at an edge, relative to the largest distance from the fit; clipped peaks change less."""
+"""Smallest change at an edge, relative to the largest distance from the fit; smaller in clipped peaks."""
 _MOST_PER_S = 400.0
 """Largest number of drop-outs per second; a larger number indicates real motion."""
 _ORDER = 48
@@ -67,7 +67,7 @@ class Dropout(NamedTuple):
 
 
 def find_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
-    """Return the drop-outs: jumps away from the motion that later return to it.
+    """Return the drop-outs, in which the signal jumps away from the motion and later returns to it.
 
     ``velocity`` is about one second long, shape (samples,), with NaN for lost samples. Below a sample rate of
     20 kHz no drop-outs are reported.
@@ -100,12 +100,12 @@ def find_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ..
 
 
 def _hold_dropouts(velocity: Samples, longest: float) -> list[Dropout]:
-    """Return drop-outs in which the decoder repeats one value; noise may hide the corners at their edges."""
+    """Return drop-outs in which the decoder repeats one value; noise may hide the corners of a drop-out."""
     change = np.abs(np.diff(velocity))
     moves = np.flatnonzero(change != 0.0)
     first, last, equal = moves[:-1], moves[1:], np.diff(moves)
     steep = change > _QUANTA * np.min(change, where=change > 0.0, initial=np.inf)
-    # Samples of a clipped peak are also equal, but have the channel's largest magnitude.
+    # Samples of a clipped peak are also equal, so exclude the channel's largest magnitude.
     is_inside = np.abs(velocity[last]) < np.fmax.reduce(np.abs(velocity))
     held = (equal >= _LEAST_HELD) & (equal <= longest) & steep[first] & steep[last] & is_inside
     ends = zip(first[held].tolist(), last[held].tolist(), strict=True)
@@ -124,7 +124,7 @@ def _join(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def first_undecided(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Return the first sample of a drop-out that may still be undetected; without one, the sample count.
+    """Return the first sample of a drop-out that may still be undetected, or else the number of samples.
 
     ``velocity`` belongs to a channel that is still being recorded, shape (samples,), in which ``dropouts``
     were found.
@@ -149,7 +149,7 @@ def _corners(velocity: Samples) -> tuple[Samples, float]:
 
 
 def _apart(places: Places, distance: float) -> list[Places]:
-    """Split sorted sample numbers where two neighbours are more than ``distance`` apart."""
+    """Split sorted sample numbers wherever two neighbours differ by more than ``distance``."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
@@ -166,7 +166,7 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
         ways = []
         for first, so_far in enumerate(best):
             one = Dropout(begins[first], ends[last])
-            # The flanks end at the neighbouring runs, whose samples are not motion.
+            # The flanks end at the neighbouring runs, whose samples do not represent motion.
             before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
             is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
             is_short = one.stop - one.first <= longest + flank  # `flank` allows for ringing on both sides
@@ -179,14 +179,14 @@ def _explain(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: fl
 
 
 def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
-    """Return the ringing time of the converter's filter [samples]; `_SILENT` quiet samples mark its end."""
+    """Return the ringing time of the converter's filter [samples]; `_SILENT` quiet samples mark the end."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
 def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
-    """Return the mean square residual of a smooth fit to both flanks; infinite if this is not a drop-out.
+    """Return the mean square residual of a smooth fit to both flanks; infinite if the range is no drop-out.
 
     A drop-out jumps far away from the fit. A clipped peak is also far from the fit, but changes more slowly.
     """
@@ -200,7 +200,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
     if np.max(pace[before:-after]) < _JUMP * max(np.max(pace[:before]), np.max(pace[-after:])):
         return np.inf
     shape = np.polynomial.legendre.legvander(at, 5)
-    left = near - shape @ lstsq(shape[outside], near[outside])[0]
+    left = near - shape @ scipy.linalg.lstsq(shape[outside], near[outside])[0]
     rough = float(np.mean(left[outside] ** 2))
     distance = np.max(np.abs(left[~outside]))
     is_far = distance**2 > _OUTSTANDING**2 * rough
@@ -240,20 +240,20 @@ def _groups(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, 
 
 
 def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
-    """Return samples with unknown samples filled by linear prediction; unchanged if too few are known."""
+    """Return samples whose unknown values are filled by linear prediction; unchanged if too few are known."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
     windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))
     past, now = np.split(windows[whole.all(axis=1)], [_ORDER], axis=1)
     if len(past) < 2 * _ORDER:
         return near
-    predictor = lstsq(past, now[:, 0])[0]
+    predictor = scipy.linalg.lstsq(past, now[:, 0])[0]
     # Prediction errors of all windows, as a band matrix times the samples.
     row, column = np.zeros(near.size), np.zeros(near.size - _ORDER)
     row[: _ORDER + 1] = np.append(-predictor, 1.0)
     column[0] = row[0]
-    errors = toeplitz(column, row)
-    values[~known] = lstsq(errors[:, ~known], -errors @ values)[0]
+    errors = scipy.linalg.toeplitz(column, row)
+    values[~known] = scipy.linalg.lstsq(errors[:, ~known], -errors @ values)[0]
     return mean + values
 
 
@@ -265,7 +265,7 @@ _FOUND: WeakKeyDictionary[Recording, dict[tuple[str, int], tuple[Dropout, ...]]]
 class BridgedChannel:
     """The vibrometer's channel of a recording, read with its drop-outs bridged.
 
-    The search uses fixed blocks of one second, so that results do not depend on the range read.
+    The search uses fixed blocks of one second, so that results do not depend on the range that is read.
     """
 
     recording: Recording
@@ -276,7 +276,7 @@ class BridgedChannel:
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
-        # Include neighbouring drop-outs: the interpolation must not use their samples.
+        # Include neighbouring drop-outs, because the interpolation must not use samples of a drop-out.
         dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
         first = max(dropouts[0].first - _CONTEXT, 0)
         last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
@@ -308,6 +308,6 @@ class BridgedChannel:
         heard = find_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
         moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
         found = tuple(each for each in moved if first <= each.first < stop)
-        if end == stop + margin:  # otherwise a growing recording may add samples here
+        if end == stop + margin:  # here the recording no longer grows
             known[self.role, place] = found
         return found

@@ -1,7 +1,7 @@
 """Notes of a feedback controller in a recording, one model for each kind.
 
-A note is stored as an event: the event has the note's kind, and its text is a JSON object of all other
-values. Because an event's text is limited in length, notes of version 1 omit their version.
+A note is stored as an event: the event has the note's kind, and the event's text is a JSON object of all
+other values. Because an event's text is limited in length, notes of version 1 omit their version.
 """
 
 import json
@@ -22,12 +22,12 @@ class Steadiness(StrEnum):
 
     PERIODIC = "periodic"
     APERIODIC = "aperiodic"
-    """Statistically stationary without a short period: quasi-periodic or chaotic motion."""
+    """Statistically stationary motion without a short period: quasi-periodic or chaotic."""
     UNSETTLED = "unsettled"
 
 
 class Hold(StrEnum):
-    """Whether the controlled amplitude of the base (or of m0) was within its tolerance."""
+    """Whether the controlled amplitude of the base (or of m0) was within the tolerance."""
 
     WITHIN = "within tolerance"
     OUTSIDE = "outside tolerance"
@@ -74,7 +74,7 @@ Way = Literal["up", "down"]
 class AbstractNote(BaseModel):
     """Values of one result of a feedback controller, in the order in which they are written."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, defer_build=True)
 
     version: Literal[1] = VERSION
 
@@ -185,7 +185,7 @@ class ResonanceNote(AbstractNote):
 
     kind: Literal["resonance"] = "resonance"
     level: int
-    """Number of the level in the order played, from 0."""
+    """Number of the level in the order in which levels are played, from 0."""
     asked_m_per_s2: float
     frequency_hz: SixFigures | None
     """Frequency of the phase resonance; None where no resonance was found."""
@@ -201,13 +201,13 @@ class ResonanceNote(AbstractNote):
     tries: int
     lock: LockResult
     periods: int = 0
-    """Number of drive periods in the search or the phase-locked loop; 0 if it is not recorded."""
+    """Number of drive periods in the search or the phase-locked loop; 0 if the number is not recorded."""
     mode_hz: SixFigures | None = None
     """Natural frequency; absent if the flanks do not determine it."""
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
-    """Harmonic of m0 whose phase is used: above 1 for a superharmonic resonance."""
+    """Number of the harmonic of m0 whose phase is used: above 1 for a superharmonic resonance."""
     subharmonic: int = 1
     """Number of drive periods in one period of m0: above 1 for a subharmonic resonance."""
     harmonic_m: SixFigures | None = None
@@ -215,7 +215,7 @@ class ResonanceNote(AbstractNote):
 
 
 class NoiseNote(AbstractNote):
-    """Error of the base's spectrum over one realisation."""
+    """Error of the base spectrum during one realisation."""
 
     kind: Literal["spectrum"] = "spectrum"
     realisation: int
@@ -225,7 +225,7 @@ class NoiseNote(AbstractNote):
     asked_rms: SixFigures
     """Requested rms acceleration in the band at full level, with notches [m/s2]."""
     within: SixFigures
-    """Fraction of the spectral lines that are within the plan's tolerance of this realisation's target."""
+    """Fraction of the spectral lines within the plan's tolerance of the target of this realisation."""
     worst_db: SixFigures
     worst_hz: SixFigures
     notched: SixFigures
@@ -265,8 +265,7 @@ class BranchPointNote(AbstractNote):
     frequency_hz: SixFigures
     base_m: SixFigures
     base_u_m: SixFigures = 0.0
-    """Standard uncertainty [m], from the scatter of the averaged values; 0 if the recording does not state
-    it."""
+    """Standard uncertainty [m], from the scatter of the averaged values; 0 if the recording states none."""
     m0_m: SixFigures
     m0_u_m: SixFigures = 0.0
     phase_deg: SixFigures
@@ -286,7 +285,7 @@ class Stability(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     OPEN = "not determined"
-    """Stability is not determined, because the bounds of the multiplier include 1 or the motion changed."""
+    """Stability is not determined, because the bounds on the multiplier include 1 or the motion changed."""
 
 
 class BranchStabilityNote(AbstractNote):
@@ -301,7 +300,7 @@ class BranchStabilityNote(AbstractNote):
     multiplier_u: SixFigures | None
     """Standard uncertainty of this magnitude; 95 % bounds are at 2.1 times this uncertainty."""
     perturbation: SixFigures
-    """Requested relative rms change of the fundamentals of base and m0; applies to the larger of the two."""
+    """Requested relative rms change of the fundamentals of base and m0; applies to the larger change."""
     moved: SixFigures
     """Relative change of the fundamental of m0 from before to after the perturbations."""
 
@@ -325,12 +324,12 @@ class UntilNote(AbstractNote):
     longest_s: SixFigures
     """Longest time for which the step or dwell may be recorded [s]."""
     bounds: dict[str, SixFigures | None] = Field(default_factory=dict)
-    """Relative 95 % bounds at the last analysis, None if not determined; empty before the first analysis."""
+    """Relative 95 % bounds at the last analysis; None if not determined; empty before the first analysis."""
     looked_s: SixFigures = 0.0
     """Recorded time of the step or dwell at the last analysis [s]."""
     looks: int = 0
     hindrance: str = ""
-    """Reason why no bounds could be determined; empty if all were determined."""
+    """Reason why no bounds could be determined; empty if all bounds were determined."""
     recorded_s: SixFigures | None = None
     """Total recorded time of the step or dwell [s]; None while it is being recorded."""
 
@@ -347,13 +346,13 @@ class UntilNote(AbstractNote):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence with the bounds reached and requested, and the remaining or recorded time."""
+        """Return a sentence with the reached and requested bounds, and the remaining or recorded time."""
         text = ", ".join(
             f"{name} {'not known' if bound is None else f'± {100 * bound:.2g} %'} (goal: {100 * wish:.2g} %)"
             for name, wish in self.wishes.items()
             for bound in (self.bounds.get(name),)
         )
-        # The scatter of a mean falls with the square root of time.
+        # A mean's scatter is inversely proportional to the square root of the time.
         needed_s = self.looked_s * max(self.shares) ** 2 if self.bounds else inf
         if self.recorded_s is not None:
             end = "known well enough" if self.is_reached else "longest time"
@@ -383,12 +382,12 @@ FeedbackNote: TypeAlias = (
     | BranchEndNote
     | UntilNote
 )
-_NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
+_NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote, config=ConfigDict(defer_build=True))
 _KINDS = frozenset(note.model_fields["kind"].default for note in get_args(FeedbackNote))
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:
-    """Read a note from an event; None for other or truncated events.
+    """Return the note in an event; None for truncated events and events without a note.
 
     Raises RecordingError when the note is not valid, for example because a newer version wrote it.
     """

@@ -1,7 +1,7 @@
 """Finish a recording: compress, seal, check and rename it to ``NAME.h5``, then delete ``NAME.h5.part``.
 
 HDF5's filters run on one core, under a global lock. Here, threads shuffle (first bytes of all samples, then
-second bytes, ...) and deflate with zlib, which releases Python's lock. The bytes are the same.
+second bytes, ...) and deflate with zlib, which releases Python's lock. The resulting bytes are the same.
 """
 
 import hashlib
@@ -17,11 +17,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files.writing import open_hdf5_to_write
+from vibench.sim.hdf5_files import open_hdf5_to_write
 from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
-from ..host.log import LOG
+from ..host import LOG
 from ..instruments import Counts
 from . import _layout as layout, _tables as tables
 from ._disk import meet_trouble, sole_use
@@ -41,9 +41,9 @@ from ._reader import open_recording
 from ._seal import SealDepth, SealKey, SealState, check_seal, seal_key, write_seal
 from ._tables import Columns
 
-# Labelled curves in NeXus format for other programs, one per channel.
-# These programs do not scale counts, so the extremes of every bin are stored again in physical units. Drawn
-# as a line, they form the envelope of the signal.
+# Labelled curves in NeXus format, one per channel, for other programs. These programs do not scale counts, so
+# each curve contains the extremes of every bin in physical units. As a line, these extremes show the envelope
+# of the signal.
 
 SIGNAL = "values"
 FIRST_CHOICE = "m0_"
@@ -62,11 +62,11 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
     name = str(channel["long_name"]) or role
     data = view.create_group(role)
     write_attributes(data, {"NX_class": "NXdata", "signal": SIGNAL, "axes": layout.TIME, "time_indices": 0})
-    # Lowest and highest value of each bin alternate; both are NaN if all its samples are lost.
+    # The lowest and highest values of the bins alternate; both are NaN if all samples of a bin are lost.
     counts = np.column_stack((overview.low, overview.high)).ravel()
     values = counts * float(channel["scale_factor"]) + float(channel["add_offset"])
     physical = np.where(counts == layout.MISSING_COUNT, np.nan, values).astype(np.float32)
-    # silx does not label the vertical axis, so the title contains the unit too.
+    # The title also contains the unit, because silx does not label the vertical axis.
     write_text_dataset(data, "title", f"{title}: {role.replace('_', ' ')} [{channel['units']}]")
     write_attributes(
         data.create_dataset(SIGNAL, data=physical, compression="gzip", shuffle=True),
@@ -76,7 +76,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
             "comment": f"smallest and largest value of every {BIN_SAMPLES} samples, alternating",
         },
     )
-    # One dataset of times, linked from each channel's group.
+    # Write the times once, and link each channel's group to this dataset.
     times = next((each[layout.TIME] for each in view.values() if layout.TIME in each), None)
     if times is None:
         time_s = np.arange(counts.size) * (0.5 * BIN_SAMPLES / float(file.attrs["sample_rate_hz"]))
@@ -86,7 +86,7 @@ def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) 
 
 
 IN_FLIGHT_PER_WORKER = 4
-"""Number of queued chunks per worker, enough to keep workers and disk busy."""
+"""Number of queued chunks per worker thread, enough to keep threads and disk busy."""
 
 
 def create_counts(file: h5py.File, name: str, samples: int, chunk_samples: int) -> h5py.Dataset:
@@ -143,8 +143,8 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     """Create and seal ``NAME.h5`` from ``NAME.h5.part``, which :func:`discard` deletes later.
 
     The caller must have locked the ``.part``, which is not changed. ``written`` has the checksum of each
-    channel's recorded samples (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, writing
-    fails (the disk may be full), or the copy reads back differently from what was written.
+    channel's recorded samples (None in a recovery). Raises RecordingError when ``NAME.h5`` exists, when
+    writing fails (the disk may be full), or when the copy reads back differently from what was written.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)
@@ -157,7 +157,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         rename(tmp, final)
     # HDF5 reports a full disk as OSError or as RuntimeError.
     except (OSError, RuntimeError, KeyboardInterrupt) as error:
-        # The copy is incomplete and not needed: all its content is in the .part.
+        # Delete the incomplete copy: the .part contains all data.
         with suppress(OSError):
             tmp.unlink()
         if isinstance(error, (RecordingError, KeyboardInterrupt)):
@@ -172,17 +172,17 @@ def location(part: Path, error: Exception) -> str:
         is_there = part.exists()
     except OSError:  # the folder no longer responds
         is_there = False
-    # FileNotFoundError means that the recording was removed; a file with this name is a different file.
+    # After FileNotFoundError, the recording was removed, and a file of this name is a different file.
     if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (
         f"{part} was not found: the file or its folder was removed, moved or disconnected during the"
-        " recording; put it back and recover it, or measure again."
+        " recording; put the file back and recover it, or measure again."
     )
 
 
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` when ``NAME.h5`` would survive a power cut; a .part left over is harmless."""
+    """Delete ``NAME.h5.part`` when ``NAME.h5`` would survive a power cut; a remaining .part is harmless."""
     try:
         sync_folder(part.parent)
         part.unlink()
@@ -209,8 +209,8 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
             write_view(copy, role, overview, part.with_suffix("").stem)
             if written is not None and written[role] != digests[f"/{role}"]:
                 raise RecordingError(
-                    f"{part}: the samples of {role!r} differ from those recorded; check disk and memory."
-                    " The file is kept unchanged; recover it to get a recording of its readable samples."
+                    f"{part}: the samples of {role!r} differ from those recorded; check disk and memory. The "
+                    "file is kept unchanged; recover this file to get a recording of the readable samples."
                 )
         for table in layout.TABLES:
             _write_table(copy, table, _rows(source, table, samples))
@@ -220,7 +220,7 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
         found = check_seal(copy, SealDepth.WHOLE, key)
     if found.state is not SealState.INTACT:
         raise RecordingError(
-            f"{tmp} differs from what was written to it ({found.sentence}); check disk and memory. All"
+            f"{tmp} differs from the data written to it ({found.sentence}); check disk and memory. All"
             f" committed samples are safe in {part}; recover that file."
         )
 
@@ -311,8 +311,8 @@ def recover(path: Path | str) -> Path:
     ``path`` is ``NAME.h5.part`` or ``NAME.h5``. After a crash there may be
     only the ``.part``, or also an incomplete or complete compressed copy. All three cases are recovered.
 
-    Raises RecordingError when there is nothing to recover, the file is still being recorded, or is not a
-    recording of vibench.
+    Raises RecordingError when there is nothing to recover, when the file is still being recorded, or when it
+    is not a recording of vibench.
     """
     path = Path(path)
     final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path
@@ -341,7 +341,7 @@ def _finish(part: Path, final: Path, key: SealKey | None) -> None:
                 raise RecordingError(f"{part} is a finished recording; rename it to {final.name}")
             is_done = final.exists() and _holds(final, source.recording_id, part)
         if not is_done:
-            # A crash during the copy may have left a .tmp; all its content is in the .part.
+            # A crash during the copy may have left a .tmp. Delete it: the .part contains all data.
             layout.tmp_of(final).unlink(missing_ok=True)
             finalise(part, key)
 

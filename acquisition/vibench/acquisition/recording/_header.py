@@ -100,14 +100,14 @@ COUPLINGS = ("AC", "DC")
 _AC_CUT_HZ = 0.5
 """-3 dB frequency of the first-order AC coupling of NI 9234, 4431 and similar modules [Hz]."""
 OPTIONAL = ("sensitivity", "volts_per_count")
-"""Numbers that may be unknown: NaN in the file, None in a header."""
+"""Numbers that may be unknown; an unknown number is NaN in the file and None in a header."""
 UNPLANNED = -1
-"""Value of ``expected_samples`` in the file for a recording without a planned end."""
+"""Value of ``expected_samples`` in the file if the recording has no planned end."""
 
 FINE_STEP = 2.0**-30
 """Step of stored counts if the converter's step is unknown, as a fraction of the range.
 
-Twice the range still fits into an int32, and 2^-30 is 42 dB below a 24-bit converter's step.
+With this step, twice the range still fits into an int32; 2^-30 is 42 dB below a 24-bit converter's step.
 """
 
 
@@ -125,7 +125,7 @@ class ChannelHeader:
         "volts_at_zero_count": "V",
         "sensitivity": "{0.sensitivity_unit}",
     }
-    """Units of the values whose names contain no unit; ``{0.unit}`` is the channel's unit."""
+    """Units of those values whose names contain no unit; ``{0.unit}`` is the channel's unit."""
 
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""
@@ -210,14 +210,6 @@ class ChannelHeader:
             **absent,
         }
 
-    @classmethod
-    def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
-        """Return the header of the channel ``role`` from the attributes that :meth:`attributes` returned."""
-        given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
-        # NaN is the only value that differs from itself.
-        absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
-        return cls(**{**given, **absent, "role": role, "unit": attributes["units"]})  # type: ignore[arg-type]
-
 
 @dataclass(frozen=True)
 class RecordingHeader:
@@ -241,7 +233,7 @@ class RecordingHeader:
     confirmations: Mapping[str, str | float] = field(default_factory=dict)
     """Settings confirmed by the operator: amplifier gain, vibrometer range and filters."""
     bench_check_json: str = "{}"
-    """Result of the last bench check as JSON; ``{}`` if there was none."""
+    """Result of the last bench check as JSON; ``{}`` if there was no check."""
     provenance: Provenance = field(default_factory=collect_provenance)
 
     def __post_init__(self) -> None:
@@ -293,7 +285,7 @@ class RecordingHeader:
 
 
 def require_different(channels: Iterable[ChannelHeader]) -> tuple[ChannelHeader, ...]:
-    """Return the channels; raises RecordingError if there is no channel, or two have the same name."""
+    """Return the channels; raises RecordingError if there are none, or two channels share a name."""
     given = tuple(channels)
     roles = [channel.role for channel in given]
     if not roles or len(set(roles)) != len(roles):

@@ -22,7 +22,7 @@ FORMAT_VERSION = 1
 
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")
-"""HDF5 format versions: superblock 0, which every HDF5 reader since 1.8 understands, including MATLAB's."""
+"""HDF5 format versions: superblock 0, which all HDF5 readers since 1.8 understand, including MATLAB's."""
 
 SUFFIX = ".h5"
 PART_SUFFIX = ".part"
@@ -36,7 +36,7 @@ DEFLATE_LEVEL = 1
 COUNT_DTYPE = "<i4"
 COUNTER_DTYPE = "<i8"
 MISSING_COUNT = -(2**31)
-"""Count of a lost sample; it is CF's ``_FillValue``, so that other programs show NaN."""
+"""Count that marks a lost sample; it is CF's ``_FillValue``, so that other programs show NaN."""
 LARGEST_COUNT = 2**31 - 1
 
 N_VALID = "n_valid"
@@ -151,7 +151,7 @@ def part_of(path: Path) -> Path:
 
 
 def tmp_of(path: Path) -> Path:
-    """Return ``NAME.h5.tmp``, the path of a compressed copy or a ``.part`` that is not yet complete."""
+    """Return ``NAME.h5.tmp``, the path of a compressed copy or ``.part`` while it is incomplete."""
     return path.parent / (path.name + TMP_SUFFIX)
 
 
@@ -200,7 +200,7 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
             if len(raw) > ATTRIBUTE_BYTES:
                 raise RecordingError(
                     f"The text of {name!r} has {len(raw)} bytes; an HDF5 attribute holds at most "
-                    f"{ATTRIBUTE_BYTES}. Nothing was written; shorten it."
+                    f"{ATTRIBUTE_BYTES}. Nothing was written; shorten this text."
                 )
             dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
             target.attrs.create(name, np.array(raw, dtype=dtype), dtype=dtype)
@@ -249,7 +249,7 @@ def json_text(what: str, values: Mapping[str, Any]) -> str:
     except (TypeError, ValueError) as error:
         raise RecordingError(
             f"{what} cannot be stored as JSON: {error}. Give text, finite numbers, truth values, None,"
-            " or lists and mappings of them."
+            " or lists and mappings of these."
         ) from error
 
 

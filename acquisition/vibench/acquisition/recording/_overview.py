@@ -1,7 +1,7 @@
 """Overview: the smallest and largest count of every 128 samples, for plots of whole recordings.
 
-It is computed when a recording is finished, and stored in the group ``overview``. A viewer then opens
-long recordings as fast as short ones. Without an overview, the viewer reads the whole file once.
+The overview is computed when a recording is finished, and stored in the group ``overview``. A viewer then
+opens long recordings as fast as short recordings. Without an overview, the viewer reads the whole file once.
 """
 
 from collections.abc import Iterator
@@ -44,7 +44,7 @@ def extremes(counts: Counts) -> CountOverview:
 
 
 class OverviewSums:
-    """Overview of a channel whose counts arrive in pieces; all pieces but the last consist of whole bins."""
+    """Overview of a channel whose counts arrive in pieces; only the last piece may end within a bin."""
 
     def __init__(self) -> None:
         self._low: list[Counts] = []
@@ -92,7 +92,7 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
 
 
 def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | None:
-    """Read a channel's overview; None if it is missing or its shape is wrong."""
+    """Read a channel's overview; None if the overview is missing or has a wrong shape."""
     group = file.get(layout.OVERVIEW)
     if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
         return None

@@ -1,6 +1,6 @@
 """Creation of the file before the first sample, with all known data and reserved space.
 
-After that, until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
+From then until the recording ends, only bytes at known offsets are written. HDF5 has already closed the
 file, so a crash cannot damage its structure.
 """
 
@@ -18,7 +18,7 @@ from typing import TypeVar
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files.writing import open_hdf5_to_write
+from vibench.sim.hdf5_files import open_hdf5_to_write
 from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
@@ -31,15 +31,15 @@ MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
 """Margin added to the planned length: 5 % or 10 s, whichever is longer."""
 HOLD_ROOM_S = 600.0
-"""Additional length for pauses during a run [s]; disk space for it is reserved only as samples arrive."""
+"""Additional length for pauses during a run [s]; disk space for pauses is reserved only as samples arrive."""
 
 OPEN_ENDED_S = 24 * 3600.0
-"""Declared length of a recording without a planned end [s]; disk space is reserved as samples arrive."""
+"""Declared length of a recording that has no planned end [s]; disk space is reserved as samples arrive."""
 RESERVE_AHEAD_S = 60.0
 """Length of each further reservation when a recording outgrows its reserved space [s]."""
 
 ROOM_FACTOR = 2
-"""Ratio of required disk space to the size of the samples: a compressed copy is made at the end."""
+"""Ratio of required disk space to the size of the samples: at the end, a compressed copy is made."""
 
 ITEM_BYTES = 4
 
@@ -73,7 +73,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
 
     The file is written as ``.tmp`` and then renamed, so that a ``.part`` can always be opened. If the process
     is killed before the renaming, a ``.tmp`` without samples remains. Raises RecordingError when the file
-    exists already, its folder does not exist, or the disk is too full.
+    exists already, when its folder does not exist, or when the disk is too full.
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
@@ -112,13 +112,13 @@ def _lengths(header: RecordingHeader) -> tuple[int, int]:
 def _require_room(path: Path, needed_bytes: int) -> None:
     if not path.parent.is_dir():
         raise RecordingError(
-            f"The folder {path.parent} does not exist. Nothing was recorded; create it first."
+            f"The folder {path.parent} does not exist. Nothing was recorded; create this folder first."
         )
     free_bytes = shutil.disk_usage(path.parent).free
     if free_bytes < ROOM_FACTOR * needed_bytes:
         raise RecordingError(
-            f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (the recording, and its finished"
-            f" copy); the disk has {free_bytes / 1e6:.0f} MB free. Nothing was recorded; make"
+            f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (for the recording and its finished "
+            f"copy); the disk has {free_bytes / 1e6:.0f} MB free. Nothing was recorded; make"
             " room, or choose another folder or a shorter measurement."
         )
 
@@ -204,8 +204,8 @@ _one_at_a_time = threading.Lock()
 def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> Answer:
     """Apply ``change`` to a copy, then replace the file by the copy; return the result of ``change``.
 
-    A crash leaves the old file unchanged (and perhaps a ``.tmp``). If another program changes the file
-    meanwhile, ``change`` is repeated. Raises RecordingError when writing fails; the file is then unchanged.
+    A crash leaves the old file unchanged (and perhaps a ``.tmp``). If another program changes the file at the
+    same time, ``change`` is repeated. Raises RecordingError when writing fails; the file is then unchanged.
     """
     try:
         with _one_at_a_time:
@@ -222,18 +222,18 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
                     sync_file(tmp)
                     if _fingerprint(path) == before:
                         rename(tmp, path)
-                        with suppress(OSError):  # after a power cut, the old or the new file is complete
+                        with suppress(OSError):  # a power cut leaves the old or the new file
                             sync_folder(path.parent)
                         return answer
                 finally:
-                    with suppress(OSError):  # after the rename, the file no longer exists
+                    with suppress(OSError):  # no longer exists after the rename
                         tmp.unlink()
     except RecordingError:
         raise
     except (OSError, RuntimeError) as error:
         raise RecordingError(
-            f"nothing could be added to {path}: {error}. The file is unchanged; make room, or close the"
-            " programs that have it open, and try again."
+            f"nothing could be added to {path}: {error}. The file is unchanged; make room, or close the "
+            "programs that have the file open, and try again."
         ) from error
     raise RecordingError(
         f"another program changed {path} during {ATTEMPTS} attempts. Nothing was added; try again later."

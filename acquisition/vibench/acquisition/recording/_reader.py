@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files import door
+from vibench.sim import hdf5_files
 
 from ..errors import RecordingError
 from ..host.beside import ClosedOnLeaving
@@ -49,20 +49,20 @@ _LOCKED_OTHERWISE = "file locking flag values don't match"
 
 
 def open_hdf5(path: Path) -> h5py.File:
-    """Return the HDF5 file of a recording, opened for reading; it may still be growing.
+    """Return the HDF5 file of a recording, opened for reading; the file may still be growing.
 
     Raises RecordingError, with the reason, when the file is not a readable recording.
     """
     _require_file(path)
     try:
-        file = door.open_hdf5(path, locking=False)
-    except door.UnsafeHdf5 as error:
+        file = hdf5_files.open_hdf5(path, locking=False)
+    except hdf5_files.UnsafeHdf5 as error:
         raise RecordingError(f"{path} was not read: {str(error)[:LONGEST]}") from error
     except OSError as error:
         if _LOCKED_OTHERWISE in str(error):
             raise RecordingError(
-                f"another library of this program has already opened {path} with a different lock: close "
-                "it there first. The file was not touched."
+                f"another library of this program has already opened {path} with a different lock: close the "
+                "file there first. The file was not touched."
             ) from error
         require_reachable(str(path), error)
         raise RecordingError(
@@ -78,7 +78,7 @@ def open_hdf5(path: Path) -> h5py.File:
 
 
 def name_now(path: Path) -> Path:
-    """Return the current path of a recording: ``NAME.h5`` if the given ``.part`` has since been finished."""
+    """Return the current path of a recording: ``NAME.h5`` if the given ``.part`` has been finished since."""
     if path.suffix != layout.PART_SUFFIX or path.exists():
         return path
     final = path.with_suffix("")
@@ -95,8 +95,8 @@ def _require_file(path: Path) -> None:
     part = layout.part_of(path)
     if part.is_file():
         raise RecordingError(
-            f"{path} does not exist, but {part.name} does: it is being recorded, or was interrupted."
-            f" Open {part.name} to look at it, or recover it."
+            f"{path} does not exist, but {part.name} does: the recording is still running, or was "
+            f"interrupted. Open {part.name} to view it, or recover it."
         )
     raise RecordingError(f"{path} does not exist, or is not a file; vibench catalogue DIR lists recordings")
 
@@ -115,8 +115,8 @@ def _require_ours(path: Path, file: h5py.File) -> None:
     version = attributes.get("format_version")
     if version != layout.FORMAT_VERSION:
         raise RecordingError(
-            f"{path} has format version {str(version)[:LONGEST]}; this vibench reads version"
-            f" {layout.FORMAT_VERSION}. Update vibench to read it."
+            f"{path} has format version {str(version)[:LONGEST]}; this version of vibench reads version "
+            f"{layout.FORMAT_VERSION}. Update vibench."
         )
 
 
@@ -166,18 +166,18 @@ class RecordingDescription:
     started_utc: str
     recording_id: str
     samples_id: str
-    """SHA-256 of all channels' checksums, equal in copies; empty without samples or while the file grows."""
+    """SHA-256 of all channels' checksums, equal in copies; empty if the file grows or has no samples."""
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
     bench_check: Mapping[str, Any]
-    """Last bench check before the recording (``checked``, ``verdict``, ``findings``, ...); empty if none."""
+    """Last bench check before the recording (``checked``, ``verdict``, ``findings``, ...); or empty."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording(RecordingDescription, ClosedOnLeaving):
-    """One recording as it was when opened. Close it, or use it in a ``with`` block."""
+    """One recording as it was when opened. Use it in a ``with`` block, or `close` it."""
 
     samples: int
     """Number of valid samples per channel."""
@@ -185,7 +185,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
     channels: tuple[ChannelHeader, ...]
     plan: Mapping[str, Any]
     seal: str
-    """SHA-256 of the manifest, as stored in the file; empty without a seal. See `check_seal`."""
+    """SHA-256 of the manifest, as stored in the file; empty if there is no seal. See `check_seal`."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
@@ -215,7 +215,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
 
     @property
     def check_text(self) -> str:
-        """Result of the bench check before the run; empty if there is none."""
+        """Result of the bench check before the run; empty if there was no check."""
         return " ".join(each.text for each in self.events if each.kind == EventKind.CHECK)
 
     @property
@@ -238,7 +238,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
     def read(self, role: str, start: int = 0, stop: int | None = None) -> Samples:
         """Return samples ``start`` to ``stop`` (exclusive) in the channel's unit; lost samples are NaN.
 
-        Raises RecordingError when there is no such channel or range, or the file is damaged there.
+        Raises RecordingError when there is no such channel or range, or when the file is damaged there.
         """
         channel = self.channel(role)
         counts = self.read_counts(role, start, stop)
@@ -319,7 +319,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process has checked the whole file; later reads are then compared with that check."""
+        """Whether this process has checked the whole file; later reads are then compared with this check."""
         return was_checked(self.seal) and not journal_objection(self.path, self.seal)
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
@@ -354,7 +354,7 @@ class Recording(RecordingDescription, ClosedOnLeaving):
 
         No result is overwritten: if the name exists, ``-2``, ``-3``, ... is appended. The result is added to
         a copy, which then replaces the file, so that a crash cannot harm the samples. ``roles`` are the
-        channels used for the result (default: all); their checksums are stored with it.
+        channels used for the result (default: all); their checksums are stored with the result.
 
         Raises RecordingError when the recording is not finished, an axis does not fit, or writing fails.
         """
@@ -459,7 +459,7 @@ def _require_channel(file: h5py.File, role: str, samples: int) -> None:
     if len(dataset) < samples or (layout.N_VALID not in file and len(dataset) != samples):
         raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, the recording {samples}")
     if dataset.chunks is not None and dataset.id.get_num_chunks() != -(-len(dataset) // dataset.chunks[0]):
-        raise RecordingError(f"the channel {role!r} lacks some of its samples")
+        raise RecordingError(f"some samples of the channel {role!r} are missing")
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
@@ -468,5 +468,5 @@ def _growing(handle: OpenRecording) -> dict[str, object]:
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):
         state = RecordingState.INTERRUPTED
-        reason = "its program ended before it could record how the run ended"
+        reason = "the recording program ended before it could record how the run ended"
     return {"samples": tables.first_number(file, layout.N_VALID), "state": state, "reason": reason}

@@ -37,7 +37,7 @@ class ResultArray:
     """Real or complex numbers, in an array of any shape."""
     unit: str = "1"
     axes: tuple[str, ...] = ()
-    """Name of the axis array of each dimension (``("frequency",)``); empty if this array is an axis."""
+    """Name of the axis array of each dimension (``("frequency",)``); empty if the array itself is an axis."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
 
 
 def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of an array's axes; for files of earlier versions, derive them from the lengths."""
+    """Return the names of an array's axes; in files of earlier versions, names follow from the lengths."""
     if AXES in attributes:
         axes = tuple(json.loads(attributes[AXES]))
         if not all(isinstance(axis, str) for axis in axes):

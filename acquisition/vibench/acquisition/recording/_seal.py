@@ -2,8 +2,8 @@
 
 A manifest lists two checksums for every group and dataset: one of its attributes, type and shape, and one of
 its data. The SHA-256 of the manifest is the seal. With a key, the seal is also signed (HMAC, RFC 2104).
-Without a signature it shows only accidental changes: anyone can compute a new seal, but a signature needs the
-key. ``docs/recording-format.md`` shows how to check a seal without this package; reasons: decision 0031.
+An unsigned seal shows only accidental changes: anyone can compute a new seal, but a signature needs the key.
+``docs/recording-format.md`` shows how to check a seal without this package; reasons: decision 0031.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.hdf5_files.door import system_error, walk
+from vibench.sim.hdf5_files import system_error, walk
 
 from ..errors import RecordingError, RecordingUnreachable
 from ..instruments import Counts
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 MANIFEST = "manifest_json"
 SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
 RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
-"""Attributes of a result's group that contain its seal, and are therefore not sealed themselves."""
+"""Attributes of a result's group that contain the seal, and are therefore not sealed themselves."""
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
-"""HDF5 attributes that link axes. They contain addresses inside the file instead of data."""
+"""HDF5 attributes that link axes; these attributes contain addresses inside the file instead of data."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 LARGEST_TABLE_BYTES = 500_000_000
 """Largest multidimensional array [bytes]; such arrays (results) are read in one piece."""
@@ -53,7 +53,7 @@ DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
-"""SHA-256 states, by path of the dataset: one before each piece of data, and the final state."""
+"""SHA-256 states, by path of the dataset: the state before each piece of data, and the final state."""
 
 
 class SealDepth(StrEnum):
@@ -69,15 +69,15 @@ class SealState(StrEnum):
 
     INTACT = "intact"
     DAMAGED = "damaged"
-    """The file was changed after sealing."""
+    """The file was changed after it was sealed."""
     UNSEALED = "unsealed"
     """The file was written before seals existed; changes of scales, tables and plan cannot be detected."""
     SEAL_GONE = "seal_gone"
     """The file was written by a version that seals every recording, but its seal is missing."""
     UNFINISHED = "unfinished"
-    """The file is still being recorded, or was cut off; it is sealed when finished or recovered."""
+    """The file is still being recorded, or was cut off; it will be sealed when finished or recovered."""
     OTHER_KEY = "other_key"
-    """The file is unchanged, but not signed with the given key."""
+    """The file is unchanged, but is not signed with the given key."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +102,14 @@ class SealKey:
         return self.signature(b"name of this key")[:16]
 
     def signature(self, text: bytes) -> str:
-        """Return the signature of a text: HMAC-SHA-256 in hexadecimal digits."""
+        """Return the signature of a text: its HMAC-SHA-256 in hexadecimal digits."""
         return hmac.new(self._secret, text, hashlib.sha256).hexdigest()
 
 
 def seal_key(path: Path | None = None) -> SealKey | None:
-    """Return the key from a file, by default the file named by VIBENCH_SEAL_KEY; None without a file.
+    """Return the key from a file, by default the file named by VIBENCH_SEAL_KEY; None if there is no file.
 
-    Raises RecordingError when the file cannot be read, or the key is too short.
+    Raises RecordingError when the file cannot be read, or when the key is too short.
     """
     named = os.environ.get(KEY_VARIABLE, "") if path is None else str(path)
     if not named:
@@ -119,12 +119,12 @@ def seal_key(path: Path | None = None) -> SealKey | None:
     except OSError as error:
         raise RecordingError(
             f"The key {named} for seals cannot be read ({error.strerror}). Nothing was done; give the file"
-            f" of the key (--key, or the variable {KEY_VARIABLE}), or no key."
+            f" of the key (--key, or the variable {KEY_VARIABLE}), or give no key."
         ) from error
     if len(secret) < SHORTEST_KEY:
         raise RecordingError(
-            f"The key {named} for seals has {len(secret)} bytes; at least {SHORTEST_KEY} are needed. Make one"
-            " with: head -c 32 /dev/urandom | base64"
+            f"The key {named} for seals has {len(secret)} bytes; at least {SHORTEST_KEY} are needed. Make a "
+            "key with: head -c 32 /dev/urandom | base64"
         )
     return SealKey(secret)
 
@@ -183,7 +183,7 @@ def require_reachable(file: h5py.File | str, error: Exception) -> None:
 
 
 def seal_of(file: h5py.File) -> str:
-    """Return the seal stored in a recording, without checking it; empty if there is none."""
+    """Return the seal stored in a recording, without checking it; empty if there is no seal."""
     return str(read_attributes(file[layout.SEAL]).get(SHA256, "")) if layout.SEAL in file else ""
 
 
@@ -222,7 +222,7 @@ def copy_sentence(kept: FileIdentity, name: str, copy: FileIdentity) -> str:
 
 
 def seal_result(group: h5py.Group, key: SealKey | None) -> None:
-    """Seal a new result; its seal also covers the seal of its recording."""
+    """Seal a new result; the seal also covers the seal of the result's recording."""
     write_attributes(group, _marks(_result_text(group), key, RESULT_MARKS))
 
 
@@ -245,9 +245,9 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 
 
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
-    """Yield a dataset's data in pieces, in the order in which it is hashed."""
+    """Yield a dataset's data in pieces, in the order in which the data are hashed."""
     if dataset.ndim != 1:
-        if dataset.nbytes > LARGEST_TABLE_BYTES:  # a small compressed file may expand to more than this limit
+        if dataset.nbytes > LARGEST_TABLE_BYTES:  # decompressed data of a small file may exceed this limit
             raise RecordingError(f"{dataset.name} ({dataset.nbytes:.2g} bytes) is larger than any result")
         yield np.asarray(dataset[()])
         return
@@ -354,7 +354,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
         version = str(read_attributes(file).get("software_version", ""))
         sentence = (
             f"its seal is gone: vibench {version} seals every recording, so scales, tables or plan may have "
-            "been changed; restore it from a copy"
+            "been changed; restore the recording from a copy"
         )
         return SealCheck(SealState.SEAL_GONE, sentence, "")
     return _missing_seal("it was made before recordings were sealed", key)
@@ -393,8 +393,8 @@ def _sha256(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
 
 
-# Campaign journals list the seals of recordings, so they reveal a different recording under the same name.
-# Every check of a seal reads the journals too, so that all commands detect such a recording.
+# Campaign journals list the seals of recordings, and so show when another recording has taken a name. Every
+# check of a seal therefore also reads the journals.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 
@@ -413,7 +413,7 @@ class NotedSeal:
     seal: str
     """Seal in the table of points; for the file of an earlier attempt, the seal of that attempt."""
     attempt_seal: str
-    """Seal in the table of attempts; empty without an attempt, or for an attempt before seals existed."""
+    """Seal in the table of attempts; empty if there was no attempt, or if seals did not exist yet."""
 
 
 def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
@@ -432,13 +432,13 @@ def noted_seals(folder: Path) -> dict[str, list[NotedSeal]]:
 def journal_objection(path: Path, seal: str) -> str:
     """Return why a journal in the folder contradicts the recording's seal; empty if no journal does.
 
-    Both tables of a journal must have the same seal. If they differ, neither confirms the recording.
+    Both tables of a journal must contain the same seal. If they differ, neither confirms the recording.
     """
     noted = noted_seals(path.parent).get(path.name, [])
     stated = {each for one in noted for each in (one.seal, one.attempt_seal) if each}
     if stated and seal not in stated:
         point = noted[0].point
-        return f"its seal differs from that in the campaign's journal for {point}: it is another recording"
+        return f"its seal differs from the seal of {point} in the campaign's journal: it is another recording"
     for each in noted:
         if each.attempt_seal not in ("", each.seal):
             return f"the campaign's journal has two seals for {each.point}: the journal was changed"
@@ -469,7 +469,7 @@ def open_read_only(path: Path) -> sqlite3.Connection:
     """Open a database read-only, even in a read-only folder."""
     address = path.resolve().as_uri()
     try:
-        # If this connection could write, the last connection to close would clean up the database files.
+        # A connection in mode rw also cleans up the database files if it is the last to close.
         with close_on_error(open_database(f"{address}?mode=rw")) as connection:
             connection.execute("PRAGMA query_only = ON")
             connection.execute("SELECT 1 FROM sqlite_master").fetchone()
@@ -478,9 +478,9 @@ def open_read_only(path: Path) -> sqlite3.Connection:
         return open_database(f"{address}?mode=ro")
 
 
-# An analysis must read the same samples that were checked, although it reads the file again.
-# For each seal, the check therefore keeps the state of each channel's checksum before every piece. A piece
-# that is read later from a file with this seal is hashed again and compared with these states.
+# The check of a seal reads all samples. An analysis reads samples again, which must still be the same. For
+# each seal, the check therefore keeps the state of each channel's checksum before every piece. When a piece
+# is read again, it is hashed and compared with these states.
 
 _KNOWN: dict[str, ChannelStates] = {}
 """Checksum states, by seal; about 20 kB for a recording of one minute."""
@@ -492,7 +492,7 @@ def remember(seal: str, states: ChannelStates) -> None:
 
 
 def forget_checks() -> None:
-    """Forget all checks, so that files are checked again when they are next read."""
+    """Discard the results of all checks, so that files are checked again when they are next read."""
     _KNOWN.clear()
 
 
@@ -508,7 +508,7 @@ class CheckedCounts:
         self._last: dict[str, tuple[int, Counts]] = {}
 
     def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
-        """Return the counts of a range; raises ValueError if they were changed after the check."""
+        """Return the counts of a range; raises ValueError if the counts were changed after the check."""
         known = _KNOWN.get(seal)
         if known is None:
             return np.asarray(dataset[begin:end], dtype=np.int32)

@@ -39,7 +39,7 @@ class EventKind(StrEnum):
 
 
 REJECTED = "average rejected"
-"""Text of a mark that excludes the noise realisation that began last before the mark."""
+"""Text of a mark that excludes the last noise realisation that began before the mark."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Gap:
-    """Range of samples that were lost; they read as NaN."""
+    """Range of samples that were lost; lost samples are read as NaN."""
 
     first_sample: int
     last_sample: int
@@ -64,12 +64,12 @@ class Gap:
 
 @dataclass(frozen=True)
 class Segment:
-    """A named range of samples, with the numbers that its analysis needs."""
+    """A named range of samples, with the numbers that are needed to analyse it."""
 
     label: str
     first_sample: int
     last_sample: int
-    """Number of the last sample; one less than ``first_sample`` when the segment is empty."""
+    """Number of the last sample; ``first_sample`` minus one if the segment is empty."""
     is_complete: bool
     """False if the recording ended before the end of the segment."""
     numbers: Mapping[str, Number]
@@ -88,7 +88,7 @@ class Segment:
 def read_columns(file: h5py.File, table: Table) -> Columns:
     """Return the valid rows of a table, by column.
 
-    Raises RecordingError when a column is missing, has a wrong type or width, or has too many rows.
+    Raises RecordingError when a column is missing, or has a wrong type, a wrong width or too many rows.
     """
     group = file.get(table.name)
     if not isinstance(group, h5py.Group):
@@ -97,7 +97,7 @@ def read_columns(file: h5py.File, table: Table) -> Columns:
     if layout.N_ROWS in group:
         rows = first_number(group, layout.N_ROWS)
         if not 0 <= rows <= min(len(each) for each in datasets):
-            raise RecordingError(f"the table {table.name} states {rows} rows, but has fewer")
+            raise RecordingError(f"the table {table.name} declares {rows} rows, but has fewer")
     else:
         (rows, *others) = {len(each) for each in datasets}
         if others:
@@ -164,13 +164,13 @@ def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence
 def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
     """Return the rows of a table, limited to the valid samples.
 
-    Rows are written before the counters, so after a crash they may refer to missing samples. A segment that
-    is still open, or ends after the valid samples, is marked incomplete.
+    Rows are written before the counters, so after a crash the rows may refer to missing samples. A segment
+    that is still open or that ends after the valid samples is marked incomplete.
     """
     if table is layout.SEGMENTS:
         first = np.minimum(columns["first_sample"], n_valid)
         last = columns["last_sample"]
-        # A power cut may leave a complete segment without its end; an empty one at sample 0 ends at -1.
+        # A power cut may leave a complete segment without an end. An empty segment at sample 0 ends at -1.
         is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
         is_cut = is_open | (last >= n_valid)
         return {
@@ -219,7 +219,7 @@ class SegmentLabel(StrEnum):
     SWEEP = "sweep"
     DWELL = "dwell"
     STEP = "step"
-    """A frequency or a level of the plan's list."""
+    """A frequency or a level in the plan's list."""
     SEARCH = "search"
     """A frequency that was added to localise a jump."""
     RESONANCE = "resonance"

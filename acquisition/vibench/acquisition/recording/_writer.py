@@ -9,7 +9,6 @@
 """
 
 import hashlib
-import os
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -20,8 +19,9 @@ import numpy as np
 from vibench.sim.operating_system.this import Buffer
 
 from ..errors import RecordingError
-from ..host.log import LOG
+from ..host import LOG
 from ..instruments import Block, Counts, Samples
+from ..stopping.stop import DescriptorReserve
 from . import _layout as layout
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer, Journal, Number
 from ._disk import PositionedFile, open_disk
@@ -56,9 +56,9 @@ class CountScale:
         if not inside.all():
             row, column = np.argwhere(~inside)[0]
             raise RecordingError(
-                f"{self._roles[row]!r} reads {rounded[row, column] * self._step_v[row, 0]:g} V, which is"
-                f" {rounded[row, column]:g} steps of {self._step_v[row, 0]:g} V; at most 2^31 - 1 fit."
-                " The block was not recorded; correct volts_per_count or range_v of the channel."
+                f"{self._roles[row]!r} reads {rounded[row, column] * self._step_v[row, 0]:g} V, which is "
+                f"{rounded[row, column]:g} steps of {self._step_v[row, 0]:g} V; at most 2^31 - 1 steps can "
+                "be stored. The block was not recorded; correct volts_per_count or range_v of the channel."
             )
         self._require_whole_counts(np.abs(scaled - rounded))
         return np.ascontiguousarray(rounded.astype(COUNT_DTYPE))
@@ -68,38 +68,15 @@ class CountScale:
         if (worst > COUNT_TOLERANCE).any():
             row = int(worst.argmax())
             raise RecordingError(
-                f"The volts of {self._roles[row]!r} differ by up to {worst[row]:.2f} counts from whole steps"
-                f" of {self._step_v[row, 0]:g} V. The block was not recorded, because its counts would give"
-                " other volts; correct volts_per_count and volts_at_zero_count, or set volts_per_count"
-                " to None to store the volts in steps of 2^-30 of the range."
+                f"The volts of {self._roles[row]!r} differ by up to {worst[row]:.2f} counts from whole steps "
+                f"of {self._step_v[row, 0]:g} V. The block was not recorded, because its counts would not "
+                "reproduce the volts; correct volts_per_count and volts_at_zero_count, or set "
+                "volts_per_count to None to store the volts in steps of 2^-30 of the range."
             )
 
 
 RESERVED = 8
-"""Number of reserved file descriptors: for recording and copy, folder and disk checks, and journal."""
-
-
-class DescriptorReserve:
-    """File descriptors kept in reserve during the run, then released to finish the recording."""
-
-    def __init__(self) -> None:
-        self._held: list[int] = []
-        try:
-            for _ in range(RESERVED):
-                self._held.append(os.open(os.devnull, os.O_RDONLY))
-        except OSError as error:
-            self.close()
-            raise RecordingError(
-                f"this process may open no more files ({error}), but a recording needs {RESERVED} more to "
-                "finish. Nothing was recorded; raise its limit (ulimit -n), or close other programs"
-            ) from error
-
-    def close(self) -> None:
-        """Release the reserved descriptors. May be called at any time."""
-        while self._held:
-            os.close(self._held.pop())
-
-
+"""Number of reserved file descriptors: for recording, copy, folder checks, disk checks and journal."""
 QUEUE_S = 10.0
 """Capacity of the queue of samples to be written [s]; the slowest measured disk sync took 0.12 s."""
 GAP_PIECE_SAMPLES = 51_200
@@ -111,7 +88,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
     """Create ``NAME.h5.part`` with all data known before the run, and return its writer.
 
     Raises RecordingError if the name is not ``NAME.h5``, if the file, its ``.part`` or its ``.tmp`` exists,
-    or if the disk has no room for the planned samples.
+    or if the disk has no space for the planned samples.
     """
     path = Path(path)
     if path.suffix != layout.SUFFIX:
@@ -121,23 +98,31 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
         if taken.exists() or taken.is_symlink():
             raise RecordingError(
                 f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
-                " (an interrupted recording leaves a .part or .tmp file: recover it first)."
+                " (an interrupted recording leaves a .part or .tmp file: recover that file first)."
             )
     key = seal_key()
-    reserve = DescriptorReserve()
+    reserve = DescriptorReserve(RESERVED)
+    try:
+        reserve.hold()
+    except OSError as error:
+        reserve.release()
+        raise RecordingError(
+            f"this process may open no more files ({error}), but a recording needs {RESERVED} more files to "
+            "finish. Nothing was recorded; raise the limit (ulimit -n), or close other programs"
+        ) from error
     try:
         places = preallocate(path, part, header)
         return RecordingWriter(path, header, places, open_disk(part), reserve=reserve, key=key)
     except BaseException:
-        reserve.close()
+        reserve.release()
         raise
 
 
 class RecordingWriter:
     """Writer of a recording, for use by one thread; a second thread writes to the disk.
 
-    Leaving the ``with`` block finishes the recording, unless it is finished already. Its state is then
-    complete, stopped (after KeyboardInterrupt) or failed (after any other exception).
+    Leaving the ``with`` block finishes the recording, unless it is finished already. The state of the
+    recording is then complete, stopped (after KeyboardInterrupt) or failed (after any other exception).
     """
 
     def __init__(
@@ -174,13 +159,13 @@ class RecordingWriter:
     def append(self, block: Block) -> None:
         """Append the next samples; wait only if the disk is seconds behind.
 
-        Samples missing between the previous block and this block are marked as a gap; they read as NaN.
+        Samples missing between the previous block and this block are marked as a gap, and are read as NaN.
 
         Raises RecordingError when the block does not fit (wrong shape or order, volts that are not whole
-        counts, full recording), or the disk has failed. Committed samples are kept.
+        counts, full recording), or when the disk has failed. Committed samples are kept.
         """
         self._check(block)
-        # Counts that come from the converter are recorded unchanged.
+        # Record counts of the converter unchanged.
         counts = (
             self._scale.counts(block.volts) if block.counts is None else np.ascontiguousarray(block.counts)
         )
@@ -218,8 +203,8 @@ class RecordingWriter:
     def finish(self, state: RecordingState, reason: str = "") -> Path:
         """End the recording and turn it into ``NAME.h5``; a second call changes nothing.
 
-        Raises RecordingError when the disk has failed. Samples committed before that are kept in ``NAME.h5``
-        or ``NAME.h5.part``; the message says which.
+        Raises RecordingError when the disk has failed. Samples committed before the failure are kept in
+        ``NAME.h5`` or ``NAME.h5.part``; the message says which.
         """
         if state not in ENDINGS:
             raise RecordingError(
@@ -230,7 +215,7 @@ class RecordingWriter:
             return self.path
         self._is_finished = True
         if self._reserve is not None:
-            self._reserve.close()
+            self._reserve.release()
         self._committer.close()
         failure = self._committer.failure
         if failure is not None:
@@ -259,7 +244,7 @@ class RecordingWriter:
         try:
             self.finish(state, f"{type(error).__name__}: {error}".removesuffix(": "))
         except RecordingError as second:
-            # The first error is the cause; an error of finishing must not hide it.
+            # An error while finishing must not hide the first error, which is the cause.
             error.add_note(str(second))
 
     def _check(self, block: Block) -> None:
@@ -289,10 +274,10 @@ class RecordingWriter:
     def _require_capacity(self, end: int) -> None:
         if end > self._places.capacity:
             raise RecordingError(
-                f"The recording is full: the block ends at sample {end}, and {self._places.capacity} fit"
-                f" (planned: {self._header.expected_samples}, plus a margin). The {self.samples} samples"
-                " before it are kept; plan a longer measurement, or leave its length open"
-                " (expected_samples=None)."
+                f"The recording is full: the block ends at sample {end}, but only {self._places.capacity} "
+                f"samples fit (planned: {self._header.expected_samples}, plus a margin). The {self.samples} "
+                "samples recorded so far are kept; plan a longer measurement, or leave its length open "
+                "(expected_samples=None)."
             )
 
     def _reserve_up_to(self, end: int) -> None:
@@ -327,7 +312,7 @@ class RecordingWriter:
         )
 
     def _write_ending(self, state: RecordingState, reason: str) -> None:
-        """Write the reason before the state, so that a state never lacks its reason."""
+        """Write the reason before the state, so that there is never a state without a reason."""
         why = encode(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
         try:
             self._disk.write(self._places.reason, why)

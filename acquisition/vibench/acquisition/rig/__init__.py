@@ -1,4 +1,4 @@
-"""The hardware configuration of a rig: signal chain, channels, limits, linear model, knobs set by hand.
+"""The hardware configuration of a rig: signal chain, channels, limits, linear model, and manual settings.
 
 `load_rig` reads the configuration from TOML; with the table ``[virtual]`` the rig is simulated. `RigModel`
 describes the chain from voltage at the generator's terminal to amplifier, coil, table and specimen, which

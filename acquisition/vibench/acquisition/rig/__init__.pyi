@@ -58,6 +58,7 @@ from ._sensors import (
     AccelerometerConfig as AccelerometerConfig,
     Role as Role,
     SensorConfig as SensorConfig,
+    Sourced as Sourced,
     StatedUncertainty as StatedUncertainty,
     TransducerConfig as TransducerConfig,
     VibrometerConfig as VibrometerConfig,

@@ -36,7 +36,7 @@ from ._sensors import (
 TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
 """Metadata key of the token in a gRPC call."""
 TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
-"""Environment variable for the token; on a command line, other users could see it."""
+"""Environment variable for the token; on a command line, other users could see the token."""
 
 
 def token_from_env() -> str:
@@ -47,7 +47,7 @@ def token_from_env() -> str:
 USUAL_GRID_RATE_HZ = 102_400.0
 """Default number of computed time steps per second on the virtual rig (its grid)."""
 COARSEST_GRID_RATE_HZ = 12_800.0
-"""Smallest number of time steps per second; with it, the base motion at `WATCHED_HZ` is 0.8 % too small."""
+"""Smallest number of time steps per second; the base motion at `WATCHED_HZ` is then 0.8 % too small."""
 WATCHED_HZ = 500.0
 """Frequency at which a grid's error is judged: highest specimen resonance and end of the paper's range."""
 _MEASURED = 0.55
@@ -66,8 +66,8 @@ class VirtualConfig(FrozenModel):
     """Pace of rig time: ``"free"`` is as fast as possible, ``"wall"`` is ``speed`` times real time."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
-    """Number of computed steps per second: 12,800 to 102,400, and at least twice the sample rate. A coarser
-    grid is faster but less accurate (docs/decisions/0006-virtual-rig.md)."""
+    """Number of computed steps per second: 12,800 to 102,400, and at least twice the sample rate. Fewer steps
+    are faster but less accurate (docs/decisions/0006-virtual-rig.md)."""
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
     generator_noise_v: NonNegativeFloat
@@ -81,7 +81,7 @@ class VirtualConfig(FrozenModel):
     faults: str | None = None
     """Path of a fault script, relative to the folder of this file; see docs/campaigns.md."""
     converter_noise_v: NonNegativeFloat
-    """Noise of each converter input, rms; the same at any sample rate [V]."""
+    """Rms noise of each converter input, the same at any sample rate [V]."""
 
     @field_validator("grid_rate_hz")
     @classmethod
@@ -91,7 +91,7 @@ class VirtualConfig(FrozenModel):
                 f"the virtual rig needs {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a second: "
                 f"with fewer, the base motion would be more than "
                 f"{level_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.1%} too small at {WATCHED_HZ:g} Hz; give "
-                "a rate in this range, or leave it out"
+                "a rate in this range, or leave the rate out"
             )
         return rate_hz
 
@@ -99,8 +99,8 @@ class VirtualConfig(FrozenModel):
 def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
     """Return the largest relative amount by which the base motion of a sine is too small.
 
-    Averaging and holding the drive over a step h contributes (pi f h)^2 / 3. The extrapolation of the
-    specimen's force on the table over the step contributes the rest. The specimen's response is exact.
+    Averaging and holding the drive over a step h contribute (pi f h)^2 / 3. The remaining part comes from the
+    extrapolation of the specimen's force on the table over the step. The specimen's response is exact.
     """
     return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
 
@@ -118,10 +118,10 @@ def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
 
 
 class OutputUse(StrEnum):
-    """Excitations that an analogue output plays; the function generator plays the others."""
+    """Excitations that an analogue output plays; the function generator plays all other excitations."""
 
     STREAMS = "streams"
-    """Only signals that do not repeat and therefore do not fit into a generator's memory."""
+    """Only signals that do not fit into a generator's memory, because they do not repeat."""
     TONES_AND_STREAMS = "tones_and_streams"
     """Also sines (dwells, steps and sweeps), for a bench with a permanently connected output."""
 
@@ -129,26 +129,26 @@ class OutputUse(StrEnum):
 class OutputConfig(FrozenModel):
     """An analogue output that drives the amplifier with signals too long for a function generator.
 
-    The output plays the voltage that a generator's terminal has at the same setting, so ``amplitude_vpp``
-    has the same meaning for both. Connect only one of the two to the amplifier: even at 0 V, an output of
-    50 ohm in parallel would halve the generator's voltage. The check at low level before every run detects
-    a wrong connection.
+    The output plays the voltage that a generator's terminal has at the same setting, so ``amplitude_vpp`` has
+    the same meaning for output and generator. Connect only the output or the generator to the amplifier: even
+    at 0 V, an output of 50 ohm in parallel would halve the generator's voltage. The check at low level before
+    every run detects a wrong connection.
     """
 
     physical: str = Field(pattern=r"^ao\d+$")
     """Name of the output on the device: ``"ao0"``."""
     plays: OutputUse = OutputUse.STREAMS
     device: str | None = None
-    """Device name of the output's module, if it differs from the converter's. Both devices must be able to
-    share a start trigger, as modules in one chassis can."""
+    """Device name of the output's module, if it differs from the device name of the converter. Both devices
+    must be able to share a start trigger, as modules in one chassis can."""
     limit_v: PositiveFloat = Field(le=10.0)
     """Largest allowed magnitude of the output voltage [V]."""
     sample_rate_hz: PositiveFloat
     """Sample rate of the output, which the hardware must support exactly [samples/s]."""
     # At least three blocks of a run: one is being played, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
-    """Duration of the samples written in advance [s]. It is also the longest pause of this computer that is
-    tolerated, and the delay of an early ramp down."""
+    """Duration of the samples written in advance [s]. This is also the longest tolerated pause of this
+    computer, and the delay of an early ramp down."""
     source: str = Field(min_length=1)
     """Source of the values ``limit_v`` and ``sample_rate_hz``."""
 
@@ -172,7 +172,7 @@ class GeneratorConfig(FrozenModel):
     resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
     """VISA resource name; empty for a generator without VISA."""
     options: Options = Field(default_factory=dict)
-    """Further settings of the driver; the drivers of this package have none."""
+    """Further settings of the driver; the drivers of this package have no further settings."""
     visa_library: str = "@py"
     """VISA library: ``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
@@ -208,7 +208,7 @@ class GeneratorConfig(FrozenModel):
 
 
 class AmplifierConfig(FrozenModel):
-    """The power amplifier. Its settings cannot be read back, so the operator confirms them."""
+    """The power amplifier. Its settings cannot be read back, so the operator confirms the settings."""
 
     model: str
     serial: str = ""
@@ -248,7 +248,7 @@ class ShakerLimits(FrozenModel):
 
 
 class ShakerConfig(FrozenModel):
-    """An electrodynamic shaker, modelled as a coil and a suspended mass, with its fixture."""
+    """An electrodynamic shaker with its fixture, modelled as a coil and a suspended mass."""
 
     model: str
     serial: str = ""
@@ -268,7 +268,7 @@ class ShakerConfig(FrozenModel):
     def _can_be_computed_with(self) -> Self:
         for name, value in self.model_dump().items():
             if isinstance(value, float) and value > _LARGEST:
-                raise ValueError(f"{name} = {value:g} is too large to compute with; correct it")
+                raise ValueError(f"{name} = {value:g} is too large to compute with; correct this value")
         return self
 
 
@@ -285,7 +285,7 @@ class ChannelConfig(FrozenModel):
     attenuation: PositiveFloat = 1.0
     """Voltage divider in front of the input: source voltage per input voltage [V/V]."""
     sensor: str | None = None
-    """Name of an entry point of ``vibench.sensors``; if absent, the default of the role."""
+    """Name of an entry point of ``vibench.sensors``; if absent, the default of the channel's role."""
     options: Options = Field(default_factory=dict)
     """Further settings of the sensor's plug-in."""
     calibrated: date
@@ -335,7 +335,7 @@ class DaqConfig(FrozenModel):
 
 
 class SpecimenConfig(SpecimenTable):
-    """The specimen on the shaker: a named specimen, and values that differ from it."""
+    """The specimen on the shaker: a named specimen, and the values that differ from the named specimen."""
 
     amplitude_limit_m: Sourced
     """Largest displacement of any mass without damage to the springs [m]."""
@@ -371,7 +371,7 @@ class ControllerConfig(FrozenModel):
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Time without a message after which the controller ramps down by itself [s]."""
     pd_of: LoopInput | None = None
-    """The one input of a proportional-derivative law; absent if the controller accepts any linear law."""
+    """The only input of a proportional-derivative law; absent if the controller accepts any linear law."""
     source: str = Field(min_length=1)
     """Source of the values for sample rate, latency and limit."""
 
@@ -401,7 +401,7 @@ class Rig(FrozenModel):
     """Real-time controller that can replace the generator; optional."""
     calibration_valid_days: PositiveInt = 730
     check_valid_h: PositiveFloat = 12.0
-    """Time for which the bench may be armed after a passed bench check [h]."""
+    """Time after a passed bench check during which the bench may be armed [h]."""
     virtual: VirtualConfig | None = None
     """Settings of a virtual rig, whose instruments are all simulated; absent for a real rig."""
 
@@ -411,7 +411,7 @@ class Rig(FrozenModel):
             if role.quantity == "voltage":
                 raise ValueError(f"sensors.{role}: a voltage channel has no sensor; remove the table")
             if sensor_table(role) != f"sensors.{role}":
-                raise ValueError(f"sensors.{role}: describe it in the table [{sensor_table(role)}]")
+                raise ValueError(f"sensors.{role}: describe this sensor in the table [{sensor_table(role)}]")
             try:
                 sensor.units_per_volt(role.unit)
             except ValueError as error:
@@ -429,7 +429,7 @@ class Rig(FrozenModel):
         return self
 
     def sensor(self, role: Role) -> SensorConfig | None:
-        """Return the sensor of a channel; None for a voltage, or if no sensor is described."""
+        """Return the sensor of a channel; None for a voltage, and if no sensor is described."""
         described = {Role.BASE_ACCELERATION: self.accelerometer, Role.M0_VELOCITY: self.vibrometer}
         is_scanned = role in SCANNED_ROLES and Role.M0_VELOCITY not in self._roles
         return described.get(role, self.sensors.get(role, self.vibrometer if is_scanned else None))

@@ -18,7 +18,7 @@ from ._sensors import Role, sensor_table
 
 
 class Sensor(Protocol):
-    """Entry point of ``vibench.sensors``: returns the properties of a sensor; may query its instrument."""
+    """Entry point of ``vibench.sensors``: returns the properties of a sensor, and may query an instrument."""
 
     def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
         """Return the properties of the sensor at an input of the converter."""
@@ -94,7 +94,7 @@ class Channel:
     units_per_volt: float
     """Physical units per volt at the converter's input."""
     full_scale_v: float
-    """Largest usable voltage at the input: the smaller of the sensor's output limit and the range [V]."""
+    """Largest usable voltage at the input [V]: the sensor's output limit or the range, if that is smaller."""
     range_v: float
     coupling: str
     iepe_current_a: float
@@ -130,7 +130,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# A confirmation is valid for a campaign of a day and a night. After that, settings may have changed.
+# A confirmation is valid long enough for a campaign of 24 hours. After that, settings may have changed.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
@@ -143,9 +143,14 @@ class KnobSheet(FrozenModel):
     confirmed: AwareDatetime
     knobs: tuple[Knob, ...]
 
+    @property
+    def values(self) -> dict[str, str]:
+        """Value of each setting, keyed by the names of instrument and setting."""
+        return {f"{knob.instrument} {knob.setting}": knob.value for knob in self.knobs}
+
 
 Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
-"""Function that asks whether settings are right and returns the sheet; raises CheckFailed if one is wrong."""
+"""Function that asks whether settings are right and returns the sheet; CheckFailed if a setting is wrong."""
 
 
 def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -192,10 +197,10 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
-    """Return a function that accepts an earlier confirmation if it is recent and has the same settings.
+    """Return a function that accepts an earlier confirmation that is recent and has the same settings.
 
     ``path`` is a sheet from `save_knob_sheet`; ``valid`` is the time for which the sheet is valid. The
-    function raises CheckFailed if the sheet is older or its settings differ.
+    function raises CheckFailed if the sheet is older or if its settings differ.
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -223,7 +228,7 @@ def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ..
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Save a sheet, or replace an older one; raises ConfigurationError if the file there is not a sheet."""
+    """Save a sheet, or replace an older sheet; raises ConfigurationError if the old file is no sheet."""
     if path.exists():
         load_knob_sheet(path)
     save_toml(sheet, path)
@@ -281,7 +286,7 @@ class Calibration:
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
     """Return the calibrations of a rig: of every sensor with a calibration date, and of every input.
 
-    Ages are those on the date ``today``.
+    Ages of calibrations refer to the date ``today``.
     """
     channels = channels_of(rig)
     sensors = dict.fromkeys(

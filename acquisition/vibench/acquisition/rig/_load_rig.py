@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from ..errors import ConfigurationError
-from ..host.shipped import file_path
+from ..host.installation import file_path
 from ..host.toml_file import load_toml
 from ..instruments import (
     AnalogOutput,
@@ -34,7 +34,7 @@ def load_rig(path: Path | str) -> Rig:
 
 
 def plug_ins_of(rig: Rig) -> dict[tuple[PlugInKind, str], str]:
-    """Return the plug-ins that a hardware configuration names: the key of each, by kind and name."""
+    """Return the plug-ins that a hardware configuration names: the key of each plug-in, by kind and name."""
     named = {
         (PlugInKind.GENERATOR, rig.generator.driver): "generator.driver",
         (PlugInKind.DIGITIZER, rig.daq.driver): "daq.driver",
@@ -54,7 +54,7 @@ def with_faults(rig: Rig, script: Path) -> Rig:
     """
     if rig.virtual is None:
         raise ConfigurationError(
-            f"{script}: faults can be scripted only on a virtual rig, and {rig.name!r} is a real one. "
+            f"{script}: faults can be scripted only on a virtual rig, and {rig.name!r} is a real rig. "
             "Nothing was opened; leave the script out, or give a rig with a [virtual] table"
         )
     script = file_path(script, "hardware_configs/faults")
@@ -71,7 +71,7 @@ class GeneratorDriver(Protocol):
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open and return a generator with its output off and its smallest amplitude set.
 
-        Raises InstrumentError when no instrument responds, or a different one; nothing then stays open.
+        Raises InstrumentError, and closes all connections, if no instrument or a wrong instrument responds.
         """
 
 
@@ -94,15 +94,15 @@ class OutputDriver(Protocol):
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:
-    """Return the driver of a generator; raises ConfigurationError if it is not installed."""
+    """Return the driver of a generator; raises ConfigurationError if the driver is not installed."""
     return cast("GeneratorDriver", driver_of(PlugInKind.GENERATOR, config.driver, GeneratorDriver))
 
 
 def digitizer_driver(rig: Rig) -> DigitizerDriver:
-    """Return the driver of a converter; raises ConfigurationError if it is not installed."""
+    """Return the driver of a converter; raises ConfigurationError if the driver is not installed."""
     return cast("DigitizerDriver", driver_of(PlugInKind.DIGITIZER, rig.daq.driver, DigitizerDriver))
 
 
 def output_driver(rig: Rig) -> OutputDriver:
-    """Return the driver of an analogue output; raises ConfigurationError if it is not installed."""
+    """Return the driver of an analogue output; raises ConfigurationError if the driver is not installed."""
     return cast("OutputDriver", driver_of(PlugInKind.OUTPUT, rig.daq.driver, OutputDriver))

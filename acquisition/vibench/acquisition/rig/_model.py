@@ -16,7 +16,7 @@ from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
-"""Ratio of peak to rms of a sine; the limiter is set to the rms current of the largest unlimited sine."""
+"""Ratio of peak to rms of a sine; the limiter's setting is the rms current of the largest unlimited sine."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
@@ -74,10 +74,10 @@ class OnTable(StrEnum):
 class RigModel:
     """A rig from the generator's terminal to table and specimen, linear except for the specimen's stops.
 
-    Coil, table and specimen are solved together (`vibench.sim.shaker`), because the specimen changes the
-    table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops are
-    included to first order. Clipping, the current limiter, the table's stops and its axial resonance above
-    15 kHz are not included; the virtual rig, or a check on the real rig, covers these effects.
+    Coil, table and specimen are solved together (`vibench.sim.shaker`), because near its resonances the
+    specimen changes the table's motion by some decibels. Where a sine moves p beyond the gap, the stops are
+    included to first order. Clipping, the current limiter, the table's stops and its axial resonance above 15
+    kHz are not included; the virtual rig, or a check on the real rig, covers these effects.
     """
 
     rig: Rig
@@ -99,11 +99,11 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the same quantity as `transfer`, but with m1 fixed to m2 by the stops."""
+        """Return the same quantity as `transfer`, but with the stops fixing m1 to m2."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck_motion)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Return the complex ``quantity`` per metre of p imposed by the stops, shape of ``frequency_hz``."""
+        """Return the complex ``quantity`` per metre of p that the stops impose; shape of ``frequency_hz``."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
 
     def under_sines(

@@ -14,7 +14,7 @@ from ..host.toml_file import FrozenModel
 
 _VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
 _STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
-"""Standard gravity [m/s2] and pound [kg], exact by definition (NIST SP 811)."""
+"""Standard gravity [m/s2] and pound [kg], both exact by definition (NIST SP 811)."""
 _UNITS = {
     "m s-2": {
         **dict.fromkeys(("m/s2", "m s-2", "ms-2"), 1.0),
@@ -33,7 +33,7 @@ _UNITS = {
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "lbf": _POUND_KG * _STANDARD_GRAVITY},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
 }
-"""Value of each data-sheet unit in SI units, by the SI unit of the recorded quantity."""
+"""Value of each data-sheet unit in SI units, keyed by the SI unit of the recorded quantity."""
 _EXAMPLES = {
     "m s-2": "'100 mV/g' or '10 mV/(m/s2)'",
     "m s-1": "'250 mm/s/V' or '4 V/(m/s)'",
@@ -41,7 +41,7 @@ _EXAMPLES = {
     "m": "'80 um/V' or '12.5 mV/um'",
 }
 _SMALLEST = 1e-12
-"""Smallest number accepted in a sensitivity; the largest is its inverse. This catches typing errors."""
+"""Smallest number accepted in a sensitivity; the largest is its inverse. This limit catches typing errors."""
 _NUMBER = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", "−": "-", "·": " ", "⋅": " "})
 
@@ -79,7 +79,7 @@ def volts_per_unit(text: str, unit: str) -> float:
 def size_of_unit(name: str, unit: str) -> float | None:
     """Return the value of the unit ``name`` in ``unit``: 9.80665 for ``"g"`` in ``"m s-2"``.
 
-    Return None if ``name`` is a unit of another quantity, or one of the two units is unknown.
+    Return None if ``name`` is a unit of another quantity, or if one of the two units is unknown.
     """
     volts = _VOLTS | dict.fromkeys(("v", "volt", "volts", "Volt", "Volts"), 1.0)
     return {**_UNITS, "V": volts}.get(unit, {}).get(_plain(name))
@@ -125,16 +125,16 @@ class SensorConfig(FrozenModel):
     full_scale_v: PositiveFloat
     """Largest output voltage of the sensor, peak [V]."""
     bandwidth_hz: PositiveFloat | None = None
-    """Upper -3 dB frequency, first order [Hz]; absent if far above the measured band."""
+    """Upper -3 dB frequency, first order [Hz]; absent if it is far above the measured band."""
     resonance_hz: PositiveFloat | None = None
-    """Mounted resonance frequency [Hz]; absent if far above the measured band."""
+    """Mounted resonance frequency [Hz]; absent if it is far above the measured band."""
     delay_s: NonNegativeFloat = 0.0
-    """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects phases for it."""
+    """Signal delay of the electronics, including their bandwidth [s]; the analysis corrects this delay."""
     iepe: Literal["yes", "no"] = "no"
     """Whether the input supplies the sensor with a constant current."""
     calibrated: date
     uncertainty: StatedUncertainty | None = None
-    """Uncertainty of the calibration; if absent, every result reports that none was stated."""
+    """Uncertainty of the calibration; if absent, every result reports that no uncertainty was stated."""
     alignment_deg: Sourced | None = None
     """Largest angle between the motion and the sensitive axis or laser beam [degrees]."""
     noise_per_rthz: Sourced | None = None
@@ -151,7 +151,7 @@ class SensorConfig(FrozenModel):
 
 
 class TransducerConfig(SensorConfig):
-    """A sensor other than accelerometer and vibrometer, in a table such as ``[sensors.m0_acceleration]``."""
+    """A sensor in a table such as ``[sensors.m0_acceleration]``; not the base sensor or the vibrometer."""
 
     sensitivity: str
     """Sensitivity with the unit of the data sheet: ``"10 mV/g"``, ``"12.5 mV/um"``."""
@@ -172,7 +172,7 @@ class VibrometerConfig(SensorConfig):
     bandwidth_hz: PositiveFloat
     tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
     delay_s: NonNegativeFloat
-    """Signal delay of the decoder [s]; the analysis corrects the phase for it."""
+    """Signal delay of the decoder [s]; the analysis corrects the phase for this delay."""
 
     @property
     def name(self) -> str:
@@ -204,7 +204,7 @@ class AccelerometerConfig(SensorConfig):
 class Role(StrEnum):
     """Place and quantity that a channel records; also the name of the dataset in the recording.
 
-    ``base_force`` is the force of the shaker's table on everything mounted on it.
+    ``base_force`` is the force of the shaker's table on everything mounted on the table.
     """
 
     DRIVE_VOLTAGE = "drive_voltage"

@@ -46,7 +46,7 @@ class AcquisitionLoop:
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
-        # Compute the goal again for every block, because a slow consumer of the blocks moves it.
+        # A slow consumer of the blocks delays the goal, so compute the goal again for every block.
         while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield min(longest, goal - self.samples)
 
@@ -61,7 +61,7 @@ class AcquisitionLoop:
 
     def waiting_sizes(self) -> Iterator[int]:
         """Yield the sizes of the waiting blocks, and delay the rest of the plan by their duration."""
-        # Ask for waiting samples only once, because more samples arrive during reading.
+        # Ask only once how many samples wait, because more samples arrive during reading.
         waiting = self._digitizer.waiting_samples
         self._due_s += waiting / self._digitizer.sample_rate_hz
         longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
@@ -70,7 +70,7 @@ class AcquisitionLoop:
             waiting -= min(longest, waiting)
 
     def sizes_until(self, duration_s: float) -> Iterator[int]:
-        """Yield sizes until another ``duration_s`` has been converted; as many samples stay unread as before.
+        """Yield sizes until another ``duration_s`` has been converted; the number of unread samples is kept.
 
         If more time has passed already, the rest of the plan is delayed accordingly.
         """
@@ -82,12 +82,12 @@ class AcquisitionLoop:
         while sampled < goal:
             yield min(piece, goal - self.samples)
             sampled = self._converted
-        # Ignore up to half a sample: rounding the goal causes this difference, which must not accumulate.
+        # A difference of up to half a sample comes from rounding the goal; it must not accumulate.
         self._due_s = max(self._due_s, (sampled - 0.5) / rate_hz)
 
     @property
     def _converted(self) -> int:
-        """Number of samples per channel converted so far, read or not."""
+        """Number of samples per channel converted so far, whether read or not."""
         return self.samples + self._digitizer.waiting_samples
 
     def extend(self, duration_s: float) -> int:

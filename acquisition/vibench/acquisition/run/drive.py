@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
 
-from ..bench.bench import Bench
+from ..bench import Bench
 from ..errors import ConfigurationError
 from ..excitation.steps import Tone
 from ..instruments import PlugInKind, plug_in
@@ -15,8 +15,8 @@ from .stream_drive import StreamDrive
 class Drive(Protocol):
     """Player of consecutive phases while the run reads samples.
 
-    A drive never waits. It yields how long to read until its next action, because the samples read are the
-    only clock. Phases are announced beforehand, because some drives write samples in advance.
+    A drive never waits. It yields how long to read until its next action, because the number of samples read
+    is the only clock. Phases are announced beforehand, because some drives write samples in advance.
     """
 
     @property
@@ -29,7 +29,7 @@ class Drive(Protocol):
 
     @property
     def coefficients(self) -> tuple[Any, ...]:
-        """Measurements by a real-time controller since the start of the phase; empty for other drives."""
+        """Measurements by a real-time controller since the phase started; empty for other drives."""
 
     @property
     def is_commanded(self) -> bool:
@@ -47,7 +47,7 @@ class Drive(Protocol):
         """Prepare the drive; the first phase of ``coming`` starts at the digitizer's first sample."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Announce the phases that follow all previous ones; they start after `pause_s`."""
+        """Announce the phases that follow all previous phases; the new phases start after `pause_s`."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
         """Play a phase; before each command, yield how long to read until that command [s]."""
@@ -63,10 +63,10 @@ class Drive(Protocol):
         """
 
     def cut(self) -> None:
-        """Switch off at once without a ramp. May be called at any time."""
+        """Switch the drive off at once, without a ramp. May be called at any time."""
 
     def silence(self) -> None:
-        """Ramp down as fast as possible; if that fails, switch off at once. May be called at any time."""
+        """Ramp down as fast as possible; if this fails, switch off at once. May be called at any time."""
 
 
 def drive_for(bench: Bench, measurement: Measurement) -> Drive:
@@ -88,14 +88,14 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
 
 
 def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
-    """Return the configured dead man's switch; raise ConfigurationError if the signal does not allow one."""
+    """Return the configured dead man's switch; raise ConfigurationError if the signal does not allow it."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:
         return None
     plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
     frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
     frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
-    if frequency_hz is None:  # feedback decides the frequencies during the run
+    if frequency_hz is None:  # several frequencies, or frequencies chosen by feedback
         raise _without_dead_man(f"{measurement.name} is not a sine of one frequency")
     if frequency_hz * longest_s < 1:
         raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")
@@ -104,7 +104,7 @@ def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
 
 def _without_dead_man(what: str) -> ConfigurationError:
     return ConfigurationError(
-        f"{what}, but generator.dead_man_s allows only sines of one frequency, because it plays bursts that "
-        "the run must keep triggering. Nothing was played; leave dead_man_s out of the hardware "
-        "configuration for this campaign"
+        f"{what}, but generator.dead_man_s allows only sines of one frequency, because the generator then "
+        "plays bursts that the run must keep triggering. Nothing was played; leave dead_man_s out of the "
+        "hardware configuration for this campaign"
     )

@@ -51,7 +51,7 @@ class Ending:
 
     def __init__(self) -> None:
         self.state = RunState.FAILED
-        self.reason = "the run ended without a reason"
+        self.reason = "the run ended without a stated reason"
         self._cause: Cause | None = None
 
     def is_finished(self, lost_samples: int, known: str) -> None:
@@ -76,7 +76,7 @@ class Ending:
         return Outcome(self.state, self.reason, path, self._cause)
 
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
-        """Silence the drive, end sampling and finish the recording; do each step even if another fails."""
+        """Silence the drive, end sampling and finish the recording; do each even if another step fails."""
         with ExitStack() as leaving:
             leaving.callback(self._note_failure, lambda: sink.finish(_RECORDED_AS[self.state], self.reason))
             leaving.callback(self._stop_listening, digitizer)
@@ -96,7 +96,7 @@ class Ending:
             digitizer.stop()
         except AcquisitionError as failure:
             self._add(failure)
-            if not has_failed_already:  # otherwise the first failure stays the cause of the end
+            if not has_failed_already:  # an earlier failure remains the cause of the end
                 raise
 
     def _add(self, failure: AcquisitionError) -> None:

@@ -67,7 +67,7 @@ class DeadMan:
         self._left_s = self._period_s
 
     def pieces(self, duration_s: float) -> Iterator[float]:
-        """Yield the parts of a duration; trigger each burst after the end of the last one."""
+        """Yield the parts of a duration; trigger each burst after the end of the last burst."""
         while duration_s > _ROUNDING_S:
             piece_s = min(duration_s, self._left_s)
             yield piece_s
@@ -141,7 +141,7 @@ class GeneratorDrive:
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float, clock_s: Callable[[], float]) -> Iterator[float]:
-        """Ramp down from the current level in as many steps as time allows; yield the duration of each [s].
+        """Ramp down from the present level in as many steps as time allows; yield each step's duration [s].
 
         Steps whose time has passed are skipped, but no step exceeds 1/`FEWEST_STAIRS` of the ramp.
         """
@@ -160,7 +160,7 @@ class GeneratorDrive:
         self._is_on = False
 
     def silence(self) -> None:
-        """Ramp down as fast as the generator takes commands; then turn the output off in any case.
+        """Ramp down as fast as the generator takes commands; in any case, turn the output off afterwards.
 
         Used when the run ends without sampling, or if a drive signal is still measured after switching off.
         The ramp has about 20 commands of a few milliseconds each, or four on a slow generator. If the output
@@ -168,7 +168,7 @@ class GeneratorDrive:
         """
         was_off = not self._is_on
         try:
-            with suppress(AcquisitionError):  # if the ramp fails, stop() still switches the output off
+            with suppress(AcquisitionError):  # after a failed ramp, `cut` still switches off
                 self._ramp_down_blindly()
         finally:
             self.cut()
@@ -177,7 +177,7 @@ class GeneratorDrive:
                 quiet_vpp = self._quiet_vpp()
                 try:
                     self._generator.set_amplitude(quiet_vpp)
-                except AcquisitionError:  # the generator's settings are unknown after a failed change
+                except AcquisitionError:  # after a failed change, the settings are unknown
                     self._generator.load_sine(CHECK_FREQUENCY_HZ, quiet_vpp)
                 self._level, self._setting_vpp = 0.0, quiet_vpp
             self.cut()
@@ -236,7 +236,7 @@ class GeneratorDrive:
         self._setting_vpp = self._due_vpp
 
     def _change_tone(self, old: Tone, new: Tone) -> None:
-        """Change amplitude and frequency: lower the amplitude first, or raise it last, for safety.
+        """Change amplitude and frequency; for safety, lower the amplitude first or raise it last.
 
         Between steps of a sweep, a small decrease of amplitude also comes last, so the frequency is on time.
         """
@@ -259,7 +259,7 @@ class GeneratorDrive:
         return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
-        # Set this before the command: if the command fails half-way, the output must be regarded as on.
+        # Set this before the command: if the command fails half-way, the output may be on.
         self._is_on = True
         self._generator.start()
 
@@ -287,6 +287,6 @@ class GeneratorDrive:
     def _quiet_vpp(self) -> float:
         quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
         if isinstance(self._play, Waveform):
-            # Generators scale a waveform to full range: their setting is this amplitude times its peak.
+            # Generators scale a waveform to full range: the setting is this amplitude times the peak.
             return quiet_vpp / float(np.max(np.abs(self._play.values)))
         return quiet_vpp

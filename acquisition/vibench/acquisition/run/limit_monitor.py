@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from math import exp, pi, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from ..errors import LimitExceeded, LimitTrip
 from ..instruments import Block, Overload, Samples
 from ..plan import InRunLimits, OnChange, OnOverload
-from ..rig import Channel, Rig, Role, suspended_mass_kg
+from ..rig import Channel, Rig, Role, Sourced, suspended_mass_kg
 
 HIGH_PASS_HZ = 2.0
 """Corner of every high-pass filter [Hz]. A sine is attenuated by 0.2 % at 10 Hz and by 2.5 % at 5 Hz."""
@@ -22,15 +22,15 @@ class _Section:
 
     def __init__(self, numerator: tuple[float, ...], sample_rate_hz: float) -> None:
         corner = 2 * pi * HIGH_PASS_HZ
-        self._b, self._a = bilinear(numerator, (1.0, sqrt(2.0) * corner, corner**2), sample_rate_hz)
+        self._b, self._a = scipy.signal.bilinear(numerator, (1.0, 2**0.5 * corner, corner**2), sample_rate_hz)
         self._state: NDArray[np.float64] | None = None
 
     def run(self, values: Samples) -> Samples:
         if self._state is None:
             # Start from the mean of the first block. The first sample could be a peak of the last run's
             # decay, to which the filter would respond for a second.
-            self._state = lfilter_zi(self._b, self._a) * float(np.mean(values))
-        out, self._state = lfilter(self._b, self._a, values, zi=self._state)
+            self._state = scipy.signal.lfilter_zi(self._b, self._a) * float(np.mean(values))
+        out, self._state = scipy.signal.lfilter(self._b, self._a, values, zi=self._state)
         return np.asarray(out)
 
 
@@ -96,7 +96,7 @@ SETTLING_S = 0.5
 """Time after the start during which integrated quantities are not checked [s]. An AC-coupled input drifts
 after its current is switched on, and the drift integrates to metres. During this time, the run plays only the
 low level of its check. Measured quantities are checked from the first sample."""
-_OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
+_OFF = "The run was ramped down, and its recording was kept; lower amplitude_vpp"
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,11 @@ class _MonitoredQuantity:
     """Channel from which the quantity is computed."""
     what: str
     values: Samples
-    limit: float
+    rated: Sourced
+    """Limit of the rig for this quantity."""
+    share: float
+    """Fraction of this limit that the plan allows."""
     unit: str
-    source: str
 
 
 class LimitMonitor:
@@ -150,9 +152,9 @@ class LimitMonitor:
         if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
             trip = self._trip(self._response, "change of the specimen", 1.0, 0.0, "1", sample)
             self._change = LimitExceeded(
-                f"{text.rstrip('.')}. The run was ramped down and its recording kept, as on_changed_specimen "
-                "requires; check the specimen; if the change is intended, set a new baseline with "
-                "'vibench twin --new-baseline'",
+                f"{text.rstrip('.')}. The run was ramped down, and its recording was kept, as "
+                "on_changed_specimen requires; check the specimen; if the change is intended, set a new "
+                "baseline with 'vibench twin --new-baseline'",
                 trip,
             )
 
@@ -173,9 +175,9 @@ class LimitMonitor:
         base = still if acceleration is None else self._base.follow(acceleration)
         is_settled = block.first_sample >= self._settled_sample
         if acceleration is not None:
-            limit, what = self._rig.shaker.limits.acceleration_m_per_s2, "the base acceleration"
-            most = limit.value * self._limits.base_acceleration
-            yield _MonitoredQuantity(Role.BASE_ACCELERATION, what, acceleration, most, "m/s2", limit.source)
+            limit, share = self._rig.shaker.limits.acceleration_m_per_s2, self._limits.base_acceleration
+            what = "the base acceleration"
+            yield _MonitoredQuantity(Role.BASE_ACCELERATION, what, acceleration, limit, share, "m/s2")
         if voltage is not None:
             yield from self._at_the_amplifier(voltage, base if is_settled else still)
         integrated = [] if acceleration is None else [*self._at_the_base(acceleration, base)]
@@ -187,77 +189,59 @@ class LimitMonitor:
     def _at_the_base(self, acceleration: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
         """Yield the motion of the base, and the force on the table: inertia force plus suspension force."""
         shaker, share, role = self._rig.shaker, self._limits, Role.BASE_ACCELERATION
-        velocity, stroke, force = (
-            shaker.limits.velocity_m_per_s,
-            shaker.limits.stroke_m,
-            shaker.limits.force_n,
-        )
-        most = velocity.value * share.base_velocity
-        yield _MonitoredQuantity(role, "the base velocity", base.velocity, most, "m/s", velocity.source)
-        most = stroke.value * share.stroke
-        yield _MonitoredQuantity(role, "the stroke", base.displacement, most, "m", stroke.source)
+        limits = shaker.limits
         forces = (
             suspended_mass_kg(shaker) * acceleration
             + shaker.suspension_damping_ns_per_m * base.velocity
             + shaker.suspension_stiffness_n_per_m * base.displacement
         )
-        most, source = REACTION * force.value * share.force, f"{REACTION:g} times: {force.source}"
-        yield _MonitoredQuantity(role, "the force on the table", forces, most, "N", source)
+        rated = Sourced(
+            value=REACTION * limits.force_n.value, source=f"{REACTION:g} times: {limits.force_n.source}"
+        )
+        for what, values, limit, fraction, unit in (
+            ("the base velocity", base.velocity, limits.velocity_m_per_s, share.base_velocity, "m/s"),
+            ("the stroke", base.displacement, limits.stroke_m, share.stroke, "m"),
+            ("the force on the table", forces, rated, share.force, "N"),
+        ):
+            yield _MonitoredQuantity(role, what, values, limit, fraction, unit)
 
     def _at_the_amplifier(self, voltage: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
-        rig, share, role = self._rig, self._limits, Role.AMPLIFIER_VOLTAGE
-        shaker = rig.shaker
-        clip_v = rig.amplifier.clip_v * share.amplifier_voltage
-        yield _MonitoredQuantity(
-            role, "the amplifier voltage", voltage, clip_v, "V", f"clipping of the {rig.amplifier.model}"
-        )
+        rig, share, shaker = self._rig, self._limits, self._rig.shaker
+        clip = Sourced(value=rig.amplifier.clip_v, source=f"clipping of the {rig.amplifier.model}")
         # Neglecting the inductance of the coil overestimates the current by 3 % at 1 kHz.
         current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
-        peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
-        yield _MonitoredQuantity(
-            role, "the coil current", current, peak.value * share.current, "A", peak.source
-        )
-        yield _MonitoredQuantity(
-            role,
-            "the coil's force",
-            shaker.force_constant_n_per_a * current,
-            force.value * share.force,
-            "N",
-            force.source,
-        )
-        rms = np.full(1, self._rms(current))
-        yield _MonitoredQuantity(
-            role, "the coil current (rms)", rms, limiter.value * share.current, "A", limiter.source
-        )
-
-    def _rms(self, current: Samples) -> float:
-        share = 1 - exp(-current.size / self._rate_hz / RMS_S)
-        self._mean_square_a2 += share * (float(np.mean(current**2)) - self._mean_square_a2)
-        return sqrt(self._mean_square_a2)
+        force = shaker.force_constant_n_per_a * current
+        newest = 1 - exp(-current.size / self._rate_hz / RMS_S)
+        self._mean_square_a2 += newest * (float(np.mean(current**2)) - self._mean_square_a2)
+        rms = np.full(1, sqrt(self._mean_square_a2))
+        for what, values, limit, fraction, unit in (
+            ("the amplifier voltage", voltage, clip, share.amplifier_voltage, "V"),
+            ("the coil current", current, shaker.limits.current_a, share.current, "A"),
+            ("the coil's force", force, shaker.limits.force_n, share.force, "N"),
+            ("the coil current (rms)", rms, rig.amplifier.current_limit_a, share.current, "A"),
+        ):
+            yield _MonitoredQuantity(Role.AMPLIFIER_VOLTAGE, what, values, limit, fraction, unit)
 
     def _in_the_specimen(self, moved: Samples, base: BaseMotion, block: Block) -> _MonitoredQuantity:
-        limit = self._rig.specimen.amplitude_limit_m
         is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
         for overload in block.overloads:
             if overload.channel == self._response.value:
                 first = max(overload.first_sample - block.first_sample, 0)
                 is_blind[first : max(overload.last_sample - block.first_sample + 1, 0)] = True
         stretched = self._specimen.follow(moved, base, is_blind)
-        allowed = limit.value * self._limits.specimen_amplitude
-        return _MonitoredQuantity(
-            self._response, "the specimen's amplitude", stretched, allowed, "m", limit.source
-        )
+        limit, share = self._rig.specimen.amplitude_limit_m, self._limits.specimen_amplitude
+        return _MonitoredQuantity(self._response, "the specimen's amplitude", stretched, limit, share, "m")
 
     def _require(self, monitored: _MonitoredQuantity, first_sample: int) -> None:
-        peak = float(np.max(np.abs(monitored.values)))
-        if peak <= monitored.limit:
+        peak, limit = float(np.max(np.abs(monitored.values))), monitored.share * monitored.rated.value
+        if peak <= limit:
             return
-        sample = first_sample + int(np.argmax(np.abs(monitored.values) > monitored.limit))
+        sample = first_sample + int(np.argmax(np.abs(monitored.values) > limit))
         quantity = monitored.what.removeprefix("the ")
-        trip = self._trip(monitored.role, quantity, peak, monitored.limit, monitored.unit, sample)
+        trip = self._trip(monitored.role, quantity, peak, limit, monitored.unit, sample)
         raise LimitExceeded(
-            f"{monitored.what} reached {peak:.4g} {monitored.unit}, above the limit of {monitored.limit:.4g} "
-            f"{monitored.unit} ({monitored.source}), on {monitored.role.value} at {trip.time_s:.4f} s "
+            f"{monitored.what} reached {peak:.4g} {monitored.unit}, above the limit of {limit:.4g} "
+            f"{monitored.unit} ({monitored.rated.source}), on {monitored.role.value} at {trip.time_s:.4f} s "
             f"(sample {sample}). {_OFF}",
             trip,
         )
@@ -278,7 +262,7 @@ class LimitMonitor:
         trip = self._trip(channel.role, what, value, limit, channel.unit, overload.first_sample)
         return LimitExceeded(
             f"{overload.channel} was overloaded at sample {overload.first_sample} ({trip.time_s:.4f} s): it "
-            f"reached {trip.value:.4g} {trip.unit}, the {what} is {trip.limit:.4g} {trip.unit}. The run was "
-            "ramped down and its recording kept; widen the range or lower amplitude_vpp",
+            f"reached {trip.value:.4g} {trip.unit}; the {what} is {trip.limit:.4g} {trip.unit}. The run was "
+            "ramped down, and its recording was kept; widen the range or lower amplitude_vpp",
             trip,
         )

@@ -24,7 +24,7 @@ from .until import UntilWatch
 
 DELAY_SAMPLES = 40
 """Approximate delay of a delta-sigma converter's filter in samples (NI 9234: 38.4). While the frequency
-changes, the delay shifts the count of cycles."""
+changes, this delay shifts the count of cycles."""
 
 
 CLEAR = 0.3
@@ -51,7 +51,7 @@ class GlideWatch:
         self._more = 0.0
         self._offset_v = 0.0
         self._before: tuple[float, float] | None = None
-        """Time and voltage of the last sample that was clearly positive or negative."""
+        """Time and voltage of the last sample that was clearly positive or clearly negative."""
 
     def take(
         self,
@@ -96,6 +96,19 @@ class GlideWatch:
         at = np.flatnonzero((v[:-1] < 0) & (v[1:] > 0))
         return np.asarray(time_s[at] - v[at] * (time_s[at + 1] - time_s[at]) / (v[at + 1] - v[at]))
 
+    def following(self, sweep: Sweep) -> "Sink":
+        """Return a function that compares a sweep made by the generator with the plan, block by block."""
+        began_s = 0.0
+
+        def take_block(block: Block) -> None:
+            nonlocal began_s
+            since_s, duration_s = began_s, block.volts.shape[1] / self.sample_rate_hz
+            began, began_s = sweep.cycles(since_s), since_s + duration_s
+            mean_hz = (sweep.cycles(began_s) - began) / duration_s
+            self.take([block], mean_hz, duration_s, lambda t: sweep.cycles(since_s + t) - began)
+
+        return take_block
+
     @property
     def more_cycles(self) -> float:
         """Number of cycles of the drive beyond the plan; 0 if the converter's delay can explain them."""
@@ -105,25 +118,8 @@ class GlideWatch:
         return float(np.sign(self._more) * max(0.0, abs(self._more) - delayed))
 
 
-class SweepWatch:
-    """Comparison of a sweep made by the generator with the planned sweep, block by block."""
-
-    def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
-        self._glide = glide
-        self._sweep = sweep
-        self._time_s = 0.0
-
-    def append(self, block: Block) -> None:
-        """Add the next block of samples of the sweep."""
-        began_s, duration_s = self._time_s, block.volts.shape[1] / self._glide.sample_rate_hz
-        began = self._sweep.cycles(began_s)
-        self._time_s += duration_s
-        mean_hz = (self._sweep.cycles(self._time_s) - began) / duration_s
-        self._glide.take([block], mean_hz, duration_s, lambda t: self._sweep.cycles(began_s + t) - began)
-
-
-Sink: TypeAlias = list[Block] | SweepWatch
-"""Object to which every block that is read is appended."""
+Sink: TypeAlias = Callable[[Block], None]
+"""Function called with every block that is read."""
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """Longest total hold of a run [s], limited by the space in its recording."""
@@ -157,11 +153,11 @@ class _Pace(Enum):
     OF_THE_PLAN = auto()
     """The planned time; used for stepped sweeps."""
     OF_ITSELF = auto()
-    """The end of the previous phase; used if no command is due, or commands take no time."""
+    """The end of the previous phase; used if no command is due, or if commands take no time."""
 
 
 class StopRequested(Exception):
-    """Raised when somebody requested the end of the run."""
+    """Raised when somebody has requested the end of the run."""
 
     def __init__(self, request: StopRequest) -> None:
         super().__init__(request.reason)
@@ -199,8 +195,8 @@ class PhaseRunner:
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         """Play a phase and yield progress; the blocks of the phase are also appended to ``into``, if given.
 
-        A phase begins when its command has been carried out, however long that takes. Steps of a sweep within
-        one segment start at their planned times; the run fails if that is impossible.
+        A phase begins when its command has been carried out, however long the command takes. Steps of a sweep
+        within one segment start at their planned times; the run fails if this is impossible.
         """
         self._enter(phase.state)
         pace, commanded = self._pace_of(phase), phase
@@ -210,39 +206,34 @@ class PhaseRunner:
             more, self._lost_cycles = self.glide.more_cycles, 0.0
             self.glide.begin()
             if abs(more) > TOLD_CYCLES:
-                text = f"at its end, the recorded drive was {more:+.2g} cycles off the planned phase"
+                text = f"the recorded drive ended {more:+.2g} cycles off the planned phase"
                 self.loop.log(EventKind.LATE, text)
             yield from self._read(0.0)
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
             self._planned_hz = self._glided_hz
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
-            yield from self._catch_up()  # the segment must start at the trigger
+            yield from self._catch_up()  # so that the segment starts at the trigger
         if phase.segment != self.loop.segment:
-            self.loop.enter(None)  # the duration of the next command belongs to no segment
+            self.loop.enter(None)  # no segment includes the duration of the next command
         waits = self.drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
             yield from self._catch_up()
         self.loop.enter(phase.segment)
         self._play = phase.play
-        heard = self._drive_checks(phase) if into is None else into
+        # A phase of a recorded sweep is compared with the plan; the blocks of other phases are not stored.
+        may_glide = self.drive.is_commanded and phase.state is RunState.RECORDING
+        blocks = [] if into is None else into
+        heard = None if into is None and not may_glide else blocks.append
+        if into is None and may_glide and isinstance(phase.play, Sweep):
+            heard = self.glide.following(phase.play)
         while wait_s is not None:
             yield from self._read(wait_s, heard, self._lead_s if phase.state is RunState.RECORDING else 0.0)
             if pace is _Pace.OF_THE_COMMANDS:
-                yield from self._catch_up(into)
+                yield from self._catch_up(None if into is None else into.append)
             wait_s = next(waits, None)
-        if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
-            self.glide.take(heard, phase.play.frequency_hz, phase.duration_s)
-
-    def _drive_checks(self, phase: Phase) -> Sink | None:
-        """Return an object that checks the drive in the phase's blocks against the plan, or None."""
-        if not self._may_glide(phase):
-            return None
-        return SweepWatch(self.glide, phase.play) if isinstance(phase.play, Sweep) else []
-
-    def _may_glide(self, phase: Phase) -> bool:
-        """Return whether a phase may be a step of a recorded sweep that is played by commands."""
-        return self.drive.is_commanded and phase.state is RunState.RECORDING
+        if may_glide and isinstance(phase.play, Tone):
+            self.glide.take(blocks, phase.play.frequency_hz, phase.duration_s)
 
     def _pace_of(self, phase: Phase) -> "_Pace":
         if not self.drive.is_commanded:
@@ -258,14 +249,14 @@ class PhaseRunner:
     def _with_lost_cycles(self, phase: Phase, late_s: float) -> Phase:
         """Return the phase with its frequency corrected for cycles that were lost before this phase.
 
-        While a command is late, the previous tone continues. The cycles lost are the difference between the
-        two frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
+        While a command is late, the previous tone continues. The lost cycles are the difference of the two
+        frequencies times the delay. Cycles that one step cannot correct are corrected in the next step.
         """
         if not isinstance(phase.play, Tone):
             return phase
         planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
         self._lost_cycles += (planned_hz - self._glided_hz) * late_s
-        # The limit follows from the planned frequency step, so that corrections do not accumulate.
+        # Limit the correction by the planned frequency step, so that corrections do not accumulate.
         most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
         wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
         more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
@@ -276,10 +267,10 @@ class PhaseRunner:
     def _require_pace(self, phase: Phase) -> float:
         """Return the delay of this command [s], and send later commands earlier accordingly.
 
-        Delays above half a step are logged; several in a row raise DriveLate.
+        Delays above half a step are logged; several such delays in a row raise DriveLate.
 
-        Samples arrive some milliseconds after conversion, so a command that waits for them is late. Over a
-        sweep of 200 Hz, a cycle or two would be lost, so later commands are sent earlier.
+        Samples arrive some milliseconds after conversion, so a command that waits for samples is late. Over a
+        sweep of 200 Hz, one or two cycles would be lost, so later commands are sent earlier.
         """
         late_s = self.loop.waiting_s - self._lead_s
         self._glides += 1
@@ -291,13 +282,13 @@ class PhaseRunner:
         self._late_steps += 1
         at = f"{phase.play.frequency_hz:.6g} Hz" if isinstance(phase.play, Tone) else "one of its steps"
         text = (
-            f"the drive was {late_s:.3g} s behind its plan at {at}, where a step lasts {phase.duration_s:g} s"
+            f"the drive was {late_s:.3g} s behind the plan at {at}, where a step lasts {phase.duration_s:g} s"
         )
         self.loop.log(EventKind.LATE, text)
         late_for_s = late_s + self._late_steps * phase.duration_s
         if self._late_steps >= LATE_STEPS and late_for_s > LATE_FOR_S:
             raise DriveLate(
-                f"{text}, {self._late_steps} times in a row. The run was ended and its recording kept; "
+                f"{text}, {self._late_steps} times in a row. The run was ended, and its recording was kept; "
                 "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
             )
         return late_s
@@ -310,7 +301,7 @@ class PhaseRunner:
         for size in sizes:
             block = self.loop.read(size)
             if into is not None:
-                into.append(block)
+                into(block)
             yield self._report_progress(block)
             self._look(block)
             if self.switch.is_holding and self._look == self._go_on and self.state is not RunState.HELD:
@@ -321,7 +312,7 @@ class PhaseRunner:
     ) -> Iterator[Progress]:
         """Ramp down from the current state without limit checks; an open segment stays incomplete.
 
-        A faster stop requested meanwhile takes over. ``ramp_s`` returns the duration of the ramp for a stop
+        A faster stop, if requested, takes over. ``ramp_s`` returns the duration of the ramp for a stop
         level [s]. The method records until silence is measured; raises InstrumentError if the drive stays on.
         """
         self._look = self.silence.take
@@ -348,20 +339,20 @@ class PhaseRunner:
     def _listen(self) -> Iterator[Progress]:
         """Continue to record until the measured drive is silent, but no longer than `LONGEST_S`.
 
-        While a drive is measured, it is switched off again and its amplitude lowered, at growing intervals.
+        While a drive is measured, switch the output off again and lower the amplitude, at growing intervals.
         """
         give_up_s, wait_s = self.loop.elapsed_s + LONGEST_S, LOWER_AFTER_S
         yield from self._read(LISTEN_S)
         if not self.silence.is_silent:
             self.loop.cut()
-            yield from self._read(LISTEN_S)  # this also reads samples converted before the output was off
+            yield from self._read(LISTEN_S)  # the first samples may be from before the output was off
         lower_s = self.loop.elapsed_s + wait_s
         while not self.silence.is_silent and self.loop.elapsed_s < give_up_s:
             if self.loop.elapsed_s > lower_s:
                 self.silence.note_signal()
-                with suppress(AcquisitionError):  # the measured drive shows whether switching off succeeded
+                with suppress(AcquisitionError):  # the measured drive shows whether this succeeded
                     self.drive.silence()
-                self.loop.log(EventKind.OFF, "output switched off again, and its amplitude lowered")
+                self.loop.log(EventKind.OFF, "the output was switched off again, and its amplitude lowered")
                 self.loop.cut()
                 lower_s, wait_s = lower_s + 2 * wait_s, 2 * wait_s
             yield from self._read(LISTEN_S)
@@ -372,8 +363,8 @@ class PhaseRunner:
     def _hold(self) -> Iterator[Progress]:
         """Hold the run, monitored and recorded, until it is resumed or stopped.
 
-        Signals that must be fed with samples cannot be held. The recording has space for `HOLD_LONGEST_S`;
-        after that, the run is ramped down.
+        Signals that must be fed with samples cannot be held. The recording has space for a hold of
+        `HOLD_LONGEST_S`; after this time, the run is ramped down.
         """
         if refusal := self.refusal_to_hold():
             self._stop_hold(f"{refusal}: the run was ramped down")
@@ -387,7 +378,7 @@ class PhaseRunner:
         self._enter(before)
 
     def refusal_to_hold(self) -> str:
-        """Return the reason why the drive cannot be held now; empty if it can be held."""
+        """Return the reason why the drive cannot be held now; empty if the drive can be held."""
         source = self.drive.drive_source.value
         return "" if self.drive.can_hold else f"the present signal of the {source} cannot be held"
 

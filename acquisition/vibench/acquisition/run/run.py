@@ -8,14 +8,14 @@ from dataclasses import replace
 from itertools import islice, tee
 from pathlib import Path
 
-from ..bench.bench import Bench
+from ..bench import Bench
 from ..control.control_action import Controller, phase_samples
 from ..control.controllers import feedback_controller
 from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
 from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Tone
 from ..host.beside import ClosedOnLeaving
-from ..host.chosen import member
+from ..host.toml_file import member
 from ..instruments import Block, FunctionGenerator
 from ..plan import (
     CHECK_S,
@@ -33,7 +33,7 @@ from ..plan import (
     shortest_ramp_s,
 )
 from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, RecordingWriter, create_recording
-from ..rig import Channel, KnobSheet
+from ..rig import Channel
 from ..stopping.program import stop_on_signal
 from ..stopping.stop import LEVELS, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 from .acquisition_loop import AcquisitionLoop
@@ -60,10 +60,10 @@ def require_time_for_commands(measurement: Measurement, generator: FunctionGener
         latency_s = _commands_of_a_step(measurement) * generator.measured_latency_s()
         if step_s < ROOM * latency_s:
             raise ConfigurationError(
-                f"step_s = {step_s:g} s is too short: the generator takes {latency_s:.3g} s for a setting, "
-                f"and the drive would fall behind the plan. Nothing was played; give step_s of at least "
-                f"{math.ceil(100 * ROOM * latency_s) / 100:.2f} s, or shorten generator.settle_s if the "
-                "instrument allows it"
+                f"step_s = {step_s:g} s is too short: the generator takes {latency_s:.3g} s for each "
+                "setting, and the drive would fall behind the plan. Nothing was played; give step_s of at "
+                f"least {math.ceil(100 * ROOM * latency_s) / 100:.2f} s, or shorten generator.settle_s if "
+                "the instrument allows it"
             )
         return 0.0
     settled = sum(phase.state is RunState.SETTLING for phase in known_phases(measurement))
@@ -97,7 +97,7 @@ def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] |
 
 def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> RecordingHeader:
     """Return the header of a recording of ``measurement`` on ``bench``, planned for ``planned_s``."""
-    rig = bench.rig
+    rig, sheet = bench.rig, bench.confirmations
     steps = bench.digitizer.volts_per_count
     sample_rate_hz = bench.digitizer.sample_rate_hz
     origins = {identity.origin for identity in bench.identities.values()}
@@ -111,7 +111,7 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
         bench_json=rig.model_dump_json(),
         requested_sample_rate_hz=rig.daq.sample_rate_hz,
         instruments=bench.identities,
-        confirmations=_confirmations(bench.confirmations),
+        confirmations={"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **sheet.values},
         bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
     )
 
@@ -137,14 +137,9 @@ def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:
     )
 
 
-def _confirmations(sheet: KnobSheet) -> dict[str, str]:
-    knobs = {f"{knob.instrument} {knob.setting}": knob.value for knob in sheet.knobs}
-    return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}
-
-
 CreateRecording = Callable[[Path, RecordingHeader], RecordingWriter]
 PlayedPhase = tuple[Phase, list[Block] | None]
-"""Phase to be played, and the list that receives its blocks; None if they are not needed."""
+"""Phase to be played, and the list that receives its blocks, or None if they are not needed."""
 
 
 class Run(ClosedOnLeaving):
@@ -182,9 +177,9 @@ class Run(ClosedOnLeaving):
         self._path = path
         self._bench_check = bench_check
         self._create = create
-        self._drive: Drive  # chosen when the plan is admitted, before anything plays
-        self._silence: SilenceWatch  # created after the check that the drive is recorded
-        self._guard: DriveGuard  # created when the plan is admitted
+        self._drive: Drive  # The drive is chosen when the plan is admitted.
+        self._silence: SilenceWatch  # The watch is created after the check that the drive is recorded.
+        self._guard: DriveGuard  # The guard is created when the plan is admitted.
         self._controller: Controller[None] | None = None
         self._until: UntilWatch | None = None
         self._known = ""
@@ -210,7 +205,7 @@ class Run(ClosedOnLeaving):
     def cancel(self, reason: str = "cancelled") -> None:
         """Request that the run ramp down and end.
 
-        It has no effect on a run that has ended or is in its final ramp.
+        The request has no effect on a run that has ended or is in its final ramp.
         """
         self.switch.ask(StopRequest.of(Cause.OPERATOR, reason))
 
@@ -290,7 +285,7 @@ class Run(ClosedOnLeaving):
             self._drive = drive_for(self._bench, self._measurement)
             self._controller = controller_for(self._bench, self._measurement)
             if self._bench_check is LowLevelCheck.AT_LOW_LEVEL:
-                self._total_s += CHECK_S + self._drive.pause_s  # the drive gets its phases after the check
+                self._total_s += CHECK_S + self._drive.pause_s  # the drive gets no phase before the check
             if self._drive.is_commanded:
                 self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
             self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
@@ -311,14 +306,14 @@ class Run(ClosedOnLeaving):
             raise
 
     def _course(self, loop: AcquisitionLoop) -> Iterator[PlayedPhase]:
-        """Yield the phases of the check and of the plan; each is played before the next is requested."""
+        """Yield the phases of the check and of the plan; each phase ends before the next is requested."""
         loop.log(EventKind.PLAYER, self._drive.drive_source.value)
         playing: Iterator[Phase] = iter(())
         if self._controller is None:
             playing = phases(self._measurement)
         if self._until is not None:
             playing = self._until.phases(self._measurement)
-        # An analogue output is written in advance, so it needs each phase before the run does.
+        # An analogue output is written in advance, so the output needs each phase before the run does.
         playing, announced = tee(playing)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
@@ -330,7 +325,7 @@ class Run(ClosedOnLeaving):
                 self._begin(announced)
                 loop.log(EventKind.CHECK, "skipped: the bench was checked shortly before")
                 pause_s = 0.0
-        del announced  # phases are stored only for drives that read ahead
+        del announced  # without a second reader, `tee` stores no phases
         yield Phase(RunState.ARMED, None, pause_s), None
         if self._controller is None:
             for phase in playing:
@@ -364,7 +359,7 @@ class Run(ClosedOnLeaving):
             self._known = f"; {note.sentence}"
 
     def _begin(self, coming: Iterable[Phase]) -> None:
-        """Start sampling, and with it an analogue output that shares the digitizer's trigger."""
+        """Start sampling, and so also start an analogue output that shares the digitizer's trigger."""
         self._guard.begin(self._bench.rig.generator.resource or self._bench.rig.daq.device)
         self._drive.arm(coming)
         self._bench.digitizer.start()
@@ -418,7 +413,7 @@ def run_measurement(
     that had started is finished as failed.
     """
     run = Run(bench, measurement, path, member(LowLevelCheck, bench_check), create, switch)
-    # Ctrl-C and SIGTERM are handled until the run has ended, so that they cannot keep the output on.
+    # Handle Ctrl-C and SIGTERM until the run has ended, so that the output is always switched off.
     with stop_on_signal(run.switch, path.stem), run:
         for progress in run:
             on_progress(progress)

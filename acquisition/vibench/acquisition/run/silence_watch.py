@@ -1,19 +1,19 @@
 """Check of the drive before a run, and measurement of its silence after a stop.
 
-If reading has stalled, samples that are read after a command may have been converted before it.
+If reading has stalled, samples that are read after a command may have been converted before the command.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf
+from math import hypot, inf, sqrt
 from time import monotonic
 
 import numpy as np
 
 from ..errors import AcquisitionError, CheckFailed, InstrumentError
+from ..host import LOG
 from ..host.beside import ClosedOnLeaving
-from ..host.log import LOG
 from ..instruments import Block, Samples
 from ..plan import CHECK_FREQUENCY_HZ, check_phasors, nearest_expected
 from ..rig import Channel, Rig, Role
@@ -24,8 +24,8 @@ from .drive import Drive
 
 DRIVE_TOLERANCE = 0.15
 """Relative tolerance of the measured drive; a wrong load setting would change the drive by a factor of 2."""
-BASE_FACTOR = 10 ** (3 / 20)
-"""Factor by which the measured base acceleration may differ from the model: 3 dB."""
+BASE_TOLERANCE_DB = 3.0
+"""Tolerance of the measured base acceleration relative to the model [dB]."""
 WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
 """Largest input signal before anything plays, as a fraction of the signal expected from the sine."""
@@ -78,7 +78,8 @@ def check_figures(
     terminal_v = 0.5 * amplitude_vpp * rig.generator.terminal_factor()
 
     def amplitude(volts: Samples, row: int) -> float:
-        return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt
+        fit = fit_sine(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz)
+        return fit.amplitude * channels[row].units_per_volt
 
     moved = amplitude(during, base)
     expected = nearest_expected(moved, check_phasors(rig, terminal_v))
@@ -90,16 +91,34 @@ def check_figures(
     return figures
 
 
-def sine_amplitude(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-    """Return the amplitude of a sine of known frequency [V], fitted with a constant and a linear drift.
+@dataclass(frozen=True)
+class SineFit:
+    """Sine fitted to samples by least squares."""
 
-    ``volts`` has the shape (samples,) and spans more than one period of the sine.
+    amplitude: float
+    uncertainty: float
+    """Standard uncertainty of the amplitude, from the residual of the fit."""
+    phase_rad: float
+    """Phase of the cosine at the first sample [rad]."""
+
+
+def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> SineFit:
+    """Return the least-squares fit of a cosine, a sine, a constant and a linear drift.
+
+    The uncertainty assumes white noise: ``residual * sqrt(2 / n)`` (Kay, Fundamentals of Statistical Signal
+    Processing, vol. 1, example 3.14). ``volts`` must span more than one period of the sine.
     """
-    time_s = np.arange(len(volts)) / sample_rate_hz
+    time_s = np.arange(volts.size) / sample_rate_hz
     angle = 2 * np.pi * frequency_hz * time_s
     basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle), time_s], axis=1)
     solution = np.linalg.lstsq(basis, volts)[0]
-    return float(np.hypot(solution[0], solution[1]))
+    residual = float(np.sqrt(np.mean((volts - basis @ solution) ** 2)))
+    in_phase, quadrature = float(solution[0]), float(solution[1])
+    return SineFit(
+        amplitude=hypot(in_phase, quadrature),
+        uncertainty=residual * sqrt(2 / volts.size),
+        phase_rad=float(np.arctan2(-quadrature, in_phase)),
+    )
 
 
 def require_checkable(channels: tuple[Channel, ...]) -> None:
@@ -121,9 +140,9 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
 def _require_quiet(what: str, found: float, expected: float, unit: str) -> None:
     if found > QUIET_SHARE * expected:
         raise CheckFailed(
-            f"{what} shows {found:.3g} {unit} at {CHECK_FREQUENCY_HZ:g} Hz before anything plays, "
-            f"more than a quarter of the expected {expected:.3g} {unit}. The output stayed off; "
-            "look for another source on the amplifier, hum, or a loose cable"
+            f"{what} shows {found:.3g} {unit} at {CHECK_FREQUENCY_HZ:g} Hz before any signal is played, more "
+            f"than a quarter of the expected {expected:.3g} {unit}. The output stayed off; "
+            "look for another signal source at the amplifier, mains hum, or a loose cable"
         )
 
 
@@ -140,19 +159,19 @@ def _require_drive(figures: CheckFigures) -> None:
             "input, and the range and attenuation of this input"
         )
     raise CheckFailed(
-        f"{measured}; {DRIVE_TOLERANCE:.0%} deviation is allowed. The output was turned off; {advice}"
+        f"{measured}; a deviation of {DRIVE_TOLERANCE:.0%} is allowed. The output was turned off; {advice}"
     )
 
 
 def _require_base(figures: CheckFigures) -> None:
-    ratio = figures.base_m_per_s2 / figures.expected_base_m_per_s2
-    if 1 / BASE_FACTOR <= ratio <= BASE_FACTOR:
+    factor = 10 ** (BASE_TOLERANCE_DB / 20)
+    if 1 / factor <= figures.base_m_per_s2 / figures.expected_base_m_per_s2 <= factor:
         return
     raise CheckFailed(
         f"the base acceleration is {figures.base_m_per_s2:.3g} m/s2, but the model predicts "
-        f"{figures.expected_base_m_per_s2:.3g} m/s2; 3 dB deviation is allowed. The output was turned off; "
-        "check the amplifier's gain and power, the accelerometer and its sensitivity, the moving mass, and "
-        "that the specimen is the one in the hardware configuration"
+        f"{figures.expected_base_m_per_s2:.3g} m/s2; {BASE_TOLERANCE_DB:g} dB deviation is allowed. The "
+        "output was turned off; check the amplifier's gain and power, the accelerometer and its sensitivity, "
+        "the moving mass, and that the specimen is the one in the hardware configuration"
     )
 
 
@@ -199,10 +218,13 @@ class SilenceWatch:
         drive = self._drive(block.volts)
         self._residue_v = _half_peak_to_peak(drive)
         self._loudest_v = max(self._loudest_v, self._residue_v)
-        # Subtract the mean, because an offset of the input is not a signal.
-        loud = np.flatnonzero(np.abs(drive - np.mean(drive)) > self._silent_v)
-        if loud.size:
-            self._last_loud = block.first_sample + int(loud[-1])
+        # The silent end of a block lies within the limit peak to peak, so that an offset of the input is
+        # no signal, and the length of the block does not matter: after a stall it is long.
+        newest_first = drive[::-1]
+        span_v = np.maximum.accumulate(newest_first) - np.minimum.accumulate(newest_first)
+        silent = int(np.searchsorted(0.5 * span_v, self._silent_v, side="right"))
+        if silent < drive.size:
+            self._last_loud = block.first_sample + drive.size - 1 - silent
 
     @property
     def is_silent(self) -> bool:
@@ -214,7 +236,7 @@ class SilenceWatch:
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
         if self.is_silent and self.is_heard:
             seen = f"{took_s:.3f} s after the stop was seen (now {self._residue_v:.2g} V)"
-            return f"not silent after switching off: its amplitude had to be lowered, {seen}"
+            return f"not silent after switching off: the output's amplitude had to be lowered, {seen}"
         if self.is_silent:
             return f"{took_s:.3f} s after the stop was seen, silence was measured ({self._residue_v:.2g} V)"
         return f"not silent {took_s:.3f} s after the stop was seen: {self._residue_v:.2g} V at the amplifier"
@@ -228,8 +250,8 @@ class SilenceWatch:
         self.note_signal()
         if self.is_heard:
             raise InstrumentError(
-                f"the drive is {self.text()}. It was commanded off and the recording is kept; THE OUTPUT "
-                "MAY STILL BE ON: switch the amplifier off by hand"
+                f"the drive is {self.text()}. The output was commanded off, and the recording is kept; THE "
+                "OUTPUT MAY STILL BE ON: switch the amplifier off by hand"
             )
 
     def _drive(self, volts: Samples) -> Samples:
@@ -245,7 +267,7 @@ STANDSTILL_BLOCKS = 50
 STOPPED_BLOCKS = 15
 """Number of missed blocks that are allowed after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest interval between checks that is fully counted [s]; if it is longer, the process was suspended."""
+"""Longest interval between checks that is fully counted [s]; in a longer one, the process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):
@@ -298,7 +320,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """Stop monitoring, at any time; a drive that was not confirmed as off stays listed as on."""
+        """Stop monitoring, at any time; a drive that is not confirmed as off stays listed as on."""
         self._watchdog.close()
 
     def _look(self) -> None:
@@ -319,8 +341,8 @@ class DriveGuard(ClosedOnLeaving):
             self._switch.ask(self._standstill)
         try:
             self._drive.cut()
-            self._drive.silence()  # also lowers the amplitude, because silence cannot be measured
-        except AcquisitionError as error:  # the next check tries again
+            self._drive.silence()  # Lower the amplitude too: silence cannot be measured.
+        except AcquisitionError as error:  # The next check tries again.
             LOG.debug("the drive guard could not silence the drive", exc_info=True)
             if not self._has_failed:
                 LOG.error("%s", error)

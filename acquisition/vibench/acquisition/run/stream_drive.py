@@ -60,7 +60,7 @@ class OutputSynthesizer:
         return self._stretch.play is None and self.level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
-        """Append ``phases``; the first starts at once if no earlier phase is left."""
+        """Append ``phases``; the first phase starts at once if no earlier phase is left."""
         self._coming = chain(self._coming, phases)
 
     def fade(self, duration_s: float) -> None:
@@ -86,8 +86,8 @@ class OutputSynthesizer:
     def _advance_to_next(self, wanted: int) -> None:
         """Advance to the range that contains the next sample, skipping phases shorter than a sample.
 
-        Without further phases, silence covers only the ``wanted`` samples. Phases appended later start after
-        this silence.
+        If there are no further phases, silence covers only the ``wanted`` samples. Phases appended later
+        start after this silence.
         """
         while self._sample >= self._stretch.end:
             phase = next(self._coming, None)
@@ -126,7 +126,7 @@ class OutputSynthesizer:
 
 BLIND_FADE_S = 0.1
 """Duration of the fade when the run ends without sampling [s]."""
-# Prevents a rounding error from adding a block to a duration of a whole number of blocks.
+# Without this, a rounding error could add a block to a duration of a whole number of blocks.
 _ROUNDING = 1e-9
 
 
@@ -200,7 +200,7 @@ class StreamDrive:
         Used when the run ends without sampling. A device that accepts no more samples is stopped at once.
         """
         try:
-            with suppress(AcquisitionError):  # if the fade fails, stop() still follows
+            with suppress(AcquisitionError):  # after a failed fade, `cut` still follows
                 self._fade_blindly()
         finally:
             self.cut()
@@ -238,7 +238,7 @@ class StreamDrive:
             return
         self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
-        # Each write waits for space, so when the last silence is written, the fade has already been played.
+        # Each write waits for space: when the last silence is written, the fade has been played.
         left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead
         while left > 0:
             count = min(left, ahead // 2)

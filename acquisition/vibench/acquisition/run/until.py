@@ -29,7 +29,7 @@ LONGEST_HINDRANCE = 120
 """Largest length of the text that states why a bound is missing [characters]."""
 _ENDING_S = 2.0
 _READY_S = 60.0
-"""Longest wait for the analysis to start [s]; after this wait, the run starts anyway."""
+"""Longest wait for the analysis to start [s]; after this time, the run starts anyway."""
 _ASK_S = 0.05
 
 
@@ -37,7 +37,7 @@ class UntilWatch(ClosedOnLeaving):
     """Repeated analysis of a growing recording, until the error bounds are small enough.
 
     A stretch is a part of the recording with one result. The process starts before any drive. The run queues
-    requests, reads results and never waits. If the process fails, the recording takes its longest time.
+    requests, reads results and never waits. If the process fails, the recording lasts its longest time.
     """
 
     def __init__(self, measurement: Measurement, until: Until, path: Path) -> None:
@@ -97,7 +97,7 @@ class UntilWatch(ClosedOnLeaving):
                 else:
                     yield phase
                 continue
-            # Periodic noise: all realisations together give one result; each has a ramp up and a ramp down.
+            # For periodic noise, all realisations together give one result. Each realisation has two ramps.
             if self._is_reached and phase.state is RunState.RAMPING_UP:
                 break
             if not (self._is_reached and phase.state in (RunState.SETTLING, RunState.RECORDING)):
@@ -111,9 +111,9 @@ class UntilWatch(ClosedOnLeaving):
     def _pieces(self, phase: Phase) -> Iterator[Phase]:
         self._end()
         self._longest_s = phase.duration_s
-        self._begin(min(self._until.shortest_s, phase.duration_s))
+        self._begin(min(max(self._until.shortest_s, PIECE_S), phase.duration_s))
         left_s = phase.duration_s
-        while left_s > 1e-9 and not self._is_reached:  # the tolerance ignores a remainder due to rounding
+        while left_s > 1e-9 and not self._is_reached:  # a smaller remainder is a rounding error
             piece_s = min(PIECE_S, left_s)
             yield Phase(phase.state, phase.play, piece_s, phase.segment)
             left_s -= piece_s
@@ -171,11 +171,11 @@ class UntilWatch(ClosedOnLeaving):
         return self._process.stdout.readline()
 
     def close(self) -> None:
-        """End the analysis process and discard its answer. May be called at any time."""
+        """End the analysis process and discard its results. May be called at any time."""
         self._process.kill()
         self._process.wait(_ENDING_S)
         self._beside.close(_ENDING_S)
         for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):  # the process ended during the request
+            with suppress(OSError):  # a broken pipe: the process has ended
                 assert pipe is not None
                 pipe.close()

@@ -29,11 +29,11 @@ from vibench.sim.operating_system.this import (
 from vibench.stop_files import answer_path, stop_path
 
 from ..errors import AcquisitionError
-from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
+from .stop import DRIVES_ON, MEMORY_RESERVE, Cause, DescriptorReserve, StopLevel, StopRequest, StopSwitch
 
-# A stop needs no connection: it is a file in the state folder, where programs that drive a bench look for it.
-# The file name contains process, start time and level, so a process that cannot open more files can still see
-# the stop, and a full disk can store it. The file contains the reason if there is space (decision 0029).
+# A stop is a file in the state folder and needs no connection; programs that drive a bench look for stops.
+# The file's name gives process, start time and level. Even a full disk can store the name, and a process that
+# cannot open more files can see it. If there is space, the file contains the reason (decision 0029).
 
 SILENT_REASON = "a stop request in the state folder"
 Press = Callable[[StopLevel, str], None]
@@ -60,8 +60,9 @@ class KeptStops:
         self._obeyed: dict[Path, tuple[int, int]] = {}
         self._taken: set[Path] = set()
         """Stops that are being carried out, each given by the original path of its file."""
-        self._reserve = os.open(os.devnull, os.O_RDONLY)
-        """Reserved file descriptor, closed to read a reason even if no other descriptor is free."""
+        self._reserve = DescriptorReserve()
+        """Reserved file descriptor, released to read a reason even if no other descriptor is free."""
+        self._reserve.hold()
 
     @classmethod
     def of_this_process(cls, press: Press) -> "KeptStops":
@@ -78,8 +79,8 @@ class KeptStops:
             mark = (found.st_ino, found.st_mtime_ns)
             if self._obeyed.get(path) == mark:
                 continue
-            self._obeyed[path] = mark  # carry out a stop only once, even if its file cannot be removed
-            # Read regular files only, because reading a pipe could wait for ever.
+            self._obeyed[path] = mark  # Do this once, even if the file cannot be removed.
+            # Do not read a pipe, which could wait for ever: read only regular files.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             self._taken.add(path)
             with suppress(OSError):
@@ -90,7 +91,7 @@ class KeptStops:
     def confirm(self) -> None:
         """Rename obeyed stop files when no drive is on; until then, update their times as a sign of life.
 
-        If somebody has removed such a file, write it again.
+        If somebody has removed an obeyed stop file, write it again.
         """
         is_advancing = DRIVES_ON.take_advance()
         for path in tuple(self._taken):
@@ -105,19 +106,17 @@ class KeptStops:
 
     def close(self) -> None:
         """Release the reserved file descriptor."""
-        if self._reserve >= 0:
-            os.close(self._reserve)
-            self._reserve = -1
+        self._reserve.release()
 
     def _reason(self, path: Path) -> str:
         self.close()
         try:
             return path.read_text(encoding="utf-8", errors="replace") or SILENT_REASON
-        except OSError:  # another thread has taken the descriptor
+        except OSError:  # another thread took the reserved descriptor
             return SILENT_REASON
         finally:
             with suppress(OSError):
-                self._reserve = os.open(os.devnull, os.O_RDONLY)
+                self._reserve.hold()
 
 
 def _answer(stop: Path, answer: str) -> Path:
@@ -145,8 +144,8 @@ class Watchdog:
             self._thread.start()
         except RuntimeError as error:
             raise AcquisitionError(
-                f"this process can start no more threads ({error}), but the {name} needs one. Nothing "
-                "was played; end other programs, or raise the limit (ulimit -u)"
+                f"this process can start no more threads ({error}), but the {name} needs a thread. "
+                "Nothing was played; end other programs, or raise the limit (ulimit -u)"
             ) from error
 
     def close(self) -> None:
@@ -159,7 +158,7 @@ class Watchdog:
             try:
                 if not self._closing.wait(INTERVAL_S):
                     self._look()
-            except MemoryError:  # logging the error would need more memory
+            except MemoryError:  # do not log: this would need more memory
                 MEMORY_RESERVE.release()
             except Exception:
                 getLogger(__name__).exception("%s", self._thread.name)
@@ -177,7 +176,7 @@ class Program(BaseModel):
     process_start: str = ""
     """Start time of the process, from the system; unique together with the number, which may be reused."""
     computer: str = ""
-    """Name of the computer; several computers may share the home folder that contains the state folder."""
+    """Name of the computer; several computers may share a home folder with the state folder."""
     rigs: tuple[str, ...] = ()
     """Generators of the rigs whose benches the process has opened."""
 
@@ -194,7 +193,7 @@ class Program(BaseModel):
         try:
             with closing(OpenFile(_path(self))) as file:
                 return not file.is_locked_alone()
-        except OSError:  # the file was removed, or the disk has no locks
+        except OSError:  # the file was removed, or the file system does not support locks
             return False
 
     @property
@@ -228,7 +227,7 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     """
     found = []
     for announcement in _announcements(model):
-        # The computer's name may change while a program runs. Its process number and start time do not.
+        # The computer's name may change while a program runs; the program's number and start time do not.
         is_here = announcement.place is Place.HERE and (
             announcement.computer in ("", platform.node()) or announcement.process_start != ""
         )
@@ -269,33 +268,33 @@ def programs_of_other_places() -> tuple[Program, ...]:
 
 def _announcements(model: type[AnyProgram]) -> Iterator[AnyProgram]:
     try:
-        # glob would find nothing in a folder without read permission.
+        # Do not use glob, which finds nothing in a folder without read permission, and raises no error.
         paths = sorted(engines_folder().iterdir())
     except OSError as error:
         raise AcquisitionError(
             f"the state folder cannot be searched for programs that drive a bench ({error}); set "
-            "VIBENCH_STATE_DIR to the folder of the program. In an emergency switch the amplifier off by hand"
+            "VIBENCH_STATE_DIR to the program's state folder. In an emergency, switch the amplifier off"
         ) from error
     for path in paths:
-        if path.suffix != ".json" or not path.is_file():  # reading a pipe would wait for ever
+        if path.suffix != ".json" or not path.is_file():  # reading a pipe would block
             continue
         try:
             yield model.model_validate_json(_read_announcement(path))
-        except (ValueError, OSError):  # the file is of another version or type, or was removed
+        except (ValueError, OSError):  # a file of another version or type, or a removed file
             continue
 
 
 def _read_announcement(path: Path) -> bytes:
     try:
         return path.read_bytes()
-    except PermissionError:  # a file of root, for example; a stop only needs write access to the folder
+    except PermissionError:  # for example a file of root; stopping needs only write access to the folder
         pid, start, _ = path.name.split(".")
         facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
 
 
 def withdraw(program: Program) -> None:
-    """Remove a program's announcement, if there is one; ignore a failure."""
+    """Remove a program's announcement, if it exists; ignore a failure."""
     with suppress(OSError):
         _path(program).unlink()
 
@@ -303,7 +302,7 @@ def withdraw(program: Program) -> None:
 class _StopTargets:
     """Activities of this process that a stop from outside ends: an engine, runs, checks.
 
-    Only the oldest activity is announced, but a stop ends all; an engine's announcement covers its runs.
+    Only the oldest activity is announced, but a stop ends all; the announcement of an engine covers its runs.
     """
 
     def __init__(self) -> None:
@@ -328,7 +327,7 @@ class _StopTargets:
             self._inside.append(entry)
 
     def leave(self, entry: tuple[Press, Program]) -> None:
-        """Remove an entry; after the last one, stop checking for stop files."""
+        """Remove an entry; after the last entry, stop checking for stop files."""
         with self._changing:
             spoke = self._inside[0] is entry
             self._inside = [each for each in self._inside if each is not entry]
@@ -353,7 +352,7 @@ class _StopTargets:
                 self._announce(self._inside[0][1])
 
     def _look(self) -> None:
-        """Carry out new stops, and announce again if somebody has emptied the state folder."""
+        """Carry out new stops, and repeat the announcement if somebody has emptied the state folder."""
         kept, inside = self._kept, self._inside
         if kept is None or not inside:
             return
@@ -398,7 +397,7 @@ def announce_program(press: Press, program: Program) -> Iterator[None]:
     except OSError as error:
         raise AcquisitionError(
             f"{program.what} cannot be entered in the state folder ({error}), so no other program could stop "
-            "it. Nothing was started; make room there, or set VIBENCH_STATE_DIR to another folder"
+            "it. Nothing was started; make room in that folder, or set VIBENCH_STATE_DIR to another folder"
         ) from error
     try:
         yield
@@ -419,7 +418,7 @@ def _lock(path: Path) -> OpenFile | None:
     try:
         if file.is_locked_alone():
             return file
-    except OSError:  # the disk has no locks
+    except OSError:  # the file system does not support locks
         pass
     file.close()
     return None
@@ -428,13 +427,13 @@ def _lock(path: Path) -> OpenFile | None:
 def _write(program: Program) -> Path:
     path = _path(program)
     coming = path.with_suffix(".coming")
-    coming.unlink(missing_ok=True)  # may remain from a killed process with the same number
-    # Create the file with its final mode, because nobody else may ever read the token in it.
+    coming.unlink(missing_ok=True)  # Left by a killed process with the same number.
+    # Nobody else may ever read the token in the file, so create the file with its final mode.
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(program.model_dump_json())
-        rename(coming, path)  # so that readers never see an incomplete file
+        rename(coming, path)  # readers never see an incomplete file
     except OSError:
         coming.unlink(missing_ok=True)  # on a full disk, an empty file may remain
         raise
@@ -463,11 +462,11 @@ def _sweep() -> None:
 LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
 """Signals that are not handled: the first two cannot be caught; the others recur when a handler returns."""
 _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
-"""Signals that by default neither end nor suspend a process."""
+"""Signals that neither end nor suspend a process by default."""
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
 """Signals that suspend a process, as Ctrl-Z does; a terminal may send the last two repeatedly."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
-"""Signals that are always handled; others are handled only if the program does not handle them itself."""
+"""Signals that are always handled; other signals are handled only if the program itself does not."""
 
 
 @contextmanager
@@ -531,7 +530,7 @@ def signal_name(number: int) -> str:
 def stop_signals() -> list[int]:
     """Return the signals that request a stop during a drive: those that would end or suspend the process.
 
-    Signals that the program handles or ignores itself are left out, and so are those in
+    Signals that the program handles or ignores itself are left out, and so are the signals in
     `LEFT_TO_THE_DEAD_MAN`, which cannot be handled.
     """
     return [number for number in sorted(signal.valid_signals()) if _is_heeded(number)]
@@ -543,5 +542,5 @@ def _is_heeded(number: int) -> bool:
         return False
     if name in _ALWAYS:
         return name != "SIGHUP" or handler is not signal.SIG_IGN
-    # A handler of this module belongs to an outer run with another switch, so it may be replaced.
+    # Replace a handler of this module, which belongs to an outer run with another switch.
     return handler is signal.SIG_DFL or getattr(handler, "__module__", "") == __name__

@@ -1,6 +1,7 @@
-"""Stops of a run: their causes, the level of each cause, and the switch between threads."""
+"""Stops of a run: their causes, the level for each cause, and the switch that passes them between threads."""
 
 import mmap
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -88,22 +89,22 @@ class StopRequest:
 class StopSwitch:
     """Switch by which any thread or signal handler can hold, mark or end a run or a campaign.
 
-    The switch uses no lock, because a signal handler must not wait for one. A stop cannot be withdrawn, only
-    replaced by a harder one.
+    The switch uses no lock, because a signal handler must not wait for a lock. A stop cannot be withdrawn,
+    only replaced by a harder stop.
     """
 
     def __init__(self) -> None:
         self._requests: dict[StopLevel, StopRequest] = {}
         self._holding = False
         self.refusal_to_hold: Callable[[], str] = str
-        """Function that returns the reason why the run cannot be held; empty if it can, or nothing runs."""
+        """Function that returns the reason why the run cannot be held; empty if it can or nothing runs."""
         self._marks: deque[str] = deque()
         self._changes: deque[str] = deque()
 
     @property
     def request(self) -> StopRequest | None:
-        """Hardest stop requested so far; None if none was requested."""
-        # Each level has a separate entry, so that two threads that stop at once cannot lose the harder stop.
+        """Hardest stop requested so far; None if no stop was requested."""
+        # Each level has a separate entry: if two threads stop at once, the harder stop is not lost.
         for level in reversed(StopLevel):
             if level in self._requests:
                 return self._requests[level]
@@ -139,7 +140,7 @@ class StopSwitch:
             yield self._marks.popleft()
 
     def note_change(self, text: str) -> None:
-        """Report a change of the specimen; it ends a run with ``on_changed_specimen = "stop"``."""
+        """Report a change of the specimen; the report ends a run with ``on_changed_specimen = "stop"``."""
         self._changes.append(text)
 
     def take_changes(self) -> Iterator[str]:
@@ -187,7 +188,7 @@ DRIVES_ON = DrivesOn()
 
 
 RESERVE_BYTES = 16_000_000
-"""Size of the memory reserve. Generator commands need some kB; other threads may use up the rest."""
+"""Size of the memory reserve: generator commands need some kB, and other threads may also use it."""
 
 
 class MemoryReserve:
@@ -206,8 +207,8 @@ class MemoryReserve:
                 except (OSError, MemoryError) as error:
                     raise AcquisitionError(
                         f"this process can get no more memory ({error}), but needs {RESERVE_BYTES / 1e6:g} "
-                        "MB to silence the drive in any case. Nothing was played; close other programs, or "
-                        "raise its limit (ulimit -v)"
+                        "MB to silence the drive in every case. Nothing was played; close other programs, or "
+                        "raise the limit (ulimit -v)"
                     ) from error
 
     def release(self) -> None:
@@ -219,3 +220,23 @@ class MemoryReserve:
 
 MEMORY_RESERVE = MemoryReserve()
 """Memory reserve of this process."""
+
+
+class DescriptorReserve:
+    """File descriptors kept in reserve, for use when the process may open no more files."""
+
+    def __init__(self, descriptors: int = 1) -> None:
+        self._descriptors = descriptors
+        self._held: list[int] = []
+
+    def hold(self) -> None:
+        """Reserve all descriptors that are not reserved yet; raises OSError if there are not enough."""
+        while len(self._held) < self._descriptors:
+            self._held.append(os.open(os.devnull, os.O_RDONLY))
+
+    def release(self) -> bool:
+        """Release the descriptors, and return whether any were reserved. May be called at any time."""
+        is_held = bool(self._held)
+        while self._held:
+            os.close(self._held.pop())
+        return is_held

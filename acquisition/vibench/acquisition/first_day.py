@@ -1,4 +1,9 @@
-"""Configuration of a bench from a template and answers to questions, and first tests of the bench."""
+"""First day at a bench: questions, the resulting configuration, and a page with the test results.
+
+`configured` asks `QUESTIONS` and writes a commented hardware configuration; `first_day` uses it to confirm
+wires, measure the noise floor, play a first 5 mVpp sine and check the bench; it returns the page. The caller
+supplies the answers (terminal, file or test). `vibench bench new` does all of this (docs/first-day.md).
+"""
 
 import errno
 import json
@@ -17,19 +22,17 @@ from pydantic import ValidationError
 
 from vibench.sim.operating_system.this import replace_file
 
-from ..bench.bench import Bench
-from ..bench.instrument_list import InstrumentList
-from ..bench.result import BenchReport, CheckResult, Verdict
-from ..check.admission import check_bench
-from ..check.bench_report import bench_report
-from ..errors import AcquisitionError, CheckFailed, ConfigurationError
-from ..host.printable import printable
-from ..host.schema import schema_line
-from ..host.shipped import shipped_folder
-from ..host.toml_file import complaints, from_toml
-from ..instruments import PlugInKind, missing_package, plug_in_names, usb_ids
-from ..rig import GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
-from ..stopping.stop import StopSwitch
+from .bench import Bench, BenchReport, CheckResult, InstrumentList, Verdict
+from .check.admission import check_bench
+from .check.bench_report import bench_report
+from .errors import AcquisitionError, CheckFailed, ConfigurationError
+from .host.installation import shipped_folder
+from .host.printable import printable
+from .host.schema import schema_line
+from .host.toml_file import complaints, from_toml
+from .instruments import PlugInKind, missing_package, plug_in_names, usb_ids
+from .rig import GeneratorConfig, Rig, Role, calibrations, channels_of, generator_driver, load_rig
+from .stopping.stop import StopSwitch
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Question:
     """Path of the value: ``"amplifier.gain_db"``; for a channel ``"daq.channels.m0_velocity.physical"``."""
     text: str
     choices: Callable[[InstrumentList], tuple[str, ...]] = lambda _: ()
-    """Function that returns possible answers: the names of the instruments found."""
+    """Function that returns the possible answers: the names of the instruments that were found."""
 
 
 def _converters(seen: InstrumentList) -> tuple[str, ...]:
@@ -121,7 +124,7 @@ def value_in(text: str, key: str) -> str:
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
     """Return the template with a value replaced by an answer, and with a note on the answer's source.
 
-    Raises ConfigurationError when the type of the answer is wrong (such as text for a number), or the
+    Raises ConfigurationError when the type of the answer is wrong (such as text for a number), or when the
     template has no table for the key.
     """
     found = _place(text, key)
@@ -131,7 +134,7 @@ def with_answer(text: str, key: str, answer: str, note: str) -> str:
         return text[:begin] + line + text[end:]
     begin, end, name = _table(text, key)
     if end == 0:
-        raise ConfigurationError(f"the template has no key {key}; remove it from the answers")
+        raise ConfigurationError(f"the template has no key {key}; remove this key from the answers")
     header = text.index("\n", begin) + 1
     return f"{text[:header]}{name} = {_guess_type(answer)}  # {note}\n{text[header:]}"
 
@@ -223,12 +226,12 @@ def _number(answer: str, key: str) -> str:
 
 
 Ask = Callable[[Question, Sequence[str], str], str]
-"""Function that asks a question with proposals and the template's value, which an empty answer keeps."""
+"""Function that asks a question, with proposals and the template's value; an empty answer keeps it."""
 Refuse = Callable[[ConfigurationError], None]
 
 
 def refuse_at_once(error: ConfigurationError) -> None:
-    """Raise the error of an answer; used where the question cannot be repeated (as in a script)."""
+    """Raise the error of an answer; used where the question cannot be asked again (as in a script)."""
     raise error
 
 
@@ -250,7 +253,7 @@ def configure(
     marks unchecked values. ``note``, such as name and time, becomes a comment behind each answer. ``refuse``
     receives the error of one answer or of all answers together; if it returns, the questions are repeated.
 
-    Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; then nothing is written.
+    Raises ConfigurationError when ``target`` exists or when ``refuse`` raises it; nothing is then written.
     """
     if target.exists():
         raise ConfigurationError(f"{target} exists already, and nothing is overwritten; give another name")
@@ -258,7 +261,7 @@ def configure(
         raise ConfigurationError(
             f"{target.absolute().parent} is not a folder; create it, or choose another folder"
         )
-    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # this path is relative to the template
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # without a relative path to the schema
     questions = questions_for(text) if questions is None else questions
     for question in questions:
         if len(choices := question.choices(seen)) == 1:
@@ -298,7 +301,7 @@ def _require_text(answer: str, key: str) -> None:
 
 
 def _default_answer(text: str, key: str) -> str:
-    """Return the template's value as the default answer; of a value with a source, only the number."""
+    """Return the template's value as the default answer; if it has a source, only the number."""
     written = value_in(text, key)
     held = tomllib.loads(f"held = {written}")["held"] if written else None
     return str(held["value"]) if isinstance(held, dict) and "value" in held else written.strip('"')
@@ -345,7 +348,7 @@ def _driver_of(resource: str) -> str | None:
         return None
     for name in plug_in_names(PlugInKind.GENERATOR):
         config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
-        with suppress(AcquisitionError):  # skip drivers of broken packages
+        with suppress(AcquisitionError):  # skip a driver whose package is broken
             if ids in generator_driver(config).describe(config).usb_ids:
                 return name
     if missing := missing_package(f"{ids[0]:#06x}"):
@@ -380,8 +383,8 @@ def first_day(
 
     The check at the usual level is made and stored only if the check at 5 mVpp has no verdict FAIL.
 
-    Raises CheckFailed when a wire is not confirmed; nothing has then been played. Raises InstrumentError when
-    an instrument fails.
+    Raises CheckFailed when a wire is not confirmed; in this case nothing has been played. Raises
+    InstrumentError when an instrument fails.
     """
     folder = config.absolute().parent
     again = f"start again with --from {in_a_command(config)} and a new name for the configuration"
@@ -421,7 +424,7 @@ def _wires(rig: Rig, confirmed: Confirmed, again: str) -> Iterator[str]:
     yield "\n## Wires (both ends checked)\n"
     for channel in channels_of(rig):
         config = next(each for each in rig.daq.channels if each.role is channel.role)
-        divider = f" over a divider of {config.attenuation:g}:1" if config.attenuation != 1 else ""
+        divider = f" through a divider of {config.attenuation:g}:1" if config.attenuation != 1 else ""
         current = f", IEPE {1e3 * config.iepe_current_a:g} mA" if config.iepe_current_a else ""
         source = _FROM.get(channel.role, f"{channel.sensor} ({channel.role.value.replace('_', ' ')})")
         pair = f"{source}{divider} to {channel.physical} ({channel.coupling}{current})"

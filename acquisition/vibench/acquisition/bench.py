@@ -1,12 +1,19 @@
-"""Bench: all instruments of a rig, opened together or not at all; closing it silences the generator."""
+"""Open the instruments of a rig, all or none, and close them with the generator silent.
 
+`open_bench` opens a rig's generator, converter and analogue output, for only one program at a time
+(`BenchLock`); `list_instruments` lists the instruments that could be opened. The module also defines the
+findings and the stored result of a bench check. Only this module starts simulated instruments: it loads
+`vibench.virtual_rig` by name when a configuration has a table ``[virtual]``.
+"""
+
+import json
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from getpass import getuser
 from hashlib import sha256
@@ -14,6 +21,8 @@ from importlib import import_module
 from pathlib import Path
 from threading import Event as Alarm
 from typing import Any, Self, cast
+
+from pydantic import AwareDatetime, Field
 
 from vibench.sim.operating_system.this import (
     is_locked_alone,
@@ -24,19 +33,21 @@ from vibench.sim.operating_system.this import (
     write_at,
 )
 
-from ..errors import AcquisitionError, InstrumentBusy
-from ..host.chosen import member
-from ..instruments import (
+from . import drivers
+from .errors import AcquisitionError, InstrumentBusy, InstrumentError
+from .host.toml_file import FrozenModel, member
+from .instruments import (
     AnalogOutput,
     Block,
     Digitizer,
+    FoundDevice,
     FunctionGenerator,
     Identity,
     PlugInKind,
     RealTimeController,
     plug_in,
 )
-from ..rig import (
+from .rig import (
     CalibrationRule,
     Channel,
     Confirm,
@@ -52,8 +63,160 @@ from ..rig import (
     load_rig,
     output_driver,
 )
-from ..stopping.program import note_open_bench
-from .result import CheckResult
+from .stopping.program import note_open_bench
+
+
+class Verdict(StrEnum):
+    """Verdict on one finding of a bench check."""
+
+    OK = "ok"
+    WARN = "warn"
+    """Warning: find the cause of the deviation, because measurements may be less accurate."""
+    FAIL = "fail"
+    """Failure: remove the cause before you switch the drive on."""
+
+
+_ORDER = (Verdict.OK, Verdict.WARN, Verdict.FAIL)
+
+
+class Finding(FrozenModel):
+    """One result of a bench check."""
+
+    name: str = Field(min_length=1)
+    value: str
+    """Measured value as text, with unit and uncertainty."""
+    expected: str
+    verdict: Verdict
+    number: float | None = None
+    """Measured value as a number in ``unit``; None if the value is only a text."""
+    uncertainty: float | None = None
+    """Standard uncertainty of the number, in ``unit``."""
+    unit: str = ""
+    advice: str = ""
+    """Advice on what to do; empty if the verdict is ok."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds on a deviation: ok up to ``well``, a warning from ``well`` to ``fail``, otherwise a failure."""
+
+    well: float
+    fail: float
+
+    def verdict(self, deviation: float) -> Verdict:
+        """Return the verdict on a deviation; a NaN counts as FAIL."""
+        if deviation <= self.well:
+            return Verdict.OK
+        return Verdict.WARN if deviation <= self.fail else Verdict.FAIL
+
+
+def finding_of(
+    name: str,
+    number: float,
+    unit: str,
+    expected: str,
+    verdict: Verdict,
+    advice: str,
+    uncertainty: float | None = None,
+) -> Finding:
+    """Return the finding for a measured number; the advice is included only if the verdict is not ok."""
+    spread = "" if uncertainty is None else f" +- {uncertainty:.1g}"
+    return Finding(
+        name=name,
+        value=f"{number:.4g}{spread} {unit}".rstrip(),
+        expected=expected,
+        verdict=verdict,
+        number=number,
+        uncertainty=uncertainty,
+        unit=unit,
+        advice="" if verdict is Verdict.OK else advice,
+    )
+
+
+class BenchReport(FrozenModel):
+    """All findings of a bench check."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Worst verdict of the findings."""
+        return max((finding.verdict for finding in self.findings), key=_ORDER.index, default=Verdict.OK)
+
+    def __getitem__(self, name: str) -> Finding:
+        """Return the finding ``name``; raises KeyError, whose text lists the existing names."""
+        for finding in self.findings:
+            if finding.name == name:
+                return finding
+        raise KeyError(f"no finding {name!r}; found: {', '.join(finding.name for finding in self.findings)}")
+
+    def text(self) -> str:
+        """Return the report as a table; advice stands below the line of its finding."""
+        rows = [(f.verdict.upper(), f.name, f.value, f.expected) for f in self.findings]
+        header = ("", "finding", "measured", "expected")
+        widths = [max(len(row[column]) for row in (header, *rows)) for column in range(len(header))]
+        lines = [_line(header, widths)]
+        for row, finding in zip(rows, self.findings, strict=True):
+            lines.append(_line(row, widths))
+            if finding.advice:
+                lines.append(f"{'':{widths[0]}}  -> {finding.advice}")
+        return "\n".join(lines)
+
+
+def _line(cells: tuple[str, ...], widths: list[int]) -> str:
+    return "  ".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True)).rstrip()
+
+
+_PACE = {"pace", "speed", "faults"}
+"""Settings of a virtual rig that may change without a new bench check."""
+_HOUR = timedelta(hours=1)
+_DAY = timedelta(days=1)
+
+
+class CheckResult(FrozenModel):
+    """Findings of a bench check, with the data needed to decide whether the check is still valid."""
+
+    rig: str
+    """Name of the rig that was checked."""
+    rig_digest: str
+    """SHA-256 of the checked configuration; see `rig_digest`."""
+    checked: AwareDatetime
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+
+    @classmethod
+    def of(cls, rig: Rig, report: BenchReport, checked: datetime) -> Self:
+        """Return the result to be stored for a report, with the name of the rig and the time of the check."""
+        return cls(
+            rig=rig.name,
+            rig_digest=rig_digest(rig),
+            checked=checked,
+            verdict=report.verdict,
+            findings=report.findings,
+        )
+
+    @property
+    def report(self) -> BenchReport:
+        """The findings of this check as a report."""
+        return BenchReport(findings=self.findings)
+
+    def age_h(self, now: datetime) -> float:
+        """Return the time since the check [h]."""
+        return (now - self.checked) / _HOUR
+
+
+def rig_digest(rig: Rig) -> str:
+    """Return the SHA-256 of a rig's configuration, except settings that may change without a new check."""
+    content = rig.model_dump(mode="json", exclude={"check_valid_h": True, "virtual": _PACE})
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def age(age: timedelta) -> str:
+    """Return an age as text: ``"3 hours"``, ``"2 days"``."""
+    if age < 2 * _HOUR:
+        return f"{max(age.total_seconds(), 0.0) / 60:.0f} minutes"
+    return f"{age / _HOUR:.0f} hours" if age < 2 * _DAY else f"{age / _DAY:.0f} days"
+
 
 # Only one program may use a bench. A lock ends with the process that holds it, even if it is killed.
 #
@@ -62,11 +225,11 @@ from .result import CheckResult
 # The file is never removed: otherwise two programs could each lock a file of that name.
 
 _HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
-"""Text of a lock file that errors may quote; other text is not quoted, as any user may write to the file."""
+"""Pattern of lock-file text that errors may quote; other text is not quoted, as any user may write it."""
 
 
 class BenchLock:
-    """Locks of this process on a rig's instruments; no locks if the rig is virtual or replays a recording."""
+    """Locks of this process on a rig's instruments; none if the rig is virtual or replays a recording."""
 
     def __init__(self, descriptors: list[int]) -> None:
         self._descriptors = descriptors
@@ -99,7 +262,7 @@ class BenchLock:
         except OSError as error:
             raise InstrumentBusy(
                 f"{rig.name} cannot be marked as in use: the file {path} cannot be locked ({error}). Nothing "
-                "was opened; if no measurement runs, have the file's owner or root delete it"
+                "was opened; if no measurement is running, ask the owner of the file, or root, to delete it"
             ) from error
         if not (is_ours and is_there):
             raise InstrumentBusy(
@@ -109,7 +272,7 @@ class BenchLock:
         try:
             os.ftruncate(descriptor, 0)
             write_at(descriptor, f"{os.getpid()} of {getuser()}".encode(), 0)
-        except (OSError, KeyError, ImportError):  # file of another user, full disk, unnamed user
+        except (OSError, KeyError, ImportError):  # another user's file, full disk, nameless user
             return
 
     def close(self) -> None:
@@ -127,7 +290,7 @@ def _instruments(rig: Rig) -> Iterator[str]:
 
 
 def _plain(resource: str) -> str:
-    """Return a VISA name without its optional parts, and with its numbers in decimal form."""
+    """Return a VISA name without the optional parts, with all its numbers in decimal form."""
     kind, *others = resource.upper().replace("::LOCALHOST::", "::127.0.0.1::").split("::")
     numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
     return "::".join(
@@ -144,7 +307,7 @@ def _holder(descriptor: int) -> str:
 
 
 def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
-    """Return the virtual rig; its package is loaded only here, as a real bench must work without it."""
+    """Return the virtual rig; the package is loaded only here: a real bench must work without it."""
     made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
     return made
 
@@ -319,8 +482,8 @@ def open_bench(
     Parameters
     ----------
     config
-        The rig, or the path of its TOML file. With a ``[virtual]`` table the simulated instruments
-        are started as well, and stopped when the bench is left.
+        The rig, or the path of its TOML file. If it has a ``[virtual]`` table, the simulated instruments are
+        started, and stopped when the bench is left.
     confirm
         Function that confirms settings made by hand; see `knobs`. If None, ask at the terminal; a virtual rig
         is confirmed without asking.
@@ -334,7 +497,7 @@ def open_bench(
     ConfigurationError
         When the file contains a value or key that is not allowed.
     CheckFailed
-        When a calibration has expired, or a knob is not confirmed.
+        When a calibration has expired, or when a knob is not confirmed.
     InstrumentBusy
         When another program has this bench open.
     InstrumentError
@@ -355,18 +518,18 @@ def open_bench(
 def _open_instruments(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.reachable_rig
-    # Open the generator first, which silences it: a killed program may have left its output on.
+    # A killed program may have left the output on, so open the generator first: opening it turns it off.
     generator = generator_driver(connected.generator).open(connected.generator)
     with ExitStack() as silencing:
         silencing.callback(generator.close)
         silencing.callback(generator.stop)  # an ExitStack calls its callbacks in reverse order
         simulated = "simulated " if rig.virtual or rig.plays_back else ""
-        note_open_bench(simulated + next(_instruments(rig)))  # the generator, as rigs may share a name
+        note_open_bench(simulated + next(_instruments(rig)))  # name the generator: rigs may share a name
         digitizer = digitizer_driver(connected).open(connected)
         closing.callback(digitizer.close)
         output = _output(connected, digitizer, closing)
         controller = _controller(connected, closing)
-        # At the end, silence the outputs first, then close all instruments.
+        # When the bench closes, silence all outputs before any instrument is closed.
         closing.push(silencing.pop_all())
     if output is not None:
         closing.callback(output.stop)
@@ -389,7 +552,7 @@ def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
     if rig.controller is None:
         return None
     controller: RealTimeController = plug_in(PlugInKind.DRIVE, "controller").open(rig.controller)
-    closing.callback(controller.close)  # opening a generator silences it
+    closing.callback(controller.close)  # opening a generator turns its output off
     return controller
 
 
@@ -406,8 +569,51 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         if error is None:
             raise
         error.add_note(f"While leaving the bench: {failure}")
-        # The context of each failure is the failure before it.
+        # The context of each failure is the previous failure.
         earlier = failure.__context__
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")
             earlier = earlier.__context__
+
+
+@dataclass(frozen=True)
+class InstrumentList:
+    """Instruments that a search has found."""
+
+    visa_resources: tuple[str, ...]
+    """Names for ``generator.resource``. USB numbers in them may be decimal: 1689::851 is an AFG1022."""
+    daq_devices: tuple[FoundDevice, ...]
+    remarks: tuple[str, ...]
+    """Reasons why a search by VISA or DAQmx failed."""
+
+
+def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
+    """Return the instruments found by VISA and DAQmx; if a search fails, its error becomes a remark.
+
+    Parameters
+    ----------
+    visa_library
+        ``"@py"`` for pyvisa-py, empty for the system's VISA.
+    server
+        Address of a DAQmx device server, ``"host:port"``; None for the driver on this computer.
+    """
+    remarks: list[str] = []
+    resources: tuple[str, ...] = ()
+    devices: tuple[FoundDevice, ...] = ()
+    try:
+        resources = drivers.list_visa_resources(visa_library)
+    except InstrumentError as error:
+        remarks.append(str(error))
+    try:
+        devices = drivers.list_daqmx_devices(server)
+    except InstrumentError as error:
+        remarks.append(str(error))
+    return InstrumentList(resources, devices, tuple(remarks))
+
+
+def list_rig_instruments(rig: Rig) -> InstrumentList:
+    """List the instruments that VISA and DAQmx find for a rig; a virtual rig is started for the search."""
+    if rig.virtual is None:
+        return list_instruments(rig.generator.visa_library, rig.daq.server)
+    with simulated_rig(rig) as virtual:
+        return list_instruments(rig.generator.visa_library, virtual.daq_address)

@@ -1,4 +1,4 @@
-"""Limits of each generator model, and checks of settings and waveforms before anything is sent.
+"""Limits of generators, inputs and outputs, and checks of settings and samples before anything is sent.
 
 This module does not need pyvisa, so plans can be checked without that library.
 """
@@ -11,8 +11,8 @@ from typing import NamedTuple, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConfigurationError, LimitExceeded
-from ..instruments import FunctionGenerator, GeneratorDescription, Identity, Knob, Samples, Sweep
+from ..errors import ConfigurationError, InstrumentError, LimitExceeded
+from ..instruments import FunctionGenerator, GeneratorDescription, Identity, Knob, Overload, Samples, Sweep
 from ..rig import GeneratorConfig, GeneratorDriver
 
 
@@ -100,8 +100,8 @@ class GeneratorModel:
     def codes(self, waveform: Samples) -> ArbitraryCodes:
         """Return the codes of one period of values, scaled to the full range of codes.
 
-        The mean is removed, because DC would displace the shaker. The rest is scaled so that its largest
-        magnitude gets the first or last code.
+        The mean is removed, because DC would displace the shaker. The remaining signal is scaled so that its
+        largest magnitude gets the first or the last code.
 
         Raises LimitExceeded when the waveform has too few or too many points, is not finite, exceeds -1 to 1,
         or is constant.
@@ -111,7 +111,7 @@ class GeneratorModel:
         if values.ndim != 1 or not fewest <= values.size <= most:
             raise LimitExceeded(
                 f"the waveform has the shape {values.shape}; the generator's memory takes one period of "
-                f"{fewest} to {most} points. Nothing was sent; resample it"
+                f"{fewest} to {most} points. Nothing was sent; resample the waveform"
             )
         peak = float(np.max(np.abs(values)))
         # Unlike "peak > 1", this condition also refuses a NaN.
@@ -124,8 +124,8 @@ class GeneratorModel:
         factor = float(np.max(np.abs(swing)))
         if factor <= np.finfo(np.float64).eps:
             raise LimitExceeded(
-                "the waveform is constant, and its mean value is not played. Nothing was sent; "
-                "give one period that varies"
+                "the waveform is constant, and its mean value is not played. Nothing was sent; give one "
+                "period of a varying signal"
             )
         middle = self.top_code / 2
         codes = np.clip(np.rint(middle + swing / factor * middle), 0, self.top_code).astype(np.uint16)
@@ -142,8 +142,8 @@ def _require(value: float, allowed: tuple[float, float], unit: str, reason: str)
 
 
 AFG1022_MODEL = GeneratorModel(
-    # Tektronix AFG1022 specification, as the IVI driver tkafg1k checks it. Drivers and measurements agree on
-    # a peak of 10 V, thus 20 Vpp; the IVI driver allows twice that. The stricter limit is used.
+    # Limits of the Tektronix AFG1022 specification, as in its IVI driver tkafg1k. For the amplitude, other
+    # drivers and measurements agree on 20 Vpp (10 V peak); the IVI driver allows 40 Vpp. The limit is 20 Vpp.
     name="AFG1022",
     driver="vibench.acquisition.drivers:AFG1022X",
     open_range_vpp=(2e-3, 20.0),
@@ -168,11 +168,12 @@ class NoGenerator:
 
     name: str
     silently: str = ""
-    """Reason why the placeholder accepts commands but plays nothing; empty if it refuses commands."""
+    """Reason why the placeholder accepts commands and plays nothing; empty if it refuses commands."""
     amplitude_limit_vpp: float = 0.0
+    unconfirmed: tuple[Knob, ...] = ()
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Return capabilities that allow no signal, or those that allow the plan of a recording."""
+        """Return capabilities that allow no signal, or only the plan of a recording that is played back."""
         if not self.silently:
             return GeneratorDescription(self.name, (_NOTHING_VPP, _NOTHING_VPP), _NOTHING_VPP, (1, 1))
         return GeneratorDescription(self.name, (_NOTHING_VPP, config.amplitude_limit_vpp), 1e6, (2, 65_536))
@@ -187,66 +188,67 @@ class NoGenerator:
         return Identity("", self.name, "", "", f"{self.name}: {self.silently or 'it plays nothing'}")
 
     @property
-    def unconfirmed(self) -> tuple[Knob, ...]:
-        """Return no settings, because none need confirmation."""
-        return ()
-
-    @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
         """Smallest and largest amplitude setting that is accepted, peak to peak [V]."""
         return _NOTHING_VPP, self.amplitude_limit_vpp
-
-    def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        """Accept a sine if a recording is played back; otherwise refuse it."""
-        self._take(f"a sine of {frequency_hz:g} Hz at {amplitude_vpp:g} Vpp")
-
-    def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        """Accept a waveform if a recording is played back; otherwise refuse it."""
-        self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
-
-    def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse the internal sweep, which the placeholder's capabilities do not include."""
-        raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp cannot be played by {self.name}")
-
-    def set_frequency(self, frequency_hz: float) -> None:
-        """Accept a new frequency if a recording is played back; otherwise refuse it."""
-        self._take(f"{frequency_hz:g} Hz")
-
-    def set_amplitude(self, amplitude_vpp: float) -> None:
-        """Accept a new amplitude if a recording is played back; otherwise refuse it."""
-        self._take(f"{amplitude_vpp:g} Vpp")
-
-    def arm_burst(self, cycles: int) -> None:
-        """Accept a burst if a recording is played back; otherwise refuse it."""
-        self._take(f"a burst of {cycles} cycles")
-
-    def trigger(self) -> None:
-        """Accept a trigger if a recording is played back; otherwise refuse it."""
-        self._take("a trigger")
-
-    def end_burst(self) -> None:
-        """Do nothing, because nothing plays."""
 
     def measured_latency_s(self) -> float:
         """Return zero as the duration of an amplitude change [s]."""
         return 0.0
 
-    def start(self) -> None:
-        """Accept the command, or refuse it."""
-        self._take("its output")
-
     def stop(self) -> None:
-        """Do nothing, because nothing plays."""
+        """Do nothing, because no signal plays and no instrument is open."""
 
-    def close(self) -> None:
-        """Do nothing, because nothing is open."""
+    close = end_burst = stop
 
-    def _take(self, what: str) -> None:
+    def start(self, *_settings: object) -> None:
+        """Accept a command if a recording is played back; otherwise refuse it."""
         if not self.silently:
             raise ConfigurationError(
-                f"{what} was requested from a bench without a function generator. Nothing was played; use "
-                'its analogue output (daq.output.plays = "tones_and_streams"), or set generator.driver'
+                "a signal was requested from a bench without a function generator. Nothing was played; use "
+                'the analogue output (daq.output.plays = "tones_and_streams"), or set generator.driver'
             )
+
+    load_sine = load_waveform = load_sweep = set_frequency = set_amplitude = arm_burst = trigger = start
 
 
 NO_GENERATOR = NoGenerator("no function generator")
+
+
+# Vibrometers and converters distort before they clip (hardware reference, section 4).
+OVERLOAD_FRACTION = 0.95
+# A delta-sigma converter's filter rings this long after clipping; overloads within this time count as one.
+_RECOVERY_SAMPLES = 64
+
+
+def overload_ranges(
+    volts: Samples, roles: tuple[str, ...], full_scales_v: tuple[float, ...], first_sample: int
+) -> tuple[Overload, ...]:
+    """Return the ranges of samples in a block in which a channel reaches 95 % of its full scale.
+
+    ``volts`` have the shape (channels, samples) [V]; ``first_sample`` is the number of the block's first
+    sample in the run.
+    """
+    found: list[Overload] = []
+    peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
+    for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
+        if not peak_v >= OVERLOAD_FRACTION * full_scale_v:  # also skips NaN, which `read_block` refuses
+            continue
+        past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
+        ranges = np.split(past, np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES) + 1)
+        found += [
+            Overload(role, first_sample + int(each[0]), first_sample + int(each[-1])) for each in ranges
+        ]
+    return tuple(found)
+
+
+def require_playable(volts: Samples, physical: str, limit_v: float, *, is_open: bool) -> None:
+    """Raise LimitExceeded for a NaN or a sample beyond the limit, InstrumentError if the output is closed."""
+    peak_v = float(np.max(np.abs(volts), initial=0.0))
+    if not peak_v <= limit_v:  # this form also refuses a NaN
+        raise LimitExceeded(
+            f"a peak of {peak_v:g} V was requested from {physical}; at most {limit_v:g} V are allowed. "
+            "Nothing was written; lower the amplitude"
+        )
+    if not is_open:
+        raise InstrumentError(f"{physical} is closed; open the bench again")
