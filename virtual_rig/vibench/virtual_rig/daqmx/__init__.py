@@ -1,5 +1,5 @@
 """The simulated DAQ: NI's DAQmx service over gRPC, for the unmodified nidaqmx.
 
-It has devices, tasks, channels, timing, attributes, events and errors as the real driver reports them. Rig
-time advances on demand or in real time. The device table names its sources.
+Its devices, tasks, channels, timing, attributes, events and errors are those of the real driver. Rig time
+advances on demand or in real time. The device table names the sources of its values.
 """

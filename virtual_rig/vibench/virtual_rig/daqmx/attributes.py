@@ -21,7 +21,7 @@ from nidaqmx.constants import (
 )
 from nidaqmx.error_codes import DAQmxErrors
 
-from ..world.wiring import Coupling
+from ..world.conversion import Coupling
 from .calls import DaqmxSystem, Fields
 from .data_calls import count_available, default_samples
 from .devices import AnalogInputs, Device, OutputChannel
@@ -35,7 +35,7 @@ DRIVER_VERSION = (24, 8, 0)
 
 @dataclass(frozen=True)
 class Attribute:
-    """One property: how a program reads it and, if it is writable, how a program sets it."""
+    """One property: how a program reads the property and, if it is writable, how a program sets it."""
 
     get: Callable[[Any], object]
     set: Callable[[Any, Any], None] | None = None
@@ -51,7 +51,7 @@ class Group:
     name: str
     """Prefix of these properties' names in the protocol."""
     subjects: Callable[[DaqmxSystem, Any], list[Any]]
-    """Function that returns the objects of a request; get calls use the first object, set calls use all."""
+    """Function that returns the objects of a request; ``get`` uses only the first, ``set`` uses all."""
     attributes: Callable[[Any], Attributes]
     is_set_at_rest: bool = False
     """Whether these properties are read-only while the task runs."""
@@ -69,12 +69,12 @@ class Group:
         }
 
     def find(self, subject: Any, request: Any) -> tuple[str, Attribute]:
-        """Return name and property for the number in a request (-200197 if the object lacks the property)."""
+        """Return name and property for the number in a request (-200197 if the object has none)."""
         number = int(request.attribute_raw or request.attribute)
         name = self.names.get(number, f"0x{number:X}")
         attributes = self.attributes(subject)
         if name not in attributes:
-            raise not_supported(f"{self.name}.{name}", "The simulated driver lacks this property.")
+            raise not_supported(f"{self.name}.{name}", "The simulated driver does not have this property.")
         return f"{self.name}.{name}", attributes[name]
 
 
@@ -113,14 +113,14 @@ def _output_range(device: Device) -> list[float]:
 
 def _start_terminal(task: Task) -> str:
     terminal = task.start_terminal
-    # A chassis assigns a timing engine only at reservation.
+    # A chassis assigns a timing engine only when a task is reserved.
     if any(device.chassis for device in task.devices) and task.state < TaskState.RESERVED:
         raise task.refusal(DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING)
     return terminal
 
 
 def _running_acquisition(task: Task) -> Acquisition:
-    """Return the running acquisition of a task, whose device must detect overloads."""
+    """Return the running acquisition of a task; the task's device must detect overloads."""
     if not (isinstance(task.side, AnalogInputs) and task.side.detects_overloads):
         device = task.devices[0]
         raise not_supported("Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})")
@@ -187,7 +187,7 @@ READ: Attributes = {
     "CHANNELS_TO_READ": Attribute(_channel_names),
     "NUM_CHANS": Attribute(lambda task: len(task.channels)),
     "AVAIL_SAMP_PER_CHAN": Attribute(count_available),
-    "0x31E8": Attribute(default_samples),  # samples that "all" requests; unnamed in the protocol
+    "0x31E8": Attribute(default_samples),  # number of samples that "all" means; has no name in the protocol
     "OVERLOADED_CHANS_EXIST": Attribute(_has_overloads),
     "OVERLOADED_CHANS": Attribute(_overloaded_names),
 }
@@ -266,7 +266,7 @@ _CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
 
 
 def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Fields]]:
-    """Return the calls that get and set properties of these groups, by name in the protocol."""
+    """Return the calls that get and set properties of these groups, keyed by name in the protocol."""
     calls: dict[str, Callable[[Any], Fields]] = {}
     for method in SERVICE.methods:
         found = _CALL.match(method.name)

@@ -45,13 +45,13 @@ class DaqmxSystem:
         self._unnamed = 0
 
     def task(self, name: str) -> Task:
-        """Return a task by its name (-200088 if there is no such task)."""
+        """Return the task of this name (-200088 if there is no such task)."""
         if name not in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
         return self.tasks[name]
 
     def create(self, request: Any) -> Fields:
-        """Create a task; an empty name selects an unused name. Programs cannot share a task (-200089)."""
+        """Create a task; if the name is empty, choose a name. Programs cannot share a task (-200089)."""
         name = request.session_name
         if name in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
@@ -69,7 +69,7 @@ class DaqmxSystem:
         return {}
 
     def reset(self) -> None:
-        """Delete every task, including those of disconnected clients."""
+        """Delete every task, including the tasks of disconnected clients."""
         for task in self.tasks.values():
             task.abort()
         self.tasks.clear()
@@ -174,7 +174,7 @@ TASK_CALLS: Mapping[str, TaskCall] = {
     "CfgSampClkTiming": _set_clock,
     "CfgDigEdgeStartTrig": _set_start_trigger,
     "ConfigureLogging": _set_logging,
-    # The client has already closed the event stream; nothing else needs to be undone.
+    # Do nothing: the client has already closed the event stream.
     "UnregisterEveryNSamplesEvent": lambda *_: None,
 }
 """Calls on a task, keyed by their names in the protocol; calls that transfer samples are in `DATA_CALLS`."""
@@ -183,14 +183,14 @@ TASK_CALLS: Mapping[str, TaskCall] = {
 
 Listener = Iterator[Any]
 _BY_OTHERS = math.inf
-"""Value of rig time [s] for an event that only other calls can cause."""
+"""Rig time [s] that stands for an event that only other calls can cause."""
 
 
 def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
     """Yield a response every ``n_samples`` of a task, until the client or the task ends the stream.
 
     Like a reader, a listener waits for rig time. With time on demand, the listener advances time, and
-    continues once the announced samples have been read.
+    continues when the announced samples have been read.
     """
     kind = member(
         EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
@@ -254,7 +254,7 @@ class _Subscription:
         If the buffer never loses samples, first wait until the announced samples have been read.
         """
         with self._rig.changed:
-            due_s = _BY_OTHERS  # waiting for a repeated buffer must not advance rig time
+            due_s = _BY_OTHERS  # do not advance rig time for a repeated buffer
             if isinstance(stream, Acquisition):
                 due_s = stream.time_of(count)
                 if not self._rig.pace.loses_samples:

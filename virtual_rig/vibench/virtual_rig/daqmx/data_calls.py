@@ -37,7 +37,7 @@ class Reading:
 
 
 def read(task: Task, samples: int, deadline_s: float) -> Reading:
-    """Read ``samples`` per channel, starting the task if necessary; a negative number reads all.
+    """Read ``samples`` samples per channel, and start the task if necessary; a negative number reads all.
 
     Raises DaqmxRefusal: -200279 for lost samples, -200278 past the end, -200284 if no sample arrived in time.
     """
@@ -61,7 +61,7 @@ def read(task: Task, samples: int, deadline_s: float) -> Reading:
 
 
 def default_samples(task: Task) -> int:
-    """Return how many samples "all" means: all of a finite task, or all unread ones of a continuous task."""
+    """Return how many samples "all" means: a finite task's total, or a continuous task's unread samples."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
     if task.timing.mode is AcquisitionType.FINITE:
@@ -70,7 +70,7 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Return the number of unread samples per channel; advance time on demand if there are none."""
+    """Return the number of unread samples per channel; if there are none, advance time on demand."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
@@ -79,7 +79,7 @@ def available(task: Task) -> int:
 
 
 def count_available(task: Task) -> int:
-    """Return the number of unread samples; advance time on demand if none was read since the last query."""
+    """Return the number of unread samples; if none was read since the last query, advance time on demand."""
     acquisition = task.acquisition
     if acquisition is None or acquisition.queried_at == acquisition.position:
         return available(task)
@@ -134,7 +134,7 @@ def _read_buffered(task: Task, wanted: int, deadline_s: float) -> Reading:
 def _await(
     task: Task, stream: Stream, until_s: float, is_there: Callable[[], bool], deadline_s: float
 ) -> bool:
-    """Wait for samples of a run; return whether they arrived in time. A stopped run is refused (-88709)."""
+    """Wait for samples of a run; return whether they came in time. Refuse a stopped run (-88709)."""
 
     def has_ended() -> bool:
         return stream.failure is not None or task.stream is not stream
@@ -252,7 +252,7 @@ def _waveform(task: Task, row: int, reading: Reading) -> DoubleAnalogWaveform:
 
 def _read_raw(task: Task, request: Any) -> Fields:
     reading = read(task, request.num_samps_per_chan, deadline(request.timeout))
-    if reading.status:  # the caller cannot use a part of the requested samples
+    if reading.status:  # incomplete samples are of no use to the caller
         raise DaqmxRefusal(reading.status, samples_read=reading.samples)
     size = task.inputs[0].raw_bits // 8
     raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()

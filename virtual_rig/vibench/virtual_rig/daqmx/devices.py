@@ -2,7 +2,7 @@
 
 Sources: NI 9234 and NI USB-9234 guides (ranges, IEPE, data rates fM/256/n), NI USB-443x specifications
 (ranges, rates, IEPE), NI USB-6211 specifications. Not confirmed on a device: the minimum rate, the rate steps
-and the output memory of the USB-4431, the default couplings, and the USB-6211's figures.
+and the output memory of the USB-4431, the default couplings, and all figures of the USB-6211.
 """
 
 import math
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
 
-from ..world.wiring import Coupling, Input
+from ..world.conversion import Coupling, Input
 from .errors import DaqmxRefusal, unsupported_value
 
 _NI_9234_RATE_HZ = 13.1072e6 / 256
@@ -32,12 +32,12 @@ _NI_9234_MAX_DIVISOR = 31
 _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
-"""Relative tolerance of rates: a rate read back and set again must not become the next possible rate."""
+"""Relative tolerance of rates: a rate that is read back and set again must not change to the next rate."""
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Sample rates within an interval; with a clock, only integer fractions of the clock rate."""
+    """Sample rates within an interval; if a clock is given, only integer fractions of the clock rate."""
 
     minimum_hz: float
     maximum_hz: float
@@ -69,7 +69,7 @@ class AnalogInputs:
     detects_overloads: bool = False
     """Whether the device reports clipped inputs."""
     is_multiplexed: bool = False
-    """Whether the inputs of a task share one converter, and thus the converter's highest rate."""
+    """Whether the inputs of a task share one converter, and so also share the converter's highest rate."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Catalogue:
     devices: tuple[Device, ...] = (CDAQ1, NI_9234, USB_4431, USB_6211)
 
     def device(self, name: str) -> Device:
-        """Return a device by its name or the name of one of its channels (-200220 if there is none)."""
+        """Return a device by its name or the name of one of its channels (-200220 if unknown)."""
         wanted = name.strip("/").partition("/")[0].lower()
         for device in self.devices:
             if device.name.lower() == wanted:
@@ -201,7 +201,7 @@ class Catalogue:
         """
         found, prefix = [], ""
         for given in expand(names):
-            # A name without a device belongs to the device of the name before it: ``"Dev1/ai0, ai2"``.
+            # A name without a device belongs to the device of the previous name: ``"Dev1/ai0, ai2"``.
             if "/" in given.strip("/"):
                 prefix, name = given.rpartition("/")[0], given
             else:
@@ -233,7 +233,7 @@ def expand(text: str) -> tuple[str, ...]:
 def catalogue_with(product_type: str, name: str) -> Catalogue:
     """Return the default system, with the device of type ``product_type`` renamed to ``name``.
 
-    Raises ConfigurationError for an unknown type, or a name of another device.
+    Raises ConfigurationError if the type is unknown, or if another device already has this name.
     """
     devices = Catalogue().devices
     old = next((device for device in devices if device.product_type == product_type), None)
@@ -303,7 +303,7 @@ class InputChannel(_VoltageChannel):
 
     @property
     def range_v(self) -> float:
-        """Smallest full scale that covers the expected values [V]; NaN if none does."""
+        """Smallest full scale that covers the expected values [V]; NaN if no full scale covers them."""
         wanted_v = max(abs(self.minimum), abs(self.maximum))
         return next((each for each in self.side.ranges_v if wanted_v <= each * _SLACK), float("nan"))
 
@@ -376,7 +376,7 @@ Channel = InputChannel | OutputChannel
 def channel_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of virtual channels: the given names or, by default, the physical names.
 
-    ``given`` is a list or range with one name per channel, or a single name to which numbers are added.
+    ``given`` is a list or range with one name per channel, or a single name, to which numbers are added.
     """
     if not given:
         return physical

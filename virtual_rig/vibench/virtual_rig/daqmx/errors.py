@@ -56,7 +56,7 @@ class Unavailable(Exception):
 
 
 class Faults:
-    """The faults in force; they can be changed at any time."""
+    """The present faults, which can be changed at any time."""
 
     def __init__(self) -> None:
         self._in_force: tuple[tuple[int | None, tuple[str, ...]], ...] = ()

@@ -28,7 +28,7 @@ Without this time, a temporary fault would never end for a program that retries.
 TICK_S = 0.02
 """Interval of updates in real time while a task runs [s], well below the usual read times."""
 SLICE_S = 0.1
-"""Longest rig time computed without releasing the lock [s]; also the update interval without a task."""
+"""Longest rig time computed without releasing the lock [s]; also the update interval if no task runs."""
 
 YIELD_S = 1e-4
 """Pause between two slices of rig time while the rig lags behind the clock [s]."""
@@ -37,7 +37,7 @@ YIELD_S = 1e-4
 class Rig:
     """Rig that advances the world and all running tasks together.
 
-    ``changed`` guards tasks and trigger lines. The world has its own lock, because other threads use it too.
+    ``changed`` guards tasks and trigger lines. The world has its own lock, because other threads use it.
     """
 
     def __init__(self, world: World, pace: "Pace", catalogue: Catalogue) -> None:
@@ -63,7 +63,7 @@ class Rig:
         return bool(self._acquisitions or self._generations)
 
     def wall_s(self, rig_s: float) -> float:
-        """Return the wall-clock time for a rig time [s since 1970]; both agree at switch-on."""
+        """Return the wall-clock time for a rig time [s since 1970]; the two times agree at switch-on."""
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
@@ -110,7 +110,7 @@ class Rig:
         self.changed.notify_all()
 
     def reserve(self, resource: str, task: Any) -> None:
-        """Reserve the inputs or outputs of a device for a task (-50103 if another task has them)."""
+        """Reserve the inputs or outputs of a device for a task (-50103 if another task has reserved them)."""
         other = self._holders.setdefault(resource, task)
         if other is not task:
             detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {task.name}"
@@ -139,7 +139,7 @@ class Rig:
         }
 
     def edge(self, terminal: str) -> None:
-        """Apply a rising edge to a terminal, and call all functions that wait for it."""
+        """Apply a rising edge to a terminal, and call all functions that wait for this edge."""
         for begin in self._armed.pop(terminal.lower(), []):
             begin()
         self.changed.notify_all()
@@ -150,7 +150,7 @@ def _wait(rig: "Rig", is_there: Callable[[], bool], deadline_s: float) -> bool:
     return rig.changed.wait_for(is_there, left_s)
 
 
-# The two rules for the passing of rig time have the same methods, called while ``rig.changed`` is held.
+# Two rules by which rig time passes. Both have the same methods, called while ``rig.changed`` is locked.
 
 
 class OnDemandPace:
@@ -230,7 +230,7 @@ class WallPace:
                 try:
                     behind_s = self._step(rig)
                 except AcquisitionError:
-                    return  # the world has failed; the next call reports it
+                    return  # the world failed; the next call reports this
                 is_used = rig.is_used
             pause_s = YIELD_S if behind_s > 0 else TICK_S if is_used else SLICE_S
 

@@ -44,7 +44,7 @@ class TokenCheck(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships wit
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)
         reason = (
-            f"this rig is served with a token: set {TOKEN_VARIABLE} to the one 'vibench serve-rig' printed"
+            f"this rig is served with a token: set {TOKEN_VARIABLE} to the token 'vibench serve-rig' printed"
         )
         return grpc.unary_unary_rpc_method_handler(
             lambda _, context: context.abort(grpc.StatusCode.UNAUTHENTICATED, reason)
@@ -52,11 +52,11 @@ class TokenCheck(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships wit
 
 
 LOOPBACK = "127.0.0.1:0"
-"""Default address: any free port, open only to this computer because the server has no passwords."""
+"""Default address: any free port, open only to this computer, because the server has no passwords."""
 
 LAST_PORT = 65_535
 _WORKERS = 64
-"""Number of threads; each blocking read and each event listener needs one."""
+"""Number of threads; each blocking read and each event listener needs one thread."""
 
 LONGEST_REQUEST_BYTES = 64_000_000
 """Largest request: eight million output samples, or 40 s at the highest rate."""
@@ -80,7 +80,7 @@ class DaqServer:
     pace
         Pace of rig time; by default, time passes on demand.
     address
-        ``"host:port"``; port 0 selects a free one, see `DaqServer.address`.
+        ``"host:port"``; port 0 selects a free port, see `DaqServer.address`.
     catalogue
         The devices; by default a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
     handlers
@@ -147,7 +147,7 @@ class DaqServer:
         with self._rig.changed:
             self._system.reset()
         self._server.stop(grace=None).wait()
-        with self._rig.changed:  # an unfinished call may have started another task
+        with self._rig.changed:  # a call that ended late may have started a task
             self._system.reset()
         self._pace.close()
         self._workers.shutdown(wait=True)
@@ -174,13 +174,13 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Raise an error if a rule applies. The first failure takes no rig time, but repeated failures do.
+        """Raise an error if a rule applies. The first failure takes no rig time, each repeated failure does.
 
         Successful calls take no time, because readers would otherwise fall behind.
         """
         try:
             self.faults.check(name)
-        except DaqmxRefusal:  # while the server does not answer, rig time does not advance
+        except DaqmxRefusal:  # a first refusal takes no rig time
             if name in self._refused:
                 self._pace.pass_time(self._rig, FAILED_CALL_S)
             self._refused.add(name)
@@ -192,7 +192,7 @@ class DaqServer:
             with _report_refusals(context), self._rig.changed:
                 self.faults.check(name)
                 listener = call(request, context)
-            context.send_initial_metadata(())  # without metadata, the client would keep waiting
+            context.send_initial_metadata(())  # the client waits for metadata
             yield from listener
 
         return handle
@@ -200,11 +200,11 @@ class DaqServer:
 
 @contextmanager
 def _report_refusals(context: grpc.ServicerContext) -> Iterator[None]:
-    """Convert a refusal to gRPC status UNKNOWN, with the code in the trailing metadata, as clients expect."""
+    """Convert a refusal to gRPC status UNKNOWN, with the DAQmx code in the trailing metadata."""
     try:
         try:
             yield
-        except ConfigurationError as error:  # the simulated world lacks a capability of the device
+        except ConfigurationError as error:  # the simulation does not support this capability
             raise DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error)) from error
     except DaqmxRefusal as refusal:
         entries = (

@@ -47,7 +47,7 @@ def check_memory(samples: int, channels: int) -> None:
 
 
 _ROUNDING_SAMPLES = 1e-5
-"""Tolerance, in sample periods, for deciding whether a sample is due: rig time has rounding errors."""
+"""Tolerance of the test whether a sample is due [sample periods], because rig time has rounding errors."""
 
 
 class Stream:
@@ -63,7 +63,7 @@ class Stream:
 
     @property
     def is_done(self) -> bool:
-        """Whether all samples of the task are transferred, or no more will follow."""
+        """Whether all samples of the task are transferred, or no more samples will follow."""
         return self.transferred >= self.total or self.failure is not None
 
     def reaches(self, count: int) -> bool:
@@ -94,7 +94,7 @@ class Acquisition(Stream):
         self._sampler = task.rig.world.sample(wiring, self.rate_hz)
         self._unread = SampleQueue(channels)
         self.buffer_size = max(1, task.buffer_size)
-        loses_samples = task.rig.pace.loses_samples  # if not, the buffer grows as needed
+        loses_samples = task.rig.pace.loses_samples  # otherwise the buffer grows as needed
         self._capacity = self.buffer_size if loses_samples else MOST_SAMPLES // channels
         self._is_open = True
 
@@ -140,7 +140,7 @@ class Acquisition(Stream):
 
 
 LEAD_S = 0.005
-"""Lead of the samples passed to the world [s]: avoids gaps; short, so that new samples act soon."""
+"""Lead of the samples passed to the world [s]; it avoids gaps, and is short so that new samples act soon."""
 
 
 class OutputBuffer:
@@ -159,7 +159,7 @@ class OutputBuffer:
 
     @property
     def buffered(self) -> int:
-        """Number of samples in the buffer, which a regeneration repeats."""
+        """Number of samples in the buffer; a regeneration repeats these samples."""
         return min(self.written, self.size)
 
     def grow(self, count: int) -> None:
@@ -188,7 +188,7 @@ class Generation(Stream):
         self._world = task.rig.world
         self._outputs = tuple(channel.physical for channel in task.outputs)
         self.repeats = task.regeneration is RegenerationMode.ALLOW_REGENERATION
-        """Whether the buffer is played repeatedly; if not, every sample in the buffer is played once."""
+        """Whether the buffer is played repeatedly; otherwise every sample in the buffer is played once."""
         self._idle = device.idle
         self._memory = np.empty((len(self._outputs), 0))
         self._most_in_memory = 0 if self.repeats else device.memory

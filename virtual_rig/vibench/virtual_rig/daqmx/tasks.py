@@ -63,7 +63,7 @@ _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), 
 
 
 class TaskState(IntEnum):
-    """States of a task (NI-DAQmx Help, "Task State Model"); each state includes the previous states."""
+    """States of a task (NI-DAQmx Help, "Task State Model"); each state includes all previous states."""
 
     UNVERIFIED = 0
     RESERVED = 1
@@ -103,7 +103,7 @@ class Task:
 
     @property
     def side(self) -> AnalogInputs | AnalogOutputs:
-        """Capabilities of the device's inputs or outputs, whichever the task uses."""
+        """Capabilities of the device's inputs or outputs, depending on which the task uses."""
         self.require_channels()
         return (self.inputs or self.outputs)[0].side
 
@@ -163,7 +163,7 @@ class Task:
     def _awaited_terminal(self) -> str:
         """Terminal whose edge starts the task; empty if the task starts without a trigger.
 
-        A task with another task's sample clock waits for that task's start trigger instead.
+        A task that uses another task's sample clock waits for the other task's start trigger instead.
         """
         if self.timing.trigger_source:
             return self.timing.trigger_source
@@ -198,7 +198,7 @@ class Task:
             raise self.refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING)
 
     def add(self, channel: Channel) -> None:
-        """Add a channel; a task has one direction and, except on a chassis, one device."""
+        """Add a channel; all channels of a task have one direction and, except on a chassis, one device."""
         self.require_stopped()
         if any(other.name.lower() == channel.name.lower() for other in self.channels):
             raise DaqmxRefusal(DAQmxErrors.VIRTUAL_CHAN_NAME_USED, f"Channel: {channel.name}")
@@ -260,11 +260,11 @@ class Task:
         if self._awaited_terminal:
             self.rig.arm(self._awaited_terminal, self._begin)
             return
-        # Bring rig time up to date, but not in _begin: tasks with a common trigger must start together.
+        # Update rig time here, not in _begin, because tasks with a common trigger must start together.
         self.rig.pace.pass_time(self.rig, 0.0)
         try:
             self._begin()
-        except AcquisitionError:  # the simulated world lacks a capability of the device
+        except AcquisitionError:  # the simulation does not support this capability
             self.stop()
             raise
 
@@ -302,7 +302,7 @@ class Task:
             raise self.refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE)
 
     def stop(self) -> None:
-        """End the run and return to the state before the start; allowed in every state."""
+        """End the run, and return to the state before the start; allowed in every state."""
         if not self.is_running:
             return
         self.rig.disarm(self._begin)

@@ -1,8 +1,8 @@
 """A simulated Tektronix AFG1022: messages in, replies out, and the voltage at its terminal.
 
-Reconstructed from the IVI driver ``tkafg1k`` (IVI), public drivers tested on a real AFG1022 (drivers) and
-public measurements on an AFG1062 with firmware FV:V1.0.2 (AFG1062); nothing here was compared with the lab's
-own unit. `COMMANDS` names the source of each command.
+The simulation is reconstructed from the IVI driver ``tkafg1k`` (IVI), public drivers tested on a real AFG1022
+(drivers) and public measurements on an AFG1062 with firmware FV:V1.0.2 (AFG1062); nothing here was compared
+with the lab's own unit. `COMMANDS` names the source of each command.
 """
 
 import math
@@ -57,7 +57,7 @@ class AFG1022(ScpiInstrument):
     """
 
     maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
-    points, top_code = (2, 8192), 16383  # codes have 14 bits (IVI; public drivers read them back)
+    points, top_code = (2, 8192), 16383  # 14-bit codes (by the IVI driver and public programs)
     defaults = ChannelSettings()
 
     def __init__(
@@ -84,7 +84,7 @@ class AFG1022(ScpiInstrument):
         """Return the mean voltage at channel 1's terminal over ``count`` intervals, shape (count,) [V].
 
         The first interval begins at ``start_s`` [s of rig time], which must not decrease from call to call.
-        The load is the one in ``Terminal``. Commands take effect at the rig time of their arrival or, if
+        The load is the load in ``Terminal``. Commands take effect at the rig time of their arrival or, if
         later, at the end of the rendered part.
         """
         with self.lock:
@@ -97,7 +97,7 @@ class AFG1022(ScpiInstrument):
         return self._channels[channel]
 
     def configure(self, channel: int, settings: ChannelSettings) -> None:
-        """Check and apply new settings; raises ScpiError and changes nothing if they are refused."""
+        """Check and apply new settings; if they are refused, raises ScpiError and changes nothing."""
         settings.check()
         shape_of(settings, self.memory)
         previous = self._channels[channel]
@@ -106,19 +106,19 @@ class AFG1022(ScpiInstrument):
             self._follow_frequency(channel)
 
     def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Make the other channel follow this channel's frequency, or stop following it."""
+        """Make the other channel follow this channel's frequency, or no longer follow it."""
         self.frequencies_are_locked = locked
         if locked:
             self._follow_frequency(channel)
 
     def memory_changed(self) -> None:
-        """Apply a changed waveform at once if it is playing."""
+        """If a changed waveform is playing, apply the change at once."""
         sounding = self._channels[SOUNDING_CHANNEL]
         if standard_shape(sounding.shape) is None:
             self._replace(SOUNDING_CHANNEL, sounding)
 
     def reset(self) -> None:
-        """Restore the defaults, except for a load that only the panel can set."""
+        """Restore the defaults, except the load setting if only the panel can set it."""
         self.frequencies_are_locked = False
         for channel in self._channels:
             self._replace(channel, self._power_on)
@@ -164,14 +164,14 @@ class AFG1022(ScpiInstrument):
 
 
 def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings with a run mode switched on or off; in SCPI, each mode has a separate switch."""
+    """Return settings with a run mode switched on or off; in SCPI, every run mode has a separate switch."""
     if wanted:
         return replace(settings, mode=mode)
     return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
 
 
 def without_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
-    """Return settings without a mode that is not simulated; such a mode cannot be switched on (-241)."""
+    """Return settings with an unsimulated mode switched off; such a mode cannot be switched on (-241)."""
     if wanted:
         raise scpi.ScpiError(scpi.ErrorCode.HARDWARE_MISSING)
     return with_mode(mode, settings, wanted)
@@ -202,7 +202,7 @@ def _whole_degrees(parameter: bytes) -> int:
     angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
         raise scpi.ScpiError(scpi.ErrorCode.DATA_OUT_OF_RANGE)
-    # Without this margin, 31 degrees sent in radians could be truncated to 30.
+    # Without the margin 1e-9, 31 degrees sent in radians could be truncated to 30.
     return math.floor(angle_deg + 1e-9)
 
 

@@ -25,9 +25,9 @@ from .terminal_voltage import (
     Triangle,
 )
 
-# Settings by channel, and their limits. Amplitude and offset are stored as open-circuit voltages. The panel,
-# commands and queries use the voltage across the declared load (``OUTP:IMP``), so declaring another
-# load changes the reading, not the output.
+# Settings of each channel, with limits. Amplitude and offset are stored as open-circuit voltages. The panel,
+# commands and queries use the voltage across the declared load (``OUTP:IMP``). Declaring another load
+# therefore changes the reading, not the output.
 
 LOWEST_FREQUENCY_HZ = 1e-6
 LOWEST_BURST_FREQUENCY_HZ = 2e-3
@@ -55,7 +55,7 @@ class RunMode(StrEnum):
 
 
 MODULATIONS = tuple(RunMode)[3:]
-"""Modulations, which SCPI can switch off but not on; their effect on the output is not simulated."""
+"""Modulations, which SCPI can switch off but not on; the effect of modulation is not simulated."""
 
 
 SINE, SQUARE, RAMP, PULSE, NOISE, DC = "SIN", "SQU", "RAMP", "PULS", "PRN", "DC"
@@ -173,8 +173,8 @@ class ChannelOutput(Timeline):
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
         """Apply new settings at a rig time.
 
-        The phase is continuous unless the start phase has changed. If noise is selected, the previous shape
-        continues. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
+        The phase is continuous unless the start phase has changed. If noise is selected, the output keeps its
+        previous shape. The built-in DC shape stays at zero for any offset (AFG1062, drivers).
         """
         at_s, own_s = self.effective(now_s)
         latest, is_flat = self.latest, settings.shape == DC
@@ -191,7 +191,7 @@ class ChannelOutput(Timeline):
         self.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a burst or sweep that waits for a trigger; do nothing if none is waiting or a burst runs.
+        """Start a burst or sweep that waits for a trigger; do nothing if nothing waits or if a burst runs.
 
         A gated burst never starts, because nothing is connected to the gate input.
         """
@@ -217,7 +217,7 @@ class ChannelOutput(Timeline):
     def _course_after(
         self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
     ) -> PhaseCourse:
-        """Return the phase as a function of time; the same object as before if it is unchanged."""
+        """Return the phase as a function of time; the same object as before if unchanged."""
         running = self.latest.course
         if _course_key(previous) == _course_key(settings):
             return running

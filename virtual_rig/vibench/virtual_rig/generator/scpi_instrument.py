@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 from . import scpi_message as scpi
@@ -23,7 +24,7 @@ Query = Callable[..., bytes]
 
 @dataclass(frozen=True)
 class Command:
-    """One command: query-only without ``write``, write-only without ``ask``."""
+    """One command; without ``write`` it is query-only, without ``ask`` write-only."""
 
     header: str
     """Header of the command in the notation of manuals, see `header_pattern`."""
@@ -88,7 +89,7 @@ def setting(
     show: Callable[[Any], bytes] = lambda is_on: b"1" if is_on else b"0",
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the command of a setting that ``get`` reads and ``put`` replaces; by default a switch."""
+    """Return the command of a setting that ``get`` reads and ``put`` replaces; by default on or off."""
 
     def write(generator: Any, channel: int, parameter: bytes) -> None:
         generator.configure(channel, put(generator.settings(channel), parse(parameter)))
@@ -142,7 +143,7 @@ class Quirks:
     out_of_range_becomes_default: bool = True
     """A number out of range silently sets the parameter's default (if False: -222 and no change)."""
     panel_load_ohm: float | None = None
-    """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (one driver's report); else None."""
+    """Load set at the panel [ohm], for a unit without ``OUTP:IMP`` (reported by one driver); else None."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +206,7 @@ class ScpiInstrument:
             self.status.report(code)
 
     def delay_next_reply(self, delay_s: float) -> None:
-        """Delay the next reply; if a read by the host times out, the host's next read receives this reply."""
+        """Delay the next reply; if a read by the host times out, the next read receives the delayed reply."""
         with self.lock:
             self._next_delay_s = delay_s
 
@@ -215,12 +216,12 @@ class ScpiInstrument:
             self._next_is_corrupted = True
 
     def identity(self) -> bytes:
-        """Return the identity; with the quirk, the first query after ``*CLS`` has an empty reply."""
+        """Return the identity; given this quirk, the first query after ``*CLS`` has an empty reply."""
         is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
         return b"" if is_empty else self._identity.encode("ascii")
 
     def clear_status(self) -> None:
-        """Clear error queue and event register."""
+        """Clear the error queue and the event register."""
         self.status.clear()
         self._identity_is_due_empty = self.quirks.first_identity_after_clear_is_empty
 
@@ -231,7 +232,7 @@ class ScpiInstrument:
 
     def _answers(self, message: bytes) -> list[bytes]:
         """Execute all units of a message in order and return the replies."""
-        prefix = ""  # position in the command tree, to which headers are relative (SCPI-1999, 1, 6.2.4)
+        prefix = ""  # node of the command tree from which headers start (SCPI-1999, 1, 6.2.4)
         answers: list[bytes] = []
         room = LONGEST_REPLY
         for unit in scpi.units(message):
@@ -252,7 +253,7 @@ class ScpiInstrument:
                 continue
             answers.append(answer)
             room -= len(answer)
-            if room < 0:  # replies cannot be read before the message ends (IEEE 488.2, 6.3.1.7)
+            if room < 0:  # no reply can be read until the message ends (IEEE 488.2, 6.3.1.7)
                 answers.clear()
                 self.status.report(scpi.ErrorCode.QUERY_DEADLOCKED)
         return answers
@@ -262,7 +263,7 @@ class ScpiInstrument:
         command, suffix = self._find(header)
         act = None if command is None else command.ask if unit.asks else command.write
         if command is None or act is None:
-            # Refuse an unknown header as the firmware does.
+            # Refuse an unknown header in the same way as the firmware.
             if not self.quirks.unknown_is_syntax_error:
                 raise scpi.ScpiError(scpi.ErrorCode.UNDEFINED_HEADER)
             self.status.report(scpi.ErrorCode.SYNTAX_ERROR)
@@ -297,15 +298,15 @@ COMMON_COMMANDS = (
 # fmt: on
 
 
-# The generator on a raw TCP socket, for programs without Python: one line per message and reply. The real
-# AFG1022 has no network port. Open ``TCPIP0::127.0.0.1::<port>::SOCKET``; messages end with a newline.
+# The generator on a raw TCP socket, for programs without Python. The real AFG1022 has no network port. Open
+# ``TCPIP0::127.0.0.1::<port>::SOCKET``. Each message and each reply is one line.
 
 LOOPBACK = "127.0.0.1"
 _RECEIVE_BYTES = 65536
 
 
 class ScpiDevice(Protocol):
-    """The device that a socket makes available."""
+    """Device that a socket makes available."""
 
     def execute(self, message: bytes) -> Reply:
         """Execute one complete message, and return the reply."""
@@ -319,10 +320,10 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
     device
         The instrument; several clients may use it at once.
     port
-        Port number; 0 selects a free one. See ``port`` and ``resource_name``.
+        Port number; 0 selects a free port. See ``port`` and ``resource_name``.
     """
 
-    daemon_threads = True  # each client has a thread, which does not keep the process alive
+    daemon_threads = True  # a client's thread does not keep the process alive
     allow_reuse_address = True
     block_on_close = False
 
@@ -334,7 +335,9 @@ class ScpiSocket(socketserver.ThreadingTCPServer):
         """TCP port of the server."""
         self.resource_name = f"TCPIP0::{LOOPBACK}::{self.port}::SOCKET"
         """The VISA address of the socket."""
-        self._thread = threading.Thread(target=self.serve_forever, name="scpi-socket", daemon=True)
+        # Every 0.02 s, the server looks whether it must end; close() waits for this end.
+        serve = partial(self.serve_forever, 0.02)
+        self._thread = threading.Thread(target=serve, name="scpi-socket", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -371,8 +374,8 @@ class _Session(socketserver.BaseRequestHandler):
     def _answer(self, message: bytes) -> None:
         reply = self.server.device.execute(message)
         if reply.delay_s and self.server.closing.wait(reply.delay_s):
-            return  # the server closed during the delay
+            return  # the server was closed during the delay
         if reply.data:
-            # A disconnected client needs no reply.
+            # The client may have disconnected.
             with suppress(ConnectionError):
                 self.request.sendall(reply.data)

@@ -131,7 +131,7 @@ NEWLINE = ord("\n")
 BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
 LONGEST_MESSAGE = 1 << 22
-"""Largest message [bytes] (assumed); the longest useful one, a waveform of a million points, has 2 MB."""
+"""Largest message [bytes] (assumed); the longest useful message, a waveform of a million points, has 2 MB."""
 DIGITS = frozenset(b"0123456789")
 
 
@@ -145,7 +145,7 @@ class Unit:
     parameters: tuple[bytes, ...]
     """Raw parameters without surrounding white space; a block keeps its ``#`` header."""
     starts_line: bool
-    """Whether the unit is the first of its line, so that its header is relative to the root."""
+    """Whether the unit is the first of its line; the header is then relative to the root."""
 
 
 def block_length(data: bytes, start: int) -> int | None:
@@ -229,7 +229,7 @@ def units(message: bytes) -> list[Unit]:
 
 
 def _trim(piece: bytes) -> bytes:
-    """Remove white space around a header or parameter, but do not change the data bytes of a block."""
+    """Remove white space around a header or a parameter, but do not change the data bytes of a block."""
     piece = piece.lstrip(b" \t\r")
     length = (block_length(piece, 0) or 0) if piece.startswith(b"#") else 0
     return piece[:length] if length > 1 else piece.rstrip(b" \t\r")
@@ -304,7 +304,7 @@ def integer(parameter: bytes) -> int:
 
 
 def boolean(parameter: bytes) -> bool:
-    """Return whether ON, OFF or a number means on; a number that rounds to zero means off."""
+    """Return whether a parameter (ON, OFF or a number) means on; a number that rounds to zero means off."""
     word = text(parameter).upper()
     if word in ("ON", "OFF"):
         return word == "ON"
@@ -398,7 +398,7 @@ class ArbitraryMemory:
 
 
 def memory_name(parameter: bytes) -> str:
-    """Return the canonical name of a memory; -224 for other words."""
+    """Return the canonical name of a memory; other words are refused with -224."""
     word = text(parameter).upper()
     if word in ("EMEM", "EMEMORY"):
         return EDIT_MEMORY

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .scpi_message import Codes
 
-# The phase of a generator is steady or swept. It is in cycles, time in seconds of the generator's clock.
-# Frequencies are integer microhertz, the instrument's resolution. Whole seconds thus give an exact fraction
-# of a cycle, and the phase does not drift over hours (like a DDS accumulator that never overflows).
+# The phase of a generator is steady or swept. Phases are in cycles, times in seconds of the generator's
+# clock. Frequencies are integer microhertz, the instrument's resolution. Whole seconds therefore give an
+# exact fraction of a cycle, and phases do not drift over hours (like a DDS accumulator without overflow).
 
 Samples = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ class SweptPhase:
     hold_s: float
     spacing: Spacing
     begin_s: float
-    """Time of the trigger [s]; ``math.inf`` while waiting for it."""
+    """Time of the trigger [s]; ``math.inf`` while the sweep waits."""
     anchor_s: float
     offset: float
     """Phase at the time ``anchor_s`` [cycles]."""
@@ -140,8 +140,8 @@ def _fraction(cycles: Samples) -> Samples:
     return np.asarray(np.where(fraction >= 1.0, 0.0, fraction))
 
 
-# Periodic shapes between -1 and 1, with their exact means from phases ``start`` (0 <= start < 1) over
-# ``span`` >= 0 cycles. Over a span of 0, the mean is the value at ``start``.
+# Periodic shapes between -1 and 1, with their exact means over ``span`` >= 0 cycles that begin at phase
+# ``start`` (0 <= start < 1). Over a span of 0, the mean is the value at ``start``.
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class Triangle:
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the mean: the middle value if the phase range has no corner, else its integral / span."""
-        begin = start + 0.25  # phase is counted from the lowest point
+        begin = start + 0.25  # the phase is counted from the lowest point
         end = begin + span
         straight = np.floor(2 * begin) == np.floor(2 * end)
         middle = self._value(0.5 * (begin + end))
@@ -252,7 +252,7 @@ class Relay(Enum):
 
 @dataclass(frozen=True)
 class Burst:
-    """Start and end of a burst; outside the burst, the output stays at the level of the start phase."""
+    """Start and end of a burst; before and after it, the output stays at the level of the start phase."""
 
     begin_s: float
     end_s: float
@@ -299,7 +299,7 @@ class Terminal:
     clock_error_ppm: float = 0.0
     """Error of the generator's clock relative to rig time [ppm]."""
     noise_v_per_rt_hz: float = 50e-9
-    """One-sided noise density of the output (assumed; the data sheet gives none)."""
+    """One-sided noise density of the output (assumed; the data sheet gives no value)."""
     seed: int = 0
     clock_offset_s: float = 0.0
     """Total shift of the generator's clock since switch-on [s]."""
@@ -324,7 +324,7 @@ class Timeline:
         self._origin_s = 0.0
         self._interval_s = 0.0
         self._rendered = 0
-        """Number of samples since ``_origin_s``, all over intervals of the same length."""
+        """Number of samples since ``_origin_s``, all for intervals of the same length."""
         self._noise_index = 0
         self._noise_block = NO_BLOCK, np.empty(0)
         self._end_s = -np.inf
@@ -361,7 +361,7 @@ class Timeline:
         if count == 0:
             return volts
         noise = self._noise(count)
-        # Remove signals that ended before the first interval.
+        # Remove the signals that ended before the first interval.
         ended = max(bisect_right(self._since_s, edges_s[0]) - 1, 0)
         del self._since_s[:ended], self._signals[:ended]
         until = [*self._since_s[1:], np.inf]
@@ -394,7 +394,7 @@ class Timeline:
         weights = np.diff(local) / self._interval_s
         means = signal.means(own) if len(cuts) == 0 else _mean_over_pieces(signal, own, cuts)
         volts = np.zeros(len(edges_s) - 1)
-        # Rms noise of an interval's mean: density times the square root of the bandwidth 1/(2 interval).
+        # The rms noise of a mean is the density times the root of the bandwidth 1/(2 interval).
         rms_v = self.terminal.noise_v_per_rt_hz / np.sqrt(2 * self._interval_s)
         volts[first:last] = weights * means + np.sqrt(weights) * rms_v * noise[first:last]
         return volts
@@ -425,9 +425,9 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     pieces = np.bincount(interval, minlength=intervals)
     sums = np.bincount(interval, weights=durations * means, minlength=intervals)
     widths = np.bincount(interval, weights=durations, minlength=intervals)
-    # Coinciding edges give empty intervals, which have no weight.
+    # Equal edges give empty intervals, which have no weight.
     result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
     whole = interval[pieces[interval] == 1]
-    # Dividing other intervals must not change the mean of an undivided interval, even in the last bit.
+    # An undivided interval must keep its mean to the last bit, even if other intervals are divided.
     result[whole] = means[pieces[interval] == 1]
     return np.asarray(result, dtype=np.float64)

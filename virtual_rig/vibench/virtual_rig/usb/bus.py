@@ -33,14 +33,14 @@ from vibench.acquisition.rig import TOKEN_KEY, token_from_env
 
 from .usbtmc import BULK_IN, BULK_OUT, NEVER_MS, Identification, UsbTmcInstrument
 
-# A USB cable through the network: a device served over gRPC, and its proxy on a bus. Methods take and return
-# bytes; numbers are big-endian. A response begins with the errno of the transfer (zero: success),
-# so that a disconnected cable or a timeout looks the same on both ends.
+# A USB cable through the network: a device served over gRPC, and a proxy of this device on a bus. Methods
+# take and return bytes; numbers are big-endian. A response begins with the errno of the transfer (zero:
+# success): a disconnected cable, or a timeout, then looks the same on both ends.
 
 SERVICE = "vibench.virtual.UsbDevice"
 CONNECT_TIMEOUT_S = 5.0
 NETWORK_MARGIN_S = 30.0
-"""Time beyond the transfer's own timeout after which the device counts as lost [s]."""
+"""Time after the transfer's own timeout at which the device counts as lost [s]."""
 
 _ERRNO = struct.Struct(">i")
 _READ = struct.Struct(">II")
@@ -286,7 +286,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         return 1
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
-        """Claim the interface exclusively; EBUSY if another handle has it, as with libusb."""
+        """Claim the interface exclusively; EBUSY if another handle has claimed it, as with libusb."""
         self._present(dev_handle)
         with self._lock:
             if self._owners.setdefault(dev_handle.port, dev_handle) is not dev_handle:
@@ -327,7 +327,7 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         device = self._present(dev_handle)
         incoming = usb.util.ctrl_direction(bmRequestType) == usb.util.CTRL_IN
         if bmRequestType & _REQUEST_TYPE_MASK == usb.util.CTRL_TYPE_STANDARD:
-            # PyUSB uses only GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); other requests stall.
+            # PyUSB requests only strings, by GET_DESCRIPTOR (USB 2.0, 9.4.3). Other requests stall.
             kind, index = divmod(wValue, 256)
             found = device.identification
             texts = {_MAKER: found.maker, _PRODUCT: found.product, _SERIAL: found.serial}
@@ -355,7 +355,7 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
 class _usb_errors:  # noqa: N801 - reads as a verb where it is used
     """Context that converts a device's OSError to the errors of PyUSB's own backends.
 
-    A generator function would not work: from Python 3.13 on, its frame keeps the handle of a failed session.
+    A generator function would not work: from Python 3.13 on, its frame keeps a failed session's handle.
     """
 
     def __enter__(self) -> None:
@@ -375,8 +375,8 @@ _BUS = UsbBus()
 def plug_in(device: UsbDevice) -> None:
     """Connect a device to the virtual bus, which PyUSB, and thus pyvisa-py, uses from then on.
 
-    Without libusb, pyvisa-py registers no USB sessions at its first import; in that case they are registered
-    now.
+    Without libusb, pyvisa-py registers no USB sessions at its first import; in that case this function
+    registers them.
     """
     _BUS.plug_in(device)
     usb.backend.libusb1.get_backend = lambda find_library=None: _BUS  # noqa: ARG005 - PyUSB's signature
@@ -385,7 +385,7 @@ def plug_in(device: UsbDevice) -> None:
 
 
 def unplug(device: UsbDevice) -> None:
-    """Disconnect a device from the virtual bus; do nothing if it is not connected."""
+    """Disconnect a device from the virtual bus; do nothing if the device is not connected."""
     _BUS.unplug(device)
 
 

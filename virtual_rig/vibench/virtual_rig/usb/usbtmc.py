@@ -18,8 +18,8 @@ from ..generator.scpi_message import BYTE, LONGEST_MESSAGE, ErrorCode
 
 # A USB device for the bus: descriptors, and transfers that succeed or fail like real ones. The bus does not
 # know whether a device is in this process or behind a network connection. Transfers fail with OSError: ENODEV
-# when the device is disconnected, EPIPE when it stalls an endpoint, and TimeoutError (ETIMEDOUT) when it does
-# not answer in time.
+# if the device is disconnected, EPIPE if the device stalls an endpoint, and TimeoutError (ETIMEDOUT) if the
+# device does not answer in time.
 
 BULK_OUT = 0x01
 BULK_IN = 0x82
@@ -44,7 +44,7 @@ class Identification:
 
 
 AFG1022_IDS = 0x0699, 0x0353
-"""USB vendor and product number, the same for AFG1022 and AFG1062."""
+"""USB vendor and product number; both are the same for AFG1022 and AFG1062."""
 HEADER = struct.Struct("<BBBxIBBxx")
 """Bulk header: message id, tag, inverted tag, length, attributes, termination character (tables 1 to 4)."""
 ALIGNMENT = 4
@@ -70,7 +70,7 @@ _CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 0, 0, 0, 0, 0, 0, 0, 0x00, 0x0
 
 @dataclass
 class _Flight:
-    """Pending data between host and instrument; they are lost if the cable or the instrument fails."""
+    """Pending data between host and instrument; the data are lost if the cable or the instrument fails."""
 
     message: bytes = b""
     """Parts of an incomplete message that have been received so far."""
@@ -92,30 +92,18 @@ class UsbTmcInstrument:
         self._device = device
         self.identification = Identification(*usb_ids, device.maker, device.model, device.serial)
         self._lock = threading.RLock()
-        self._is_plugged_in = True
-        self._is_hung = False
+        self._failures: set[int] = set()
         self._flight = _Flight()
 
-    def pull_cable(self) -> None:
-        """Disconnect the device: transfers fail with ENODEV; the output continues."""
+    def fail(self, number: int) -> None:
+        """Let all transfers fail with ENODEV (cable pulled) or ETIMEDOUT (hung); the output continues."""
         with self._lock:
-            self._is_plugged_in = False
+            self._failures.add(number)
 
-    def plug_cable(self) -> None:
-        """Reconnect the cable; pending data are lost."""
+    def mend(self, number: int) -> None:
+        """End a failure: reconnect the cable, or make the instrument respond again; pending data are lost."""
         with self._lock:
-            self._is_plugged_in = True
-            self._flight = _Flight()
-
-    def hang(self) -> None:
-        """Make the instrument unresponsive: transfers time out; the output continues."""
-        with self._lock:
-            self._is_hung = True
-
-    def wake(self) -> None:
-        """Make the instrument responsive again; pending data are lost."""
-        with self._lock:
-            self._is_hung = False
+            self._failures.discard(number)
             self._flight = _Flight()
 
     # Transfers
@@ -179,7 +167,7 @@ class UsbTmcInstrument:
             _fail(errno.EPIPE)
         if attributes & END_OF_MESSAGE:
             message, self._flight.message = self._flight.message, b""
-            # Execute a message; an unread earlier reply is lost, with -410 (IEEE 488.2, 6.3.2.3).
+            # An unread earlier reply is lost, with error -410 (IEEE 488.2, 6.3.2.3).
             if self._flight.reply or self._flight.rest:
                 self._flight.reply = self._flight.rest = b""
                 self._flight.request = None
@@ -208,14 +196,12 @@ class UsbTmcInstrument:
         return bytes([SUCCESS, tag])
 
     def _check_cable(self) -> None:
-        if not self._is_plugged_in:
-            _fail(errno.ENODEV)
-        if self._is_hung:
-            _fail(errno.ETIMEDOUT)
+        if self._failures:
+            _fail(min(self._failures))  # ENODEV, if the cable of a hung instrument is pulled
 
 
 def _fail(number: int) -> NoReturn:
-    raise OSError(number, os.strerror(number))  # with ETIMEDOUT, OSError becomes a TimeoutError
+    raise OSError(number, os.strerror(number))  # for ETIMEDOUT, this is a TimeoutError
 
 
 _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
@@ -223,4 +209,4 @@ _REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
     4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: always complete
     7: lambda *_: _CAPABILITIES,  # GET_CAPABILITIES, 4.2.1.8
 }
-"""Class requests used by pyvisa (table 15), by number; each receives the tag. Other requests stall."""
+"""Class requests used by pyvisa (table 15), by number; each gets the tag. All other requests stall."""

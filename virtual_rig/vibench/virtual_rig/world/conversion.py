@@ -1,23 +1,106 @@
-"""A running conversion: from signals of the world to quantised samples of the configured inputs."""
+"""Conversion of the world's signals to quantised samples, over the cables to the converter's inputs."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum, StrEnum
 from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibench.acquisition.rig import Rig, Role
 from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
 from .sensors import IEPE_BIAS_V, NoiseStream
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
-from .wiring import OPEN_INPUT, Behind, Cable, Coupling, Input
+
+SECOND_DEVICE = "Dev1"
+"""Second converter of the virtual system; T-pieces connect it to the same cables."""
+
+
+class Signal(IntEnum):
+    """Rows of the world's signals; rows of further sensors follow in the order of the configuration."""
+
+    DRIVE = 0
+    AMPLIFIER = 1
+    BASE_ACCELERATION = 2
+    M0_VELOCITY = 3
+
+
+class Coupling(StrEnum):
+    """Coupling of a converter's input."""
+
+    AC = "AC"
+    DC = "DC"
+
+
+@dataclass(frozen=True)
+class Input:
+    """Configuration of one converter input in a task."""
+
+    physical_channel: str
+    """Name of the input at the converter (``"cDAQ1Mod1/ai0"``), which the wiring maps to a signal."""
+    range_v: float
+    """Full scale of the input, plus and minus [V]."""
+    coupling: Coupling
+    iepe_current_a: float = 0.0
+    """Excitation current of an IEPE sensor [A]; IEPE sensors give no signal without this current."""
+
+
+class Behind(Enum):
+    """Source at the far end of a cable."""
+
+    VOLTAGE_SOURCE = "voltage source"
+    IEPE_SENSOR = "IEPE sensor"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class Cable:
+    """Connection of one input of the converter."""
+
+    behind: Behind
+    signal: int = Signal.DRIVE
+    attenuation: float = 1.0
+    """Ratio of the voltage at the source to the voltage at the converter's input."""
+    delay_steps: float = 0.0
+
+
+OPEN_INPUT = Cable(Behind.NOTHING)
+
+
+def signal_rows(rig: Rig) -> dict[Role, int]:
+    """Return the row of the world's signals for each role of a rig."""
+    fixed = (Role.DRIVE_VOLTAGE, Role.AMPLIFIER_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
+    return {role: row for row, role in enumerate((*fixed, *rig.sensors))}
+
+
+def cables_of(rig: Rig, delay_steps: Mapping[Role, float]) -> dict[str, Cable]:
+    """Return the cable of each connected input by its name, such as ``"cDAQ1Mod1/ai0"``."""
+    rows = signal_rows(rig)
+    return {
+        f"{device}/{channel.physical}": Cable(
+            behind=_source(rig, channel.role),
+            signal=rows[channel.role],
+            attenuation=channel.attenuation,
+            delay_steps=delay_steps.get(channel.role, 0.0),
+        )
+        for device in (rig.daq.device, SECOND_DEVICE)
+        for channel in rig.daq.channels
+    }
+
+
+def _source(rig: Rig, role: Role) -> Behind:
+    sensor = rig.sensor(role)
+    return Behind.IEPE_SENSOR if sensor is not None and sensor.iepe == "yes" else Behind.VOLTAGE_SOURCE
+
 
 # The converter's anti-alias filter computes samples at any lower rate from means over the world's steps. A
-# linear-phase windowed sinc (Kaiser window) limits the band, with a correction of the means' droop. Integer
-# ratios use one fixed set of weights, other ratios interpolate between rows of a table. A sensor's delay
-# shifts the sample times exactly, also between grid points.
+# linear-phase windowed sinc (Kaiser window) limits the band and corrects the droop of the means. For an
+# integer ratio of rates, one set of weights is used; for other ratios, weights are interpolated between rows
+# of a table. A sensor's delay shifts the sample times exactly, even between grid points.
 
 GROUP_DELAY_SAMPLES = 40
 """Common delay of all channels, in output samples: typical of a delta-sigma converter."""
@@ -40,7 +123,7 @@ _LANES = 8
 """Number of weights per SIMD operation of the native engine."""
 
 EARLIEST_STEPS = -4.0
-"""Smallest delay of a channel for which the filter needs no future means [steps]; a lead is negative."""
+"""Smallest delay of a channel for which the filter needs no future means [steps]; negative for a lead."""
 
 
 class Decimator:
@@ -49,7 +132,7 @@ class Decimator:
     def __init__(self, ratio: float, start_step: int, delay_steps: float) -> None:
         """Create a filter with ``ratio`` steps per sample; integer ratios are faster.
 
-        ``delay_steps`` is the part of the sensor's delay that is not yet included in the means.
+        ``delay_steps`` is the part of the sensor's delay that the means do not include yet.
         """
         self._ratio = ratio
         self._delay_steps = max(delay_steps, EARLIEST_STEPS)
@@ -86,7 +169,7 @@ class Decimator:
 
 
 def history_steps(ratio: float, delay_steps: float) -> int:
-    """Return how many steps before the start of a conversion the first sample needs."""
+    """Return how many steps from before the start of a conversion the first sample needs."""
     filter_span = GROUP_DELAY_SAMPLES * max(ratio, 1.0) + _half_width_steps(ratio)
     return ceil(filter_span + max(delay_steps, 0.0)) + 2 * _LANES
 
@@ -103,7 +186,7 @@ def _weights(ratio: float, fractions: FloatArray) -> FloatArray:
     newest = _half_width_steps(ratio) + 1
     count = ceil(2 * newest / _LANES) * _LANES
     positions = newest - np.arange(count - 1, -1, -1.0) - fractions[:, np.newaxis]
-    # Symmetric weights that invert sin(pi f)/(pi f), the gain of a mean over one step.
+    # Symmetric weights that invert sin(pi f)/(pi f), which is the gain of a mean over one step.
     frequency = np.linspace(0, _DROOP_BAND, _DROOP_FIT_POINTS)
     cosines = [np.ones_like(frequency)]
     cosines += [2 * np.cos(2 * np.pi * order * frequency) for order in range(1, _DROOP_REACH + 1)]
@@ -124,7 +207,7 @@ def _windowed_sinc(positions: FloatArray, ratio: float) -> FloatArray:
 
 
 AC_CUT_HZ = 0.5
-"""-3 dB frequency of the AC coupling, both for NI 9234 and USB-4431; modelled as first order."""
+"""-3 dB frequency of the AC coupling of NI 9234 and USB-4431, modelled as first order."""
 LEAST_EXCITATION_A = 1e-3
 """Smallest current at which an IEPE sensor works."""
 SOURCE_OHM = 50.0
@@ -136,10 +219,10 @@ OVER_RANGE = 1.02
 
 
 class InputStage:
-    """One input from its connector to the converter, computed together with the world."""
+    """One input, from the connector to the converter, computed together with the world."""
 
     def __init__(self, configured: Input, cables: Mapping[str, Cable], grid: TimeGrid = USUAL_GRID) -> None:
-        """``cables`` are the cables of all inputs, by name; they may be replaced at any time."""
+        """``cables`` are the cables of all inputs, keyed by name; cables may be replaced at any time."""
         self.configured = configured
         self._cables = cables
         self._clip_v = configured.range_v * OVER_RANGE
@@ -159,7 +242,7 @@ class InputStage:
         signal = signals[self.cable.signal]
         match self.configured.coupling:
             case Coupling.AC:
-                # At the start of a conversion, the capacitor is already charged to the constant part.
+                # When a conversion starts, the capacitor is already charged to the constant part.
                 volts = self._capacitor.run(signal * gain)
             case Coupling.DC:
                 volts = signal * gain
@@ -205,8 +288,8 @@ class ConverterInput:
     ) -> None:
         """Begin at a step of the world; ``history`` contains the signals of the preceding steps.
 
-        ``noise_v`` is the rms noise of the converter, in its band. The filter keeps the delay of the present
-        cable, even if the cable is replaced.
+        ``noise_v`` is the rms noise of the converter in the converter's band. The filter keeps the delay of
+        the present cable, even if the cable is replaced.
         """
         self.has_clipped = False
         self._stage = stage
@@ -214,7 +297,7 @@ class ConverterInput:
         self._noise_v = noise_v
         self._noise = noise
         self._count_v = volts_per_count(stage.configured.range_v)
-        self._means, _ = stage.pass_on(history)  # clipping before the start of the conversion is ignored
+        self._means, _ = stage.pass_on(history)  # ignore clipping before the start
         self._means_first_step = start_step - history.shape[1]
 
     def take(self, signals: FloatArray, sample: int, count: int) -> FloatArray:
@@ -223,7 +306,7 @@ class ConverterInput:
         self.has_clipped |= clips
         self._means = np.concatenate([self._means, volts])
         samples = self._filter.convert(self._means, self._means_first_step, sample, count)
-        # The next sample may lie between grid points, so keep one more step than it needs.
+        # The next sample may lie between grid points, so keep one step more than the sample needs.
         done = self._filter.first_step(sample + count) - 1 - self._means_first_step
         self._means = self._means[max(done, 0) :]
         self._means_first_step += max(done, 0)
@@ -263,7 +346,7 @@ class SampleQueue:
 
 
 class Conversion:
-    """A running conversion: samples are computed while the world advances, and stored until read."""
+    """A running conversion: samples are computed while the world advances, and stored until they are read."""
 
     def __init__(
         self,
@@ -302,9 +385,9 @@ class Conversion:
         self._end(self)
 
     def take(self, signals: FloatArray, first_step: int) -> None:
-        """Convert new signals of the world, shape (signals, steps), from ``first_step`` on."""
+        """Convert new signals of the world: an array (signals, steps) that begins at ``first_step``."""
         done = first_step + signals.shape[1] - self._start_step
-        # Number of samples whose steps are complete; the tolerance includes one that ends with the last step.
+        # Count samples with complete steps. With the tolerance, a sample that ends with the last step counts.
         complete = int(np.floor(done / self._steps_per_sample + _ROUNDING))
         count = complete - self._converted
         parts = [channel.take(signals, self._converted, count) for channel in self._inputs]

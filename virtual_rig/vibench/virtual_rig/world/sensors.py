@@ -15,7 +15,7 @@ from vibench.sim.engine.run import native_engine
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 
 PAGE = 16_384
-"""Random numbers per page: short pages need more generator calls, long pages leave more numbers unused."""
+"""Number of random numbers per page: short pages need more generator calls, long pages waste more numbers."""
 
 
 class NoiseStream:
@@ -43,7 +43,7 @@ class NoiseStream:
 
     def generator(self, page_number: int) -> Generator:
         """Return a random number generator for the events of one page."""
-        # The page number is the third word of the counter, so that pages never share random numbers.
+        # With the page number as the third word of the counter, pages never share random numbers.
         return Generator(Philox(key=self._key, counter=np.array([0, 0, page_number, 0], dtype=np.uint64)))
 
     def _samples_of(self, page_number: int) -> NDArray[np.float64]:
@@ -55,7 +55,7 @@ class NoiseStream:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A constant output level that replaces the signal during some steps."""
+    """A constant output level that replaces the signal during several steps."""
 
     first_step: int
     stop_step: int
@@ -84,7 +84,7 @@ class RandomDropouts:
         """Return every drop-out that overlaps the steps from ``first`` to before ``stop``."""
         if self._per_page == 0.0:
             return []
-        # No drop-out is longer than a page, so only the previous page can reach into the first.
+        # No drop-out is longer than a page, so include one page before the first.
         pages = range(max(first // PAGE - 1, 0), stop // PAGE + 1)
         found = [dropout for page in pages for dropout in self._page_dropouts(page)]
         return [dropout for dropout in found if dropout.stop_step > first and dropout.first_step < stop]
@@ -104,7 +104,7 @@ class RandomDropouts:
 _FIT_BAND = 0.2
 """Upper end of the fit [grid rates]: the pass band of a converter that samples at half the grid's rate."""
 _FIT_FLOOR = 1e-2
-"""Lower end of the fit; below this, the exact gain at zero frequency determines the response."""
+"""Lower end of the fit; below it, the exact gain at zero frequency determines the response."""
 _FIT_POINTS = 64
 _ZEROS = 6
 """Number of numerator weights that are fitted."""
@@ -113,7 +113,7 @@ _ZEROS = 6
 def low_pass_poles(
     bandwidth_hz: float | None = None, resonance_hz: float | None = None, damping_ratio: float = 0.02
 ) -> tuple[complex, ...]:
-    """Return the poles of a sensor [rad/s]: one for its bandwidth (-3 dB), two for its mounted resonance.
+    """Return the poles of a sensor [rad/s]: one for the bandwidth (-3 dB), two for the mounted resonance.
 
     The default damping ratio is assumed; it is typical of piezoelectric sensors.
     """
@@ -148,11 +148,11 @@ def _fit_zeros(poles: tuple[complex, ...], denominator: FloatArray, step_s: floa
     z = np.exp(-2j * np.pi * frequency_hz * step_s)
     target = low_pass_gain(poles, frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
     powers = z[:, np.newaxis] ** np.arange(_ZEROS)
-    # Unit gain at zero frequency: numerator and denominator have equal sums, so one weight is eliminated.
+    # The gain at zero frequency is 1, so numerator and denominator have equal sums: eliminate one weight.
     total = denominator.sum()
     reduced = powers[:, 1:] - powers[:, :1]
     remainder = target - total * powers[:, 0]
-    weight = (1 / frequency_hz)[:, np.newaxis]  # equal delays have equal weight at all frequencies
+    weight = (1 / frequency_hz)[:, np.newaxis]  # an equal delay has an equal weight at all frequencies
     matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
     aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
     weights, *_ = np.linalg.lstsq(matrix, aim)
@@ -167,13 +167,13 @@ LONGEST_DELAY_S = 5e-3
 
 @dataclass(frozen=True, eq=False)
 class SensorParts:
-    """Data needed to convert the motion over some steps to sensor volts."""
+    """Data needed to convert the motion during several steps to sensor volts."""
 
     filter: RecursiveFilter
     noise: FloatArray
     """Noise of the sensor in units of the motion, shape (steps,)."""
     instead: FloatArray
-    """Values that replace the motion, in its units, where they are not NaN; empty if nothing is replaced."""
+    """Values that replace the motion, where not NaN, in units of the motion; empty if nothing is replaced."""
     full_scale: float
     """Full scale of the sensor in units of the motion."""
     full_scale_v: float
@@ -234,7 +234,7 @@ class MotionSensor:
         dropouts = [] if self._dropouts is None else self._dropouts.between(first_step, first_step + count)
         disturbed = dropouts + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
-        # The first entry of ``instead`` is for ``first_step``.
+        # The first entry of ``instead`` belongs to ``first_step``.
         for disturbance in disturbed:
             begin = max(disturbance.first_step - first_step, 0)
             stop = max(disturbance.stop_step - first_step, 0)

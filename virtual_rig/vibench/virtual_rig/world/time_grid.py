@@ -19,8 +19,8 @@ PPM = 1e-6
 class TimeGrid:
     """Equal steps of rig time.
 
-    The converter's clock counts rig time, so that samples always lie at whole numbers of steps.
-    Physical time differs by the clock's error, and the equations of motion use the physical step.
+    The converter's clock counts rig time, so that samples always lie at whole numbers of steps. Physical time
+    differs from rig time by the clock's error, and the equations of motion use the physical step.
 
     The usual grid has twice the highest usual sample rate. Every rate of an NI 9234 is an integer fraction of
     this rate, and the transition band of its anti-alias filter fits below the Nyquist frequency. A step (9.8
@@ -35,7 +35,7 @@ class TimeGrid:
         return 1.0 / self.rate_hz
 
     def physical_step_s(self, converter_clock_ppm: float) -> float:
-        """Return the physical length of a step, for a converter clock that runs fast by this error [s]."""
+        """Return the physical length of a step [s] if the converter clock runs fast by this error."""
         return self.step_s / (1.0 + converter_clock_ppm * PPM)
 
     def rms_per_step(self, rms: float) -> float:
@@ -62,7 +62,7 @@ class RecursiveFilter:
     """A recursive digital filter (direct form II, transposed), initially at rest."""
 
     def __init__(self, numerator: ArrayLike, denominator: ArrayLike) -> None:
-        """Create a filter; the first coefficients are for the present value, and the denominator's is 1."""
+        """Create a filter; the first coefficients are for the present value; that of the denominator is 1."""
         weights = [np.asarray(each, dtype=np.float64) for each in (numerator, denominator)]
         order = max(len(each) for each in weights)
         self.numerator, self.denominator = (np.pad(each, (0, order - len(each))) for each in weights)

@@ -24,7 +24,18 @@ from vibench.acquisition.rig import (
 from vibench.sim import Specimen
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
-from .conversion import Conversion, ConverterInput, InputStage, history_steps
+from .conversion import (
+    OPEN_INPUT,
+    SECOND_DEVICE,
+    Conversion,
+    ConverterInput,
+    Input,
+    InputStage,
+    Signal,
+    cables_of,
+    history_steps,
+    signal_rows,
+)
 from .sensors import (
     LONGEST_DELAY_S,
     Disturbance,
@@ -34,14 +45,13 @@ from .sensors import (
     SensorParts,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, SECOND_DEVICE, Input, Signal, cables_of, signal_rows
 
 
 class AnalogueOutput:
     """Analogue output with a queue of samples, played at their own rate; zero when the queue is empty.
 
-    The mean voltage over each step is exact at any sample rate. Real converters with an interpolation filter
-    have weaker images than this zero-order hold.
+    The mean voltage over each step is exact at any sample rate. The images of this zero-order hold are
+    stronger than those of real converters with an interpolation filter.
     """
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
@@ -67,7 +77,7 @@ class AnalogueOutput:
         self._queue = np.concatenate([self._queue, np.asarray(volts, dtype=np.float64)])
 
     def queued_samples(self, now_step: int) -> int:
-        """Return the number of samples in the queue that have not been played to their end."""
+        """Return the number of samples in the queue that have not been played completely."""
         ended = int(max(now_step - self._begin_step, 0.0) / self._steps_per_sample + _ROUNDING)
         return max(len(self._queue) - ended, 0)
 
@@ -90,16 +100,16 @@ class AnalogueOutput:
 
 
 _ROUNDING = 1e-6
-"""Tolerance for samples that end exactly at the end of a step [samples]."""
+"""Tolerance that covers samples that end exactly at the end of a step [samples]."""
 
 
 LOWEST_RATE_HZ = 500.0
 """Lowest sample rate of a conversion [Hz]; at this rate, its filter needs 0.1 s of history."""
 HIGHEST_RATE_HZ = 250e3
-"""Highest sample rate of a conversion [Hz]; samples at rates above the grid's are interpolated."""
+"""Highest sample rate of a conversion [Hz]; samples at rates above the grid's rate are interpolated."""
 
 _STRETCH_STEPS = 8192
-"""Time steps per block: enough to amortise the cost of a call, few enough for the processor's cache."""
+"""Time steps per block: enough to make the cost of a call small, and few enough for the processor's cache."""
 
 
 class TerminalVoltage(Protocol):
@@ -136,9 +146,9 @@ class ClosedLoop(Protocol):
 class World:
     """The simulated rig; its time advances only on request.
 
-    Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds of one configuration agree bit
-    for bit, for any block sizes. The class is thread-safe. `time_s` takes no lock, so an instrument may read
-    it while its output is rendered.
+    Rig time is counted by the converter's clock (see `TimeGrid`). Two worlds with the same configuration
+    agree bit for bit, for any block sizes. The class is thread-safe. `time_s` takes no lock, so an instrument
+    may read it while its output is rendered.
     """
 
     def __init__(
@@ -166,7 +176,7 @@ class World:
         self._converter_noise_v = virtual.converter_noise_v
         self._plan = cables_of(rig, {role: each.delay_steps for role, each in self._sensors.items()})
         self._cables = dict(self._plan)
-        # The analogue output whose voltage is added to the generator's at the amplifier's input.
+        # At the amplifier's input, the voltage of this analogue output is added to the generator's voltage.
         self._amplifier_input = rig.daq.output_channel or f"{SECOND_DEVICE}/ao0"
         self._outputs: dict[str, AnalogueOutput] = {}
         self._loop = loop
@@ -174,7 +184,7 @@ class World:
         slowest = history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz)
         self._history = np.zeros((len(self._rows), slowest + 2))
         self._due: list[tuple[int, int, Callable[[], None]]] = []
-        """Scheduled actions by the step at which they are due; actions at one step keep their order."""
+        """Scheduled actions with the step at which each is due; actions at one step keep their order."""
         self._scheduled = count()
         self._step = 0
         self._unspent_steps = 0.0
@@ -206,12 +216,12 @@ class World:
 
         Rates from 500 Hz to 250 kHz are possible, or up to half the rate of a coarser grid; integer fractions
         of the grid's rate are faster. All inputs share the delay of a delta-sigma converter: 40 samples, or
-        40 grid steps if longer. Raises ConfigurationError for other rates.
+        40 grid steps if these are longer. Raises ConfigurationError for other rates.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
             raise ConfigurationError(
-                f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig with its "
+                f"A sample rate of {sample_rate_hz:g} Hz is not possible on this virtual rig, which takes "
                 f"{self._grid.rate_hz:g} steps a second; nothing was started. Choose a rate from "
                 f"{LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz"
             )
@@ -234,7 +244,7 @@ class World:
             return conversion
 
     def play(self, physical_channel: str, volts: FloatArray, sample_rate_hz: float) -> None:
-        """Append samples to the queue of an analogue output, which starts now if it is idle."""
+        """Append samples to the queue of an analogue output; an idle output starts now."""
         with self._turn:
             self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
 
@@ -256,10 +266,10 @@ class World:
             self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
     def aim(self, role: Role) -> None:
-        """Move the vibrometer's beam to the mass of ``role``, whose velocity replaces that of m0."""
+        """Move the vibrometer's beam to the mass of ``role``, whose velocity replaces the velocity of m0."""
         with self._turn:
             self._beam = role
-            self._compute_to(self._step + 1)  # the mean velocity over a step needs the state before the step
+            self._compute_to(self._step + 1)  # a step's mean velocity also needs the state before the step
 
     def disturb_response(self, duration_s: float, level: float) -> None:
         """Hold the output of the m0 sensor at ``level`` (fraction of full scale) for a while."""
@@ -280,7 +290,7 @@ class World:
             self._cables[physical_channel] = OPEN_INPUT
 
     def reverse(self, physical_channel: str) -> None:
-        """Swap the two wires of an input, which inverts the input's sign."""
+        """Swap the two wires of an input, and so invert the input's sign."""
         cable = self._plan.get(physical_channel, OPEN_INPUT)
         with self._turn:
             self._cables[physical_channel] = replace(cable, attenuation=-cable.attenuation)
@@ -293,7 +303,7 @@ class World:
     def truth(self) -> FloatArray:
         """Return and clear the recorded true motion, shape (steps, 9).
 
-        Columns are as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
+        Columns are as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; each row belongs to the end of a step.
         """
         with self._turn:
             kept, self._truth = self._truth or [], []
@@ -353,7 +363,7 @@ class World:
                     if role in self._sensors and role not in others:
                         signals[self._rows[role]] = self._sensors[role].volts(means, first)
         except MotionFailed as error:
-            raise AcquisitionError(f"{error}. The virtual rig has stopped: restart it") from error
+            raise AcquisitionError(f"{error}. The virtual rig has stopped: restart the rig") from error
         if others:
             ends = np.concatenate([self._last_end, motion.ends])
             self._last_end = ends[-1:]
@@ -373,7 +383,7 @@ class World:
             case "velocity":
                 means = np.diff(place) / h
             case "displacement":
-                # Mean of the cubic Hermite polynomial through the states at both ends.
+                # The mean of the cubic Hermite polynomial through the states at both ends of the step.
                 means = 0.5 * (place[:-1] + place[1:]) - h / 12 * np.diff(velocity)
             case _:
                 pull = self._specimen.stiffnesses[0] * (column["x"] - place)
@@ -383,7 +393,7 @@ class World:
 
 
 _LOOP_ROLES = (Role.BASE_ACCELERATION, Role.M0_VELOCITY)
-"""Channels that a controller can sample: those whose means the native engine computes."""
+"""Channels that a controller can sample: the channels whose means the native engine computes."""
 _STATES = {
     "base": ("base_displacement", "base_velocity"),
     "m0": ("x", "vx"),
