@@ -1,6 +1,6 @@
-from .chaos.period import Points as Points
-from .chaos.verdict import MotionVerdict as MotionVerdict, motion_verdict as motion_verdict
-from .comparison.curve import (
+from .chaos.verdict import MotionVerdict as MotionVerdict, Points as Points, motion_verdict as motion_verdict
+from .comparison import (
+    AnalysisOptions as AnalysisOptions,
     Curve as Curve,
     CurveKind as CurveKind,
     CurveOrigin as CurveOrigin,
@@ -8,36 +8,34 @@ from .comparison.curve import (
     curve_peaks as curve_peaks,
     readings as readings,
 )
-from .comparison.recording_curves import AnalysisOptions as AnalysisOptions
 from .errors import (
     AnalysisError as AnalysisError,
     InvalidRequest as InvalidRequest,
     NotEnoughData as NotEnoughData,
 )
-from .fit.parameters import Parameter as Parameter
+from .fit.lines import Parameter as Parameter
 from .fit.updated_specimen import (
     UpdatedSpecimen as UpdatedSpecimen,
     update_model as update_model,
 )
 from .frequency_response.modal_fit import Resonance as Resonance
-from .frequency_response.request import (
+from .frequency_response.resonance import resonances as resonances
+from .frequency_response.results import (
+    Estimator as Estimator,
+    FrequencyResponse as FrequencyResponse,
     FrequencyResponseRequest as FrequencyResponseRequest,
     MagnitudeScale as MagnitudeScale,
     parse_view as parse_view,
 )
-from .frequency_response.resonance import resonances as resonances
-from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
 from .frequency_response.transmissibility import transmissibility as transmissibility
 from .overlay.draws import DRAWS as DRAWS, MOST_DRAWS as MOST_DRAWS
 from .overlay.ensemble import FEWEST_DRAWS as FEWEST_DRAWS, CurveDifference as CurveDifference
-from .overlay.measurement_prediction import (
-    MeasurementPrediction as MeasurementPrediction,
-    predict_measurement as predict_measurement,
-)
-from .overlay.overlay import Simulation as Simulation
-from .overlay.prediction import (
+from .overlay.overlay import (
     PAPER_RESONANCES_HZ as PAPER_RESONANCES_HZ,
     PAPER_TERMINAL_RESONANCES_HZ as PAPER_TERMINAL_RESONANCES_HZ,
+    MeasurementPrediction as MeasurementPrediction,
+    Simulation as Simulation,
+    predict_measurement as predict_measurement,
 )
 from .overlay.similarity import (
     SIMILARITY_THRESHOLD as SIMILARITY_THRESHOLD,
@@ -50,6 +48,7 @@ from .results.campaign_results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
     FailedStep as FailedStep,
+    analyse as analyse,
     analyse_files as analyse_files,
     budget_sentences as budget_sentences,
     budgets_of as budgets_of,
@@ -66,9 +65,8 @@ from .results.compared_recording import (
     recorded_response as recorded_response,
     recorded_specimen as recorded_specimen,
 )
-from .results.measurement_analysis import analyse as analyse
 from .results.spectral_functions import scan_files as scan_files, spectral_functions as spectral_functions
-from .signals.window import Window as Window
+from .signals.averaging import Window as Window
 from .uncertainty.expected import (
     ExpectedResult as ExpectedResult,
     TimeShare as TimeShare,

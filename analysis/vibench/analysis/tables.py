@@ -1,4 +1,4 @@
-"""Tables of numbers for figures and CSV files, and conversion of results to JSON and xarray."""
+"""Choices for figures, tables for figures and CSV files, and conversion of results to JSON and xarray."""
 
 import csv
 import inspect
@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from decimal import Decimal
+from enum import StrEnum
 from itertools import zip_longest
 from pathlib import Path
 from types import MappingProxyType
@@ -22,9 +23,32 @@ from .errors import InvalidRequest
 if TYPE_CHECKING:
     import xarray
 
+
+class ImageKind(StrEnum):
+    """Image formats of figures; the value is the file suffix."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
+
+SHOWN = {
+    "response_i": "Response I of m0 over A0",
+    "response_ii": "Response II of m0 over A0",
+    "relative_i": "Response I of p over A0",
+    "relative_ii": "Response II of p over A0",
+    "impact_rate": "impacts per second",
+    "contact_energy": "largest energy in a stop [J]",
+    "lyapunov": "largest Lyapunov exponent [1/s]",
+    "duration": "simulated time [s]",
+    "motions": "number of motions reached from the initial states",
+}
+"""Quantities that a map can show in addition to the kinds of motion."""
+
+
 _DIGITS = 10
 _PLAIN = (1e-5, 1e7)
-"""Range of magnitudes in which numbers are written without a power of ten."""
+"""Numbers with magnitudes in this range are written without a power of ten."""
 
 
 def plus_minus(value: float, half_width: float) -> str:
@@ -37,13 +61,19 @@ def plus_minus(value: float, half_width: float) -> str:
     largest = max(abs(value), half_width)
     if not _PLAIN[0] <= largest < _PLAIN[1]:
         power = int(np.floor(np.log10(largest)))
-        # Decimal is used, because the power of ten itself may exceed the range of floats.
+        # Use Decimal, because the power of ten alone may exceed the range of floats.
         scaled = (float(Decimal(float(each)).scaleb(-power)) for each in (value, half_width))
         return f"({plus_minus(*scaled)})e{power}"
-    # The exponent is taken after rounding: 0.0996 is written as 0.10.
+    # Take the exponent after rounding, because 0.0996 is written as 0.10.
     place = 1 - int(f"{half_width:.1e}".partition("e")[2])
     shown = max(place, 0)
     return f"{round(value, place) + 0.0:.{shown}f} ± {round(half_width, place):.{shown}f}"
+
+
+def with_unit(value: float, half_width: float, unit: str) -> str:
+    """Return a value with its uncertainty and unit as text: ``"(94.613 ± 0.012) Hz"``."""
+    shown = plus_minus(value, half_width)
+    return f"({shown}) {unit}" if unit and "±" in shown else f"{shown} {unit}".strip()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +90,7 @@ class Table:
 
 def table(name: str, **columns: ArrayLike) -> Table:
     """Return a table from its ``name`` and ``columns``; column names end with the unit, as in ``time_s``."""
-    return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
+    return Table(name, tuple((each, tuple(np.ravel(values).tolist())) for each, values in columns.items()))
 
 
 def columns(source: object, keys: str) -> dict[str, Any]:
@@ -128,11 +158,6 @@ def _document(value: Any) -> Any:
             raise TypeError(f"{type(value).__name__} cannot be stored in a document; convert it to numbers")
 
 
-def _cells(values: ArrayLike) -> tuple[float | str, ...]:
-    cells: tuple[float | str, ...] = tuple(np.asarray(values).ravel().tolist())
-    return cells
-
-
 def write_csv(content: Table, path: Path) -> Path:
     """Write a table with headings in the first row, decimal points, and empty cells below short columns."""
     headings = [heading for heading, _ in content.columns]
@@ -140,17 +165,10 @@ def write_csv(content: Table, path: Path) -> Path:
     with replace_file(path) as coming, coming.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(headings)
-        writer.writerows([_text(cell) for cell in row] for row in rows)
+        writer.writerows(
+            [f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else cell for cell in row] for row in rows
+        )
     return path
-
-
-def _text(cell: float | str) -> str:
-    return f"{cell:.{_DIGITS}g}" if isinstance(cell, float) else str(cell)
-
-
-def write_tables(tables: Sequence[Table], folder: Path) -> tuple[Path, ...]:
-    """Write each table as ``NAME.csv``."""
-    return tuple(write_csv(each, folder / f"{each.name}.csv") for each in tables)
 
 
 UNITS = {
@@ -214,7 +232,8 @@ class Tabular:
         attributes: dict[str, Any] = {"result": type(self).__name__}
         _collect(self, "", "", variables, attributes)
         made = xarray.Dataset(variables, attrs=attributes)
-        return made.set_coords([name for name in made.variables if _is_coordinate(str(name))])
+        ends = tuple(f"_{each}" for each in COORDINATES)
+        return made.set_coords([name for name in made.variables if f"_{name}".endswith(ends)])
 
 
 def unit_of(name: str) -> str:
@@ -242,10 +261,6 @@ def _attributes(unit: str) -> dict[str, str]:
 def holds_array(annotation: object) -> bool:
     """Return whether an annotation is an array: an alias in numpy 2.5, the class in older versions."""
     return "ndarray" in str(annotation).lower()
-
-
-def _is_coordinate(name: str) -> bool:
-    return any(name == each or name.endswith(f"_{each}") for each in COORDINATES)
 
 
 def _collect(
@@ -287,7 +302,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Return the type of a part and the lengths of its lists; None if a field cannot be a table cell."""
+    """Return the type of a part and the lengths of its lists; None if any field cannot be a table cell."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:

@@ -12,10 +12,9 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ..errors import InvalidRequest, NotEnoughData
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals.arrays import Reals
 from ..tables import Tabular
-from .period import Points, is_settled, scatter_drifts, shortest_period, slow_share
 from .witnesses import (
     FEWEST,
     Divergence,
@@ -29,10 +28,122 @@ from .witnesses import (
     zero_one,
 )
 
+LONGEST_PERIOD = 32
+_TABLE = 2
+"""Number of dimensions of the array of Poincaré points; its shape is (drive periods, coordinates)."""
+STEADY = 2e-3
+"""Largest scatter of a steady motion's points, relative to the size of the orbit; real drives fluctuate."""
+_NOISE_MARGIN = 1.5
+"""Noise explains the points' scatter up to this ratio of the measured to the expected scatter."""
+_REPEATED = 0.25
+"""Largest variance of every n-th point relative to the variance of all points, if a period n exceeds one."""
+_DRIFT_BLOCKS = 10
+_DRIFT = 5.0
+"""Largest drift [standard errors]; 1 settled record in 250 drifts more (4 slopes, 8 degrees of freedom)."""
+
+_STEADY_SCATTER = 0.9
+"""Minimum ratio of the smaller to the larger scatter in the two halves of a settled record."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points(Tabular):
+    """Poincaré points of a motion, one per drive period, and their noise; both relative to the orbit."""
+
+    value: Reals
+    """Displacement and velocity, each divided by the size of the orbit, shape (periods, 2)."""
+    noise: Reals
+    """Standard deviation of the noise of each coordinate, divided by the size of the orbit, shape (2,)."""
+
+    def __post_init__(self) -> None:
+        """Raise InvalidRequest for wrong shapes or invalid noise, UnusableData for non-finite points."""
+        points, noise = np.shape(self.value), np.shape(self.noise)
+        if len(points) != _TABLE or noise != points[1:]:
+            raise InvalidRequest(
+                f"points of shape {points} with noise of shape {noise} were given; points must have the "
+                "shape (periods, 2), and their noise the shape (2,)"
+            )
+        if not np.all((np.asarray(self.noise) >= 0.0) & np.isfinite(self.noise)):
+            raise InvalidRequest(
+                f"a noise of {self.noise} is not allowed; give standard deviations, zero or more"
+            )
+        if not np.all(np.isfinite(self.value)):
+            raise UnusableData(
+                "points contain values that are not finite; choose a part without lost samples"
+            )
+
+    @property
+    def spread(self) -> float:
+        """RMS distance of the points from their mean, relative to the size of the orbit."""
+        return float(np.sqrt(np.mean(np.var(self.value, axis=0))))
+
+    @property
+    def noise_level(self) -> float:
+        """RMS noise of the points, relative to the size of the orbit."""
+        return float(np.sqrt(np.mean(self.noise**2)))
+
+
+def shortest_period(points: Points) -> int | None:
+    """Return the smallest number of drive periods after which all points repeat within noise, or None.
+
+    To test period n, every nth point is compared over the whole record, because slow changes are small from
+    one period to the next. In addition to their noise, these points may scatter by 0.2 % of the orbit
+    (unsteady drive). If n exceeds one, the points' scatter must also be below half of the total scatter.
+    """
+    by_noise = (_NOISE_MARGIN * points.noise) ** 2
+    allowed = by_noise + STEADY**2
+    count = len(points.value)
+    for period in range(1, min(LONGEST_PERIOD, count // 4) + 1):
+        whole = np.full((-(-count // period) * period, _TABLE), np.nan)
+        whole[:count] = points.value
+        scatter = np.nanvar(whole.reshape(-1, period, _TABLE), axis=0, ddof=1)
+        if np.all(np.mean(scatter, axis=0) <= allowed):
+            return period
+        allowed = np.minimum(allowed, by_noise + _REPEATED * np.var(points.value, axis=0))
+    return None
+
+
+def drift(points: Points) -> float:
+    """Return the largest trend of the points' mean or scatter over a record, in standard errors.
+
+    A line is fitted to the values of ten equal parts of the record, and its slope is divided by its standard
+    error. A scatter of 0.2 % of the orbit is tolerated as unsteadiness of the drive.
+    """
+    blocks = np.array_split(points.value, _DRIFT_BLOCKS)
+    place = np.linspace(-0.5, 0.5, _DRIFT_BLOCKS)
+    worst = 0.0
+    for figure in (
+        np.array([block.mean(axis=0) for block in blocks]),
+        np.array([block.std(axis=0) for block in blocks]),
+    ):
+        slope = place @ figure / (place @ place)
+        left = figure - figure.mean(axis=0) - np.outer(place, slope)
+        variance = np.sum(left**2, axis=0) / (_DRIFT_BLOCKS - 2) + STEADY**2 / _DRIFT_BLOCKS
+        worst = max(worst, float(np.max(np.abs(slope) / np.sqrt(variance / (place @ place)))))
+    return worst
+
+
+def slow_share(points: Points) -> float:
+    """Return the variance of the means of ten parts of the record, relative to the variance of the points."""
+    means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _DRIFT_BLOCKS)])
+    whole = float(np.sum(np.var(points.value, axis=0)))
+    return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0
+
+
+def is_settled(points: Points) -> bool:
+    """Return whether mean and scatter of the points are constant over the record."""
+    return drift(points) <= _DRIFT
+
+
+def scatter_drifts(points: Points) -> bool:
+    """Return whether the scatter of the points, however small, changes by a tenth or more over the record."""
+    sizes = [Points(half, points.noise).spread for half in np.array_split(points.value, 2)]
+    relative = Points(points.value / points.spread, points.noise)
+    return min(sizes) < _STEADY_SCATTER * max(sizes) and not is_settled(relative)
+
+
 _HARMONICS = 8
 _EXPLAINED = 0.02
-"""Largest RMS distance of points from the closed curve on which they lie, relative to their spread."""
-_NOISE_MARGIN = 1.5
+"""Points lie on a closed curve if their RMS distance from it, relative to their spread, is at most this."""
 _CLEAR = 0.8
 """Largest value to which noise of the points may raise the limit `_EXPLAINED`."""
 _MAINS_HZ = (50.0, 60.0)
@@ -75,7 +186,7 @@ def rotation(points: Reals) -> Rotation:
 
 
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
-    """Return the mains frequency, or a harmonic of it, that explains a rotation number; None if none does."""
+    """Return the mains frequency, or a harmonic of it, that explains a rotation number; None if none fits."""
     for mains in _MAINS_HZ:
         for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
             turns = hum_hz / drive_hz
@@ -115,23 +226,23 @@ def begin_of_last_motion(points: Points) -> int:
     changes = np.flatnonzero(repeats[1:] != repeats[:-1])
     if changes.size != 1:
         return 0
-    # The motion changes somewhere inside the block that does not repeat; the exact place is unknown.
+    # The motion changes at an unknown place in the block that does not repeat.
     last = int(changes[0]) + 1
     return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
 
 
 MOST_POINTS = 3000
-"""Maximum number of points in tests of the shape, from the end of a record; more points only cost time."""
+"""Maximum number of last points of a record used to test the section's shape; more would only cost time."""
 ABOVE_NOISE = 5.0
 """Minimum ratio of the points' scatter to their noise for tests of the shape of the section."""
 LARGEST_NOISE = 0.1
 """Largest ratio of noise to the size of the orbit; more noise could hide another motion."""
 SMALL = 0.05
-"""Largest scatter of a periodic motion with linear noise, relative to the size of the orbit."""
+"""Largest scatter at which a motion with linear noise counts as periodic, relative to the orbit's size."""
 SLOW = 0.5
 """Largest `slow_share` of a motion that does not change slowly."""
 _FEWEST_TURNS = 3.0
-"""Minimum number of turns around a closed curve in a record; fewer turns count as a slow change."""
+"""Minimum number of turns around a closed curve during a record; fewer turns count as a slow change."""
 _LARGEST_HUM = 0.1
 """Largest component at the mains frequency, relative to the orbit, that counts as hum, not as motion."""
 _LOW_PERIOD = 4
@@ -165,7 +276,7 @@ class Evidence:
     periods: int
     """Number of drive periods used for the tests."""
     spread: float
-    """Scatter of the points relative to the size of the orbit."""
+    """Scatter of the points, relative to the size of the orbit."""
     noise: float
     """Noise of the points relative to the size of the orbit."""
     is_settled: bool
@@ -190,7 +301,7 @@ class MotionVerdict(Tabular):
     why: str
     evidence: Evidence
     period: int | None = None
-    """Number of drive periods after which a periodic motion repeats."""
+    """Number of drive periods after which a periodic motion repeats itself."""
 
     @property
     def least_exponent_per_s(self) -> float | None:
@@ -213,9 +324,9 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     closed curve. It is *chaotic* only if all tests agree: the points are settled, far above the noise and on
     no closed curve, the 0-1 test is near one without oversampling, and surrogates reject linear noise. Each
     test alone would accept some noise as chaos. If any test fails, the verdict is undecided. If the motion
-    changes once, as when a chaotic transient ends, the last part is classified if its period is at most 4 or
-    if it is the longer part. With noise above a tenth of the orbit, the verdict is undecided. Raises
-    InvalidRequest when the drive frequency is not positive and finite.
+    changes once, as at the end of a chaotic transient, only the last part is classified. Its period must be
+    at most 4, or it must be the longer part. If the noise exceeds a tenth of the orbit, the verdict is
+    undecided. Raises InvalidRequest when the drive frequency is not positive and finite.
 
     Parameters
     ----------
@@ -227,7 +338,7 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
         Seed of the random frequencies and surrogates.
     """
     if not 0.0 < drive_hz < math.inf:
-        raise InvalidRequest(f"a drive frequency of {drive_hz} Hz is not allowed; give a positive one")
+        raise InvalidRequest(f"a drive frequency of {drive_hz} Hz is not allowed; give a positive frequency")
     count = len(points.value)
     if count < FEWEST:
         return _too_few(
@@ -241,20 +352,20 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     rest = Points(points.value[before:], points.noise)
     too_late = "before the end, too late to classify the new motion; dwell longer"
     if count - before < FEWEST:
-        return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
+        return _too_few(f"a change occurred fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
-    # A motion that repeats at the end is settled, however long its transient was. An irregular end or a long
-    # period may itself be a transient, such as points that rotate about a fixed point and decay into noise.
+    # A motion that repeats at the end is settled, however long its transient was. An irregular end, or a long
+    # period, may be a transient: for example, points that rotate about a fixed point and decay into noise.
     if (found.period or math.inf) > _LOW_PERIOD and count - before <= before:
-        return _no_verdict(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
-    return replace(found, why=f"{found.why}; this holds for the last {len(rest.value)} drive periods only")
+        return _no_verdict(f"a change occurred {count - before} drive periods {too_late}", found.evidence)
+    return replace(found, why=f"{found.why}; this holds only for the last {len(rest.value)} drive periods")
 
 
 def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
     evidence = Evidence(drive_hz, len(last.value), last.spread, last.noise_level, is_settled=is_settled(last))
     if not evidence.is_settled:
         return _no_verdict(
-            "the motion still changes: its mean or its scatter drifts; let it settle for longer",
+            "the motion still changes: its mean or its scatter drifts; let the motion settle for longer",
             evidence,
         )
     if last.noise_level > LARGEST_NOISE:
@@ -385,18 +496,18 @@ def _verdict(
         return _no_verdict(f"0-1 test: {test.k:.2f}, neither regular nor chaotic; record longer", evidence)
     above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
     why = (
-        f"settled points, {above}not on a closed curve; the 0-1 test gives {test.k:.3f}, and linear noise "
-        f"is excluded (p = {noise_test.p:.3f})"
+        f"the points are settled, {above}and not on a closed curve; the 0-1 test gives {test.k:.3f}, and "
+        f"linear noise is excluded (p = {noise_test.p:.3f})"
     )
     return MotionVerdict(MotionKind.CHAOTIC, why, evidence)
 
 
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
-    """Return the verdict if linear noise explains the points: periodic if noise is small, else undecided."""
+    """Return the verdict if linear noise explains the points: periodic for small noise, else undecided."""
     if evidence.spread > SMALL:
-        return _no_verdict(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
+        return _no_verdict(f"linear noise also explains the points (p = {noise_test.p:.2f})", evidence)
     why = (
         f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit, like linear "
-        f"noise (p = {noise_test.p:.2f}), but more than the vibrometer noise"
+        f"noise (p = {noise_test.p:.2f}), but by more than the vibrometer noise"
     )
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)

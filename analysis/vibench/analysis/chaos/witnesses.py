@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import fft
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
@@ -11,7 +12,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Flags, Integers, Reals
 
 _MOST_TRIED = 64
-"""A neighbour distant in time is searched for among up to four times as many nearest points as this."""
+"""A quarter of the largest number of nearest points searched for a neighbour that is distant in time."""
 
 
 def delay_vectors(series: Reals, delays: int) -> Reals:
@@ -28,7 +29,7 @@ def delay_vectors(series: Reals, delays: int) -> Reals:
     """
     columns = series.reshape(series.shape[0], -1)
     if delays < 1:
-        raise InvalidRequest(f"an embedding of {delays} delays is not allowed; give one or more")
+        raise InvalidRequest(f"an embedding of {delays} delays is not allowed; give one delay or more")
     points = columns.shape[0] - delays + 1
     if points < 2:
         raise NotEnoughData(
@@ -59,7 +60,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     found = np.full(last, -1, dtype=np.int64)
     tried = 4
     while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
-        # With a list of ranks, the result is two-dimensional even for one neighbour.
+        # For a list of ranks, `query` returns a two-dimensional array, even for one neighbour.
         ranks = list(range(1, min(tried, last) + 1))
         reach, index = (np.asarray(each) for each in tree.query(points[wanted], k=ranks))
         allowed = (np.abs(index - wanted[:, np.newaxis]) >= apart) & (reach > floor)
@@ -76,8 +77,8 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
 def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
     """Find several neighbours of each point, at least ``apart`` steps away in time.
 
-    Returns the indices of each point's nearest points, and flags that select at most ``count`` of them as
-    neighbours; shapes (n, tried).
+    Returns the indices of each point's nearest points, and flags that select at most ``count`` of these
+    points as neighbours; shapes (n, tried).
     """
     tried = min(count + 2 * apart - 1, len(points))
     index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
@@ -86,9 +87,9 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 
 
 _SATURATION = 0.25
-"""Distance of neighbours, relative to typical distances, at which the attractor's size stops the growth."""
+"""Distance of neighbours relative to typical distances; above it, the attractor's size limits the growth."""
 _ABOVE_NOISE = 3.0
-"""Minimum ratio of the neighbours' distance to the noise at the steps to which the line is fitted."""
+"""The line is fitted to steps at which the neighbours' distance is at least this multiple of the noise."""
 _SHORTEST_FIT = 3
 """Minimum number of steps for fitting a line to the divergence."""
 _BLOCKS = 10
@@ -105,7 +106,7 @@ class Divergence:
     exponent: float
     """Slope of the fitted line [1/step]; NaN if no line was fitted."""
     sd_exponent: float
-    """Standard error of the slope, from its scatter between ten parts of the record."""
+    """Standard error of the slope, from the scatter of the slopes of ten parts of the record."""
 
     @property
     def is_resolved(self) -> bool:
@@ -126,7 +127,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     points
         The motion, shape (n, dimensions), one point per step.
     steps
-        Number of steps to follow pairs.
+        Number of steps over which pairs of points are followed.
     apart
         Neighbours are at least this many steps apart in time.
     noise
@@ -139,22 +140,19 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     if point.size < FEWEST_PAIRS:
         raise NotEnoughData(
             f"{point.size} of {count} points have a neighbour that can be followed for {steps} steps, but "
-            f"{FEWEST_PAIRS} are needed; measure longer"
+            f"{FEWEST_PAIRS} such points are needed; measure longer"
         )
     logarithms = np.empty((steps + 1, point.size))
     for step in range(steps + 1):
         distance = np.linalg.norm(points[point + step] - points[neighbour + step], axis=1)
         logarithms[step] = np.log(np.maximum(distance, np.finfo(np.float64).tiny))
     mean = logarithms.mean(axis=1)
-    first, final = _fit_range(mean, _typical(points), floor, apart)
-    return Divergence(first, final, *_slope(logarithms, first, final))
-
-
-def _typical(points: Reals) -> float:
-    """Return the mean logarithm of the distance between points half a record apart in time."""
-    half = points.shape[0] // 2
+    # The mean logarithm of the distance between points half a record apart in time is the typical distance.
+    half = count // 2
     distance = np.linalg.norm(points[half : 2 * half] - points[:half], axis=1)
-    return float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
+    typical = float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
+    first, final = _fit_range(mean, typical, floor, apart)
+    return Divergence(first, final, *_slope(logarithms, first, final))
 
 
 def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int, int]:
@@ -162,7 +160,7 @@ def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int,
     above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
     beyond = np.flatnonzero(mean > top)
     first = int(above[0]) if above.size else mean.size - 1
-    # Leave out the first steps, while the difference rotates into the direction of growth.
+    # Leave out the first steps, in which the difference turns into the direction of growth.
     first = max(first, apart)
     last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
     return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
@@ -201,7 +199,7 @@ class ZeroOne:
 
     @property
     def is_oversampled(self) -> bool:
-        """Return whether successive values are too correlated for K to be valid."""
+        """Return whether successive values are too strongly correlated for K to be valid."""
         return self.neighbour_correlation > OVERSAMPLED
 
 
@@ -223,7 +221,7 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     """
     count = series.size
     if count < FEWEST:
-        raise NotEnoughData(f"the 0-1 test needs {FEWEST} values and was given {count}; measure longer")
+        raise NotEnoughData(f"the 0-1 test needs {FEWEST} values, but was given {count}; measure longer")
     centred = series - series.mean()
     power = float(np.mean(centred**2))
     if power == 0.0:
@@ -238,12 +236,15 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
 def _correlation(series: Reals, frequency: float) -> float:
     """Return K_c, the correlation of the mean square displacement with time."""
     count = series.size
-    cut = count // _CUT
+    lags = np.arange(1, count // _CUT + 1)
+    left = count - lags.size
     walk = np.cumsum(series * np.exp(1j * frequency * np.arange(1, count + 1)))
-    lags = np.arange(1, cut + 1)
-    displacement = np.array(
-        [np.mean(np.abs(walk[lag : count - cut + lag] - walk[: count - cut]) ** 2) for lag in lags]
-    )
+    walk -= walk.mean()
+    # Mean of |later - earlier|^2 over all starts, from running sums and a correlation by FFT.
+    squares = np.append(0.0, np.cumsum(np.abs(walk) ** 2))
+    size = fft.next_fast_len(count)
+    products = fft.ifft(fft.fft(walk, size) * np.conj(fft.fft(walk[:left], size)))[lags].real
+    displacement = (squares[left] + squares[left + lags] - squares[lags] - 2 * products) / left
     oscillation = series.mean() ** 2 * (1 - np.cos(frequency * lags)) / (1 - np.cos(frequency))
     return float(np.corrcoef(lags, displacement - oscillation)[0, 1])
 
@@ -252,6 +253,8 @@ SURROGATES = 39
 """Number of surrogates; the probability that linear noise has the smallest statistic is 1/40 = 0.025."""
 _DELAYS, _NEIGHBOURS = 4, 10
 """Number of values in a delay vector, and number of similar vectors that predict the next value."""
+_MOST_VALUES = 1 << 18
+"""Number of values in the surrogates that are made at once, to limit memory."""
 _ITERATIONS = 200
 _SETTLED = 1e-8
 _LAGS = (1, 2, 3, 4)
@@ -294,26 +297,29 @@ class SurrogateTest:
         return self.is_valid and is_lowest and self.margin >= self.least_margin
 
 
-def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
-    """Return one surrogate: the values of the series in a random order that keeps their spectrum.
+def surrogates(series: Reals, rng: np.random.Generator, count: int) -> tuple[Reals, Reals]:
+    """Return surrogates: the values of the series in random orders that keep the spectrum of the series.
 
     Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
-    Returns the surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
+    Returns the surrogates, shape (count, n), and the relative errors of their spectra (root mean square).
     """
     values = np.sort(series)
-    wanted = np.abs(np.fft.rfft(series - series.mean()))
+    wanted = np.abs(fft.rfft(series - series.mean()))
     scale = float(np.sqrt(np.mean(wanted**2)))
-    shuffled = rng.permutation(series)
-    error = np.inf
+    shuffled = np.array([rng.permutation(series) for _ in range(count)])
+    errors, changing = np.full(count, np.inf), np.arange(count)
     for _ in range(_ITERATIONS):
-        spectrum = np.fft.rfft(shuffled - shuffled.mean())
-        before = error
-        error = float(np.sqrt(np.mean((np.abs(spectrum) - wanted) ** 2))) / scale
-        if before - error < _SETTLED:
+        spectra = fft.rfft(shuffled[changing] - series.mean())
+        sizes, before = np.abs(spectra), errors[changing]
+        errors[changing] = np.sqrt(np.mean((sizes - wanted) ** 2, axis=1)) / scale
+        is_changing = before - errors[changing] >= _SETTLED
+        changing, spectra, sizes = changing[is_changing], spectra[is_changing], sizes[is_changing]
+        if not changing.size:
             break
-        turned = np.fft.irfft(wanted * np.exp(1j * np.angle(spectrum)), series.size)
-        shuffled[np.argsort(turned)] = values
-    return shuffled, error
+        turns = np.divide(spectra, sizes, out=np.ones_like(spectra), where=sizes > 0.0)
+        places = np.argsort(fft.irfft(wanted * turns, series.size), axis=1)
+        shuffled[changing[:, np.newaxis], places] = values
+    return shuffled, errors
 
 
 def prediction_error(series: Reals) -> float:
@@ -357,7 +363,7 @@ def surrogate_test(
     seed
         Seed of the surrogates.
     """
-    # Trim the series: a jump between its ends would act like noise in the spectrum.
+    # Trim the series so that its ends match: a jump between the ends would look like noise in the spectrum.
     most = max(1, series.size // 10)
     heads = series[:most]
     tails = series[series.size - most :]
@@ -366,12 +372,13 @@ def surrogate_test(
     gap = np.abs(heads[:, np.newaxis] - tails) + np.abs(slopes_head[:, np.newaxis] - slopes_tail)
     head, tail = np.unravel_index(int(np.argmin(gap)), gap.shape)
     matched = series[int(head) : series.size - most + int(tail) + 1]
-    rng = np.random.default_rng(seed)
-    made = [surrogate(matched, rng) for _ in range(SURROGATES)]
+    rng, together = np.random.default_rng(seed), max(1, _MOST_VALUES // matched.size)
+    counts = [min(together, SURROGATES - first) for first in range(0, SURROGATES, together)]
+    made, errors = zip(*(surrogates(matched, rng, count) for count in counts), strict=True)
     return SurrogateTest(
         statistic=statistic(matched),
-        surrogates=tuple(statistic(each) for each, _ in made),
-        spectrum_error=max(error for _, error in made),
+        surrogates=tuple(statistic(each) for group in made for each in group),
+        spectrum_error=float(np.max(np.concatenate(errors))),
     )
 
 

@@ -5,20 +5,11 @@ from ._branch_lines import (
     branch_lines as branch_lines,
     diagram_of as diagram_of,
 )
-from ._branch_request import (
-    BranchMethod as BranchMethod,
-    BranchRequest as BranchRequest,
-    recorded_level as recorded_level,
-)
 from ._chain_computing import (
     ChainAnswer as ChainAnswer,
     ChainRun as ChainRun,
     chain_answer as chain_answer,
     chain_runs as chain_runs,
-)
-from ._chain_request import (
-    ChainDrive as ChainDrive,
-    ChainRequest as ChainRequest,
 )
 from ._dynamics_file import (
     branch_curves as branch_curves,
@@ -29,22 +20,25 @@ from ._dynamics_file import (
 )
 from ._map_words import (
     MOTION_CLASSES as MOTION_CLASSES,
+    RecordedLevel as RecordedLevel,
     map_caption as map_caption,
     motion_classes as motion_classes,
     motion_words as motion_words,
-)
-from ._recorded_level import (
-    RecordedLevel as RecordedLevel,
+    recorded_level as recorded_level,
     specimen_difference as specimen_difference,
 )
-from ._specimen_choice import (
-    ContactWord as ContactWord,
-    SpecimenChoice as SpecimenChoice,
-)
-from ._spectrum_request import (
+from ._requests import (
+    BranchMethod as BranchMethod,
+    BranchRequest as BranchRequest,
+    ChainDrive as ChainDrive,
+    ChainRequest as ChainRequest,
     ExponentSpectrum as ExponentSpectrum,
     SpectrumPoint as SpectrumPoint,
     SpectrumRequest as SpectrumRequest,
     exponent_spectrum as exponent_spectrum,
     spectrum_points as spectrum_points,
+)
+from ._specimen_choice import (
+    ContactWord as ContactWord,
+    SpecimenChoice as SpecimenChoice,
 )

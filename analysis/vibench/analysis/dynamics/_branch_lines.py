@@ -19,10 +19,10 @@ from vibench.sim.branches import (
     shoot_branches,
 )
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..comparison import Curve, CurveKind, CurveOrigin
 from ..signals.arrays import Reals
 from ..tables import Tabular, columns
-from ._branch_request import BranchMethod, BranchRequest
+from ._requests import BranchMethod, BranchRequest
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LineEvent:
     frequency_hz: float
     amplitude_m: float
     index: int
-    """Index of the last point of the branch before the special point."""
+    """Index of the branch's last point before the special point."""
     response_ii: float
     """Response II of m0 at the special point, interpolated between the neighbouring points."""
 
@@ -87,10 +87,10 @@ class BranchLine(Tabular):
 
     @property
     def motions(self) -> list[dict[str, Any]]:
-        """One dictionary per point, with responses of m0 and of p = y - z."""
+        """One dictionary per point, which contains the responses of m0 and of p = y - z."""
         found = columns(
             self,
-            "frequency_hz amplitude_m is_stable largest_multiplier growth_time_s impacts "
+            "frequency_hz amplitude_m is_stable is_unstable largest_multiplier growth_time_s impacts "
             "response_i=response_i.T.0 response_ii=response_ii.T.0 relative_i=response_i.T.3 "
             "relative_ii=response_ii.T.3 error_estimate state=states",
         )
@@ -103,58 +103,63 @@ class BranchLine(Tabular):
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """Whether all multipliers lie within the unit circle, shape (n,)."""
-        return np.isinf(self.growth_time_s)
+        """Whether all multipliers lie inside the unit circle by more than their error, shape (n,)."""
+        return self._stability > 0
+
+    @property
+    def is_unstable(self) -> NDArray[np.bool_]:
+        """Whether a multiplier lies outside the unit circle by more than its error, shape (n,)."""
+        return self._stability < 0
+
+    @property
+    def _stability(self) -> NDArray[np.int64]:
+        """1 if stable, -1 if unstable, 0 if undecided, as without damping; shape (n,)."""
+        inside = 1.0 - self.largest_multiplier
+        is_clear = np.abs(inside) > np.where(self.impacts, np.fmax(self.error_estimate, 1e-9), 1e-9)
+        return np.where(is_clear, np.sign(inside), 0.0).astype(np.int64)
 
     @property
     def growth_time_s(self) -> Reals:
-        """Time in which a small deviation grows by a factor e; infinite if stable, shape (n,)."""
+        """Time in which a small deviation grows by a factor e; infinite if it does not grow, shape (n,)."""
         return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
     def axis_values(self, parameter: Parameter) -> Reals:
         """Return the values of the varied parameter: frequencies [Hz] or amplitudes [m]."""
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
-    def pieces(self) -> Iterator[tuple[bool, slice]]:
-        """Yield the stable and unstable stretches of the branch; neighbouring stretches share a point."""
-        is_stable = self.is_stable[1:] & self.is_stable[:-1]
-        edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
+    def pieces(self) -> Iterator[tuple[CurveOrigin, slice]]:
+        """Yield the stable, undecided and unstable stretches; neighbouring stretches share a point."""
+        stability = np.minimum(self._stability[1:], self._stability[:-1])
+        edges = [0, *(np.flatnonzero(np.diff(stability)) + 1).tolist(), self.points - 1]
         for first, last in pairwise(edges):
             if last > first:
-                yield bool(is_stable[first]), slice(first, last + 1)
+                yield _ORIGINS[stability[first]], slice(first, last + 1)
+
+
+_ORIGINS = (CurveOrigin.UNDECIDED, CurveOrigin.STABLE, CurveOrigin.UNSTABLE)
+"""Origins of curves by stability: 0, 1, -1."""
 
 
 def line_of(found: FoundBranch) -> BranchLine:
     """Convert a computed branch to a `BranchLine`."""
     branch = found.branch
     return BranchLine(
-        frequency_hz=branch.frequencies_hz,
-        amplitude_m=branch.amplitudes_m,
-        response_i=branch.response_i,
-        response_ii=branch.response_ii,
-        states=branch.states,
+        **columns(
+            branch,
+            "frequency_hz=frequencies_hz amplitude_m=amplitudes_m response_i response_ii states "
+            "impacts=contacts error_estimate=left_out end=end.value",
+        ),
+        **columns(found, "periods shape=shape.value has_twin is_isolated origin=origin.value elapsed_s"),
         multiplier_real=branch.multipliers.real.copy(),
         multiplier_imaginary=branch.multipliers.imag.copy(),
-        impacts=branch.contacts,
-        error_estimate=branch.left_out,
         events=tuple(
             LineEvent(
-                each.kind.value,
-                each.frequency_hz,
-                each.amplitude_m,
-                each.index,
-                _response_at(found, each.index, each.parameter(branch.parameter)),
+                **columns(each, "kind=kind.value frequency_hz amplitude_m index"),
+                response_ii=_response_at(found, each.index, each.parameter(branch.parameter)),
             )
             for each in branch.events
         ),
-        periods=found.periods,
-        shape=found.shape.value,
-        has_twin=found.has_twin,
-        is_isolated=found.is_isolated,
-        origin=found.origin.value,
         begin="the search started here" if branch.begin is None else branch.begin.value,
-        end=branch.end.value,
-        elapsed_s=found.elapsed_s,
     )
 
 
@@ -171,7 +176,7 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
 
 _MORE_EXACT = {
     BranchMethod.SHOOTING: "More time does not reduce the errors of shooting.",
-    BranchMethod.BALANCE: "The others need more harmonics (--harmonics), or the method 'shooting'.",
+    BranchMethod.BALANCE: "The other motions need more harmonics (--harmonics), or the method 'shooting'.",
 }
 
 
@@ -203,10 +208,17 @@ class BranchDiagram(Tabular):
 
     @property
     def cost_sentence(self) -> str:
-        """Return a sentence on number, error and computing time of the branches."""
+        """Return a sentence on the number, the error and the computing time of the branches."""
         over = "" if self.is_complete else " The time limit was reached: more branches may exist."
         if not self.lines:
-            return f"{self._none_found}; {self.elapsed_s:.1f} s.{over}"
+            none = "No periodic motion was found"
+            if self.request.method is not BranchMethod.SHOOTING:
+                none = (
+                    f"Harmonic balance with at most {self.request.balance_options.most} harmonics found no "
+                    "motion. Either no motion has the drive's period, or more harmonics are needed, as with "
+                    "impacts; use the method 'shooting'"
+                )
+            return f"{none}; {self.elapsed_s:.1f} s.{over}"
         isolated = sum(line.is_isolated for line in self.lines)
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
         wanted, reached = self.request.error, ""
@@ -223,18 +235,8 @@ class BranchDiagram(Tabular):
         )
 
     @property
-    def _none_found(self) -> str:
-        if self.request.method is BranchMethod.SHOOTING:
-            return "No periodic motion was found"
-        harmonics = self.request.balance_options.most
-        return (
-            f"Harmonic balance with at most {harmonics} harmonics found no motion. Either no motion has the "
-            "drive's period, or more harmonics are needed, as with impacts; use the method 'shooting'"
-        )
-
-    @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
-        """Whether the bench can hold each motion, one array per branch; None if no loop time is given."""
+        """Flags of motions that the bench can hold, one array per branch; None if no loop time is given."""
         least_s = self.least_growth_time_s
         return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 
@@ -244,7 +246,7 @@ class BranchDiagram(Tabular):
         holdable = self.holdable
         if not holdable:
             return ""
-        is_unstable = [~line.is_stable for line in self.lines]
+        is_unstable = [line.is_unstable for line in self.lines]
         count = sum(int(each.sum()) for each in is_unstable)
         held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
@@ -252,7 +254,7 @@ class BranchDiagram(Tabular):
             f"A control loop with {self.request.loop_time_s:.3g} s delay can hold motions whose deviations "
             f"take {self.least_growth_time_s:.3g} s or more to grow e-fold: {held} of {count} unstable ones"
         )
-        return text + (f"; the fastest growth takes {quickest:.2g} s." if count else ".")
+        return text + (f"; the fastest e-fold growth takes {quickest:.2g} s." if count else ".")
 
     @property
     def least_growth_time_s(self) -> float | None:
@@ -261,13 +263,13 @@ class BranchDiagram(Tabular):
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return curves of Responses I and II of m0, stable and unstable; none if the amplitude varies."""
+        """Return curves of Responses I and II of m0 by stability; none if the amplitude varies."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []
-        for origin in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE):
+        for origin in _ORIGINS:
             for kind, name in ((CurveKind.RESPONSE_I, "response_i"), (CurveKind.RESPONSE_II, "response_ii")):
-                frequency_hz, size = self._join(name, is_stable=origin is CurveOrigin.STABLE)
+                frequency_hz, size = self._join(name, origin)
                 if frequency_hz.size:
                     unknown = np.full(frequency_hz.shape, np.nan)
                     note = self.cost_sentence
@@ -275,17 +277,13 @@ class BranchDiagram(Tabular):
                     found.append(Curve(source, origin, kind, frequency_hz, size, unknown, note))
         return tuple(found)
 
-    def _join(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
-        """Join all stable (or all unstable) stretches into one curve, separated by NaN."""
-        places: list[Reals] = []
-        sizes: list[Reals] = []
-        for line in self.lines:
-            for stable, piece in line.pieces():
-                if stable is is_stable:
-                    places += [line.frequency_hz[piece], line.frequency_hz[piece][-1:]]
-                    sizes += [getattr(line, name)[piece, 0], np.array([np.nan])]
-        if not places:
+    def _join(self, name: str, origin: CurveOrigin) -> tuple[Reals, Reals]:
+        """Join all stretches of the same stability into one curve, with NaN between the stretches."""
+        found = [(line, piece) for line in self.lines for sort, piece in line.pieces() if sort is origin]
+        if not found:
             return np.zeros(0), np.zeros(0)
+        places = [np.append(line.frequency_hz[piece], line.frequency_hz[piece][-1]) for line, piece in found]
+        sizes = [np.append(getattr(line, name)[piece, 0], np.nan) for line, piece in found]
         return np.concatenate(places)[:-1], np.concatenate(sizes)[:-1]
 
 

@@ -31,21 +31,21 @@ from vibench.sim.chain import (
 from ..errors import InvalidRequest
 from ..frequency_response.transmissibility import transmissibility
 from ..overlay.simulated_channels import recorded_base_motion
-from ..recordings.facts import plan_of, require_intact, require_measured_size
-from ..signals.arrays import Reals
+from ..recordings.channels import BASE
+from ..recordings.facts import plan_of, require_intact, require_measured_size, require_usable
+from ..signals.arrays import PER_NEPER_DB, Reals
 from ..tables import Tabular
-from ._chain_request import ChainDrive, ChainRequest
+from ._requests import ChainDrive, ChainRequest
 
 WAVES = 61
 """Number of wave numbers from 0 to pi at which bands are computed."""
 LINES = 800
-"""Number of frequencies for the transmissibility without contact."""
+"""Number of frequencies at which the transmissibility without contact is computed."""
 MOST_SHOWN = 4
-"""Maximum number of cells to draw if there is only one chain."""
+"""Maximum number of cells that are drawn if there is only one chain."""
 ABOVE_BANDS = 1.15
 """Highest frequency of results without contact, relative to the upper edge of the highest band."""
 REACHED = Outcome.REACHED_END.text
-DECIBELS = 20.0 / math.log(10.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -53,9 +53,9 @@ class ChainRun(Tabular):
     """Results of one chain with one drive; arrays have one value per cell, starting at the base."""
 
     DOCUMENT: ClassVar = (
-        "cells frequency_hz over_hz transmission transmission_error target impacts observed_s energy_j "
-        "energy_error_j outcome elapsed_s largest_p_m=largest_m lyapunov_per_s=exponent_per_s "
-        "lyapunov_error_per_s=exponent_error_per_s"
+        "cells frequency_hz over_hz transmission transmission_error transmission_change target impacts "
+        "observed_s energy_j energy_error_j outcome elapsed_s largest_p_m=largest_m "
+        "lyapunov_per_s=exponent_per_s lyapunov_error_per_s=exponent_error_per_s"
     )
 
     cells: int
@@ -66,9 +66,11 @@ class ChainRun(Tabular):
     transmission: Reals
     """Amplitude of m0's displacement x over the base amplitude at each frequency, shape (m, cells)."""
     transmission_error: Reals
-    """Relative error of the transmission, shape (cells,); NaN if no error or time was requested."""
+    """Relative error of the transmission, shape (cells,); NaN if neither error nor time was requested."""
+    transmission_change: Reals
+    """Relative change of the transmission after the observation, shape (cells,); NaN except for sines."""
     target: TargetReport | None = None
-    """Requested and reached error and computing time; None if none was requested."""
+    """Target values and reached values of error and computing time; None without targets."""
     largest_m: Reals
     """Largest |p| = |y - z| of every cell during the observation, shape (cells,)."""
     impacts: NDArray[np.int64]
@@ -109,7 +111,7 @@ class ChainAnswer(Tabular):
 
     @cached_property
     def gaps(self) -> tuple[BandGap, ...]:
-        """Band gaps of the infinite chain without damping and contact."""
+        """Band gaps of the infinite chain without damping and without contact."""
         return band_gaps(self.request.unit)
 
     @property
@@ -145,11 +147,11 @@ class ChainAnswer(Tabular):
     @cached_property
     def attenuation_db(self) -> Reals:
         """Attenuation per unit of the infinite damped chain, at `linear_hz` [dB]."""
-        return np.asarray(-DECIBELS * np.log(np.abs(bloch_factor(self.request.unit, self.linear_hz))))
+        return np.asarray(-PER_NEPER_DB * np.log(np.abs(bloch_factor(self.request.unit, self.linear_hz))))
 
     @property
     def shown_cells(self) -> tuple[tuple[int, int, str], ...]:
-        """Chain length, index and name of cells to draw: each chain's last, or several of a single chain."""
+        """Chain length, index and name of the cells to draw: each chain's last, or several of one chain."""
         lengths = self.request.lengths
         if len(lengths) > 1:
             return tuple((cells, cells - 1, f"{count_text(cells, 'cell')}: last") for cells in lengths)
@@ -185,7 +187,7 @@ class ChainAnswer(Tabular):
         impacts = sum(int(run.impacts.sum()) for run in self.runs)
         lost = sum(run.outcome != REACHED for run in self.runs)
         complaint = f"; {count_text(lost, 'run')} ended early" if lost else ""
-        exactly = f"; each contact exact to {self.request.accuracy.promise:g} times 100 µm or 0.1 m/s"
+        exactly = f"; error per contact {self.request.accuracy.promise:g}, in units of 100 µm and 0.1 m/s"
         if self.request.error is not None:
             met = sum(bool(np.all(run.transmission_error <= self.request.error)) for run in self.runs)
             exactly = f"; {met} runs reached an error of {100.0 * self.request.error:g} %"
@@ -196,7 +198,7 @@ class ChainAnswer(Tabular):
 
 
 SAMPLES_PER_PERIOD = 8
-"""Samples per period of the highest relevant frequency, enough for mean energies."""
+"""Number of samples per period of the highest relevant frequency, enough for mean energies."""
 MOST_NUMBERS = 3e7
 """Maximum number of values stored for a run; they take 0.25 GB."""
 SHOWN_PERIODS = 16
@@ -204,13 +206,15 @@ STRETCHES = 400
 """Maximum number of equal parts of a sweep or recording; the RMS of each part is shown."""
 ENERGY_S, ENERGY_SHARE = 0.5, 0.25
 """Averaging time [s] of energies under a steady sine, after the responses were observed. If an error or a
-time was requested, the averaging time is at most `ENERGY_SHARE` of the time simulated until then."""
+time was requested, the averaging time is at most `ENERGY_SHARE` of the time simulated before averaging."""
 SWEEP_PARTS = 120
-"""Maximum number of frequencies of a swept transmission, each over `FEWEST_PERIODS` drive periods or more."""
+"""Maximum number of parts of a swept transmission; a part has at least `FEWEST_PERIODS` drive periods."""
 FEWEST_PERIODS = 12
 SEGMENTS = 8
 """Number of segments averaged for the transmission with a recorded motion."""
 X, VX = 0, 3
+LEAST = 1e-9
+"""Transmission below which changes are attributed to rounding errors."""
 
 
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
@@ -283,7 +287,9 @@ def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRu
             chain, drive, duration_s=request.exponent_s, settle_s=whole_s - observed_s
         )
         exponent, error = growth.exponent_per_s, growth.standard_error_per_s
-    base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.frequency_hz * run.time_s + drive.phase_rad)
+    turns = drive.frequency_hz * run.time_s + drive.phase_rad / (2.0 * np.pi)
+    base = drive.amplitude_m * np.sin(2.0 * np.pi * turns)
+    after = _component(run.states[:, :, X], turns) / drive.amplitude_m
     shown = run.time_s >= run.end_time_s - SHOWN_PERIODS / drive.frequency_hz
     energy, energy_error = mean_energies(chain, run.states, base)
     struck = run.impacts.times_s >= run.time_s[shown][0] if shown.any() else np.zeros(0, np.bool_)
@@ -291,6 +297,7 @@ def _run_steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRu
         _bare_run(chain, run.outcome, found.impacts, observed_s, drive.frequency_hz),
         transmission=found.response_ii[None, :, X],
         transmission_error=relative_error,
+        transmission_change=np.abs(after / np.maximum(found.response_ii[:, X], LEAST) - 1.0),
         target=target,
         largest_m=found.largest_m[:, -1],
         energy_j=energy,
@@ -318,7 +325,7 @@ def _run_sweep(chain: Chain, request: ChainRequest, drive: LinearSweep) -> Chain
 
 def _run_under_recording(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
-    # Sample the response at the times of the base samples, as the estimator requires.
+    # The estimator needs response and base at the same times.
     run = integrate_chain(
         chain, drive, duration_s, request.accuracy, sample_rate_hz=_require_rate(rate, chain, duration_s)
     )
@@ -351,6 +358,7 @@ def _bare_run(
         over_hz=np.array([frequency_hz]),
         transmission=unknown[None, :],
         transmission_error=unknown,
+        transmission_change=unknown,
         largest_m=unknown,
         impacts=impacts,
         observed_s=observed_s,
@@ -385,18 +393,21 @@ def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, 
 
 
 def _component_over_time(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
-    """Return drive frequencies with the relative amplitude at each, from Hann-weighted parts of the sweep."""
+    """Return drive frequencies and the relative amplitude at each, from Hann-weighted parts of the sweep."""
     lowest_hz = min(drive.start_hz, drive.stop_hz)
     parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
-    turning = np.exp(-2j * np.pi * drive.turns(run.time_s))
-    over_hz, ratio = [], []
-    for each in np.array_split(np.arange(len(run.time_s)), parts):
-        taper = np.hanning(len(each) + 2)[1:-1]
-        line = 2.0 * (taper * turning[each]) @ run.states[each, :, X] / taper.sum()
-        over_hz.append(float(drive.frequency_hz(run.time_s[each]).mean()))
-        ratio.append(np.abs(line) / drive.amplitude_m)
+    pieces = np.array_split(np.arange(len(run.time_s)), parts)
+    over_hz = np.array([drive.frequency_hz(run.time_s[each]).mean() for each in pieces])
+    turns = drive.turns(run.time_s)
+    lines = np.array([_component(run.states[each, :, X], turns[each]) for each in pieces])
     order = np.argsort(over_hz)
-    return np.array(over_hz)[order], np.array(ratio)[order]
+    return over_hz[order], lines[order] / drive.amplitude_m
+
+
+def _component(motion_m: Reals, turns: Reals) -> Reals:
+    """Return each column's Hann-weighted amplitude at the drive frequency; ``turns`` is the phase per row."""
+    taper = np.hanning(len(turns) + 2)[1:-1]
+    return np.asarray(2.0 * np.abs((taper * np.exp(-2j * np.pi * turns)) @ motion_m) / taper.sum())
 
 
 def _base_of(request: ChainRequest) -> Sampled:
@@ -405,6 +416,7 @@ def _base_of(request: ChainRequest) -> Sampled:
     with open_recording(path) as recording:
         require_measured_size(recording)
         require_intact(recording)
+        require_usable(recording, BASE)
         return Sampled(recorded_base_motion(recording, plan_of(recording)), recording.sample_rate_hz)
 
 

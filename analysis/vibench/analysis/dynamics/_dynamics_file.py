@@ -9,18 +9,16 @@ from typing import Any
 import h5py
 import numpy as np
 
-from vibench.sim.hdf5_files.door import UNREADABLE, open_hdf5
-from vibench.sim.hdf5_files.writing import open_hdf5_to_write
+from vibench.sim.hdf5_files import UNREADABLE, open_hdf5, open_hdf5_to_write
 from vibench.sim.study import software
 
-from ..comparison.curve import Curve
+from ..comparison import Curve
 from ..errors import InvalidRequest
 from ..exchange import new_file
 from ..tables import unit_of
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent
-from ._branch_request import BranchRequest
 from ._chain_computing import ChainAnswer
-from ._spectrum_request import ExponentSpectrum
+from ._requests import BranchRequest, ExponentSpectrum, SpectrumPoint
 
 BRANCHES_FORMAT, SPECTRUM_FORMAT = "vibench branches", "vibench spectrum"
 CHAIN_FORMAT = "vibench chain"
@@ -38,23 +36,18 @@ _COLUMNS = (
 )
 """Columns of a branch; each column is an HDF5 dataset."""
 _WIDTHS = {"response_i": 4, "response_ii": 4, "states": 6, "multiplier_real": 6, "multiplier_imaginary": 6}
-"""Numbers per row, for columns with several numbers per row."""
+"""How many numbers each row has, for columns with several numbers per row."""
 _WORDS = "periods shape has_twin is_isolated origin begin end elapsed_s"
 """Fields of a branch that are stored as attributes."""
 _EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
-_SPECTRUM_COLUMNS = (
-    "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
-    "dimension_low dimension_high impact_rate_hz blocks observed_s elapsed_s"
-)
-_SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
 _CHAIN_COLUMNS = (
-    "over_hz transmission largest_m impacts energy_j energy_error_j transmission_error time_s motion_m "
-    "impact_time_s impact_cell"
+    "over_hz transmission largest_m impacts energy_j energy_error_j transmission_error transmission_change "
+    "time_s motion_m impact_time_s impact_cell"
 )
 """Results of a run of a chain; each result is a dataset."""
 _RUN_WORDS = "cells frequency_hz observed_s exponent_per_s exponent_error_per_s outcome elapsed_s"
 _LINEAR_COLUMNS = "wave_numbers bands_hz gaps linear_hz attenuation_db"
-"""Results for the infinite chain without contact."""
+"""Results for the infinite chain without contact; each result is a dataset."""
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
@@ -66,7 +59,8 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
         for number, line in enumerate(diagram.lines):
             group = file.create_group(f"branch_{number:03d}")
             _write(group, line, _WORDS, _COLUMNS)
-            group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
+            for name in ("is_stable", "is_unstable"):
+                group.create_dataset(name, data=getattr(line, name).astype(np.int8))
             events = group.create_group("events")
             for name in _EVENT_COLUMNS:
                 events.create_dataset(name, data=np.array([getattr(each, name) for each in line.events]))
@@ -137,11 +131,12 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
     Raises InvalidRequest when the file exists or cannot be written.
     """
     with _new_file(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
-        for name in _SPECTRUM_COLUMNS.split():
-            _write_column(file, name, found.column(name))
-        for name in _SPECTRUM_WORDS:
-            words = [getattr(each, name) for each in found.points]
-            file.create_dataset(name, data=words, dtype=h5py.string_dtype("utf-8"))
+        for name, kind in ((each.name, each.type) for each in fields(SpectrumPoint)):
+            if kind is str:
+                words = [getattr(each, name) for each in found.points]
+                file.create_dataset(name, data=words, dtype=h5py.string_dtype("utf-8"))
+            else:
+                _write_column(file, name, found.column(name))
     return path
 
 

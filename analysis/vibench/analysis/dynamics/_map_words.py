@@ -1,10 +1,15 @@
-"""Texts of a map: classes and names of motions, and a caption."""
+"""Texts of a map: classes and names of motions, a caption, and the comparison with recorded levels."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from vibench.sim import MotionKind, SpecimenTable, count_text, shipped_specimens, usual_specimen
+from vibench.sim import MotionKind, Specimen, SpecimenTable, count_text, shipped_specimens, usual_specimen
 from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
+from ..comparison import Curve
+from ..errors import NotEnoughData
 from ..signals.arrays import Reals
 
 MOTION_CLASSES = (
@@ -29,7 +34,7 @@ def motion_classes(results: MapResults) -> Reals:
     Returns
     -------
     ndarray
-        The shape of the grid of varied parameters.
+        Array with the shape of the grid of varied parameters.
     """
     motion, period, impacts = (results.map_values(name) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)
@@ -44,19 +49,19 @@ def motion_classes(results: MapResults) -> Reals:
 
 
 def motion_words(results: MapResults, motion: MapMotion) -> str:
-    """Return a motion's name and the fraction of points with this motion; an estimate has an interval."""
+    """Return a motion's name and the fraction of points with this motion; add an interval to an estimate."""
     kind = motion.motion.removesuffix(" so far") if motion.period is None else f"period {motion.period}"
     kind = kind if motion.has_impacts else "no impacts"
     text = f"{kind}, Response I {motion.response_i:.3g}: {motion.share.share:.2%} of the points"
     interval = f"{motion.share.low:.2%} to {motion.share.high:.2%}"
     if results.plan.random_starts:
-        return f"{text}; with other random initial states {interval}"
+        return f"{text}; with other random initial states, it would be {interval}"
     is_estimate = results.audit is not None and results.audit.filled > 0
-    return f"{text}; if all points were computed {interval}" if is_estimate else text
+    return f"{text}; if all points were computed, it would be {interval}" if is_estimate else text
 
 
 def map_caption(results: MapResults) -> str:
-    """Return the caption: specimen, computed points, filled points and their error rate."""
+    """Return the caption: specimen, computed points, filled points and the error rate of filled points."""
     plan = results.plan
     starts = count_text(len(plan.start_labels), "initial state")
     sentences = [
@@ -71,14 +76,14 @@ def map_caption(results: MapResults) -> str:
         share = audit.wrong_share
         sentences.append(
             "The other points were filled in, because their neighbours agree. To check this, "
-            f"{audit.audited} of them were drawn at random and computed: {audit.wrong} had a different motion"
-            f" ({share.low:.1%} to {share.high:.1%} of the filled points)."
+            f"{audit.audited} of these points were drawn at random and computed: {audit.wrong} had a "
+            f"different motion ({share.low:.1%} to {share.high:.1%} of the filled points)."
         )
     return " ".join((*sentences, results.target_text(plan.error))).rstrip()
 
 
 def _specimen_words(specimen: SpecimenTable) -> str:
-    """Return a specimen's name, and how it differs from the shipped one of that name, or else the paper's."""
+    """Return a specimen's name and changes from the shipped specimen of that name or from the paper's."""
     shipped = shipped_specimens().get(specimen.name) or usual_specimen()
     changed = [
         f"{key} = {value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
@@ -107,3 +112,77 @@ def value_words(value: object) -> str:
             return f"{value:g}"
         case _:
             return str(value)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLevel:
+    """Measured base amplitude and Response I of a recording over frequency."""
+
+    name: str
+    pairs: Sequence[tuple[float, float]]
+    """Frequency [Hz] and base amplitude [m]."""
+    measured: Sequence[Curve]
+    """Curves of Response I of m0."""
+    specimen: Specimen | None = None
+    """Specimen stored in the recording; None if the recording describes none."""
+
+    def difference(self, simulated: Specimen) -> str:
+        """Return how a simulated specimen differs from the recorded one; see `specimen_difference`."""
+        return specimen_difference(simulated, self.specimen, self.name)
+
+
+def specimen_difference(simulated: Specimen, recorded: Specimen | None, name: str) -> str:
+    """Return a sentence on how a simulated specimen differs from the recorded one; empty if they are equal.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    """
+    if recorded is None:
+        return f"{name} describes no specimen, so the simulated specimen could not be compared with it."
+    pairs = zip(_properties(simulated), _properties(recorded), strict=True)
+    changed = "; ".join(f"{ours} instead of {theirs}" for ours, theirs in pairs if ours != theirs)
+    return f"The simulated specimen is not the one described in {name}: {changed}." if changed else ""
+
+
+def _properties(specimen: Specimen) -> tuple[str, ...]:
+    """Return the properties of a specimen in words; the order of the properties is always the same."""
+    law = ", ".join(f"{name} {value_words(value)}" for name, value in asdict(specimen.contact).items())
+    return (
+        f"masses {value_words(specimen.masses)} kg",
+        f"stiffnesses {value_words(specimen.stiffnesses)} N/m",
+        f"dampings {value_words(specimen.dampings)} N s/m",
+        f"gaps {value_words(specimen.gaps_m)} m",
+        f"contact {law}",
+    )
+
+
+MOST_BINS = 100
+
+
+def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple[float, float], ...]:
+    """Return up to 100 pairs of frequency [Hz] and base amplitude [m] of a sweep or stepped sine, ascending.
+
+    Raises NotEnoughData when the drive had fewer than two frequencies.
+
+    Parameters
+    ----------
+    frequency_hz, drive_amplitude_m
+        Measured values in any order, shape (n,). The median of each bin is used, so that one outlier has no
+        effect.
+    """
+    known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
+    place, level = frequency_hz[known], drive_amplitude_m[known]
+    if place.size < 2 or np.ptp(place) < 1e-3 * float(place.max()):
+        raise NotEnoughData(
+            "the drive of this recording covers no range of frequencies; choose a stepped sine or a sweep"
+        )
+    bins = min(MOST_BINS, place.size)
+    edges = np.linspace(place.min(), place.max(), bins + 1)
+    owner = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, bins - 1)
+    return tuple(
+        (float(np.median(place[owner == k])), float(np.median(level[owner == k])))
+        for k in range(bins)
+        if bool(np.any(owner == k))
+    )

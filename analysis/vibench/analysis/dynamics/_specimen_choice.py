@@ -45,7 +45,7 @@ class SpecimenChoice(FrozenModel):
 
     @model_validator(mode="after")
     def _is_a_specimen(self) -> Self:
-        """Read the description; report an invalid specimen at the field that causes the error."""
+        """Read the specimen's description; report an invalid specimen at the field that causes the error."""
         found = self.described
         if found is None:
             try:

@@ -5,6 +5,8 @@ from ._crate import (
 from ._excerpt import (
     Excerpt as Excerpt,
     excerpt as excerpt,
+    sep005 as sep005,
+    xarray_dataset as xarray_dataset,
 )
 from ._export import (
     Format as Format,
@@ -16,10 +18,6 @@ from ._export import (
 )
 from ._import_recording import (
     import_recording as import_recording,
-)
-from ._labelled import (
-    sep005 as sep005,
-    xarray_dataset as xarray_dataset,
 )
 from ._mapping import (
     ImportMapping as ImportMapping,

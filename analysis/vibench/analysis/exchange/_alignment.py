@@ -31,11 +31,11 @@ class Piece:
 
     @property
     def end(self) -> int:
-        """Time one interval after the stretch's last sample, in sample intervals since the start."""
+        """Time one interval after the stretch's last sample, in intervals since the channel's start."""
         return self.place + self.samples
 
     def span(self, first: int, stop: int) -> range:
-        """Return the times of the stretch's samples from ``first`` to ``stop`` of the file; may be empty."""
+        """Return the times of the stretch's samples between ``first`` and ``stop`` in the file, if any."""
         shift = self.place - self.first
         return range(max(self.place, first + shift), min(self.end, stop + shift))
 
@@ -52,7 +52,7 @@ def pieces(channel: SourceChannel) -> tuple[Piece, ...]:
         back = max(0, end - place)
         if back > _MOST_REPEATED:
             raise InvalidRequest(
-                f"the times of {channel.title} go back by {back} samples at its sample {first}, as if two "
+                f"the times of {channel.title} go back by {back} samples at sample {first}, as if two "
                 'records were joined; export each record alone, or give time = "even" to ignore the times'
             )
         while back and kept and kept[-1].end > place:
@@ -79,11 +79,11 @@ class Alignment:
     pieces: tuple[tuple[Piece, ...], ...]
     """Evenly sampled stretches of each channel."""
     late_s: tuple[float, ...]
-    """Delay of each channel that remains after rounding to whole intervals; at most half an interval."""
+    """Delay that remains for each channel after rounding to whole intervals; at most half an interval."""
     errors_s: tuple[float, ...]
     """Largest error of each channel's start relative to the other channels, from the digits of the times."""
     remarks: tuple[str, ...]
-    """Remarks on the times in the file, and on times that the mapping replaces."""
+    """Remarks on the times in the file, and on those times that the mapping replaces."""
     is_contradicted: bool
     """Whether the file's times, which the mapping replaces, show another sample rate or lost samples."""
 
@@ -120,7 +120,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
         raise InvalidRequest(f"the channels of {path.name} do not overlap in time; choose channels that do")
     for each, offset, own, error_s in zip(placed, offsets, cut, errors_s, strict=True):
         if offset:
-            known = f", known to {error_s:.1g} s" if error_s else ""
+            known = f", known to within {error_s:.1g} s" if error_s else ""
             remarks[f"{each.title} starts {offset / rate_hz:.6g} s after the first channel{known}"] = None
         if len(own) > 1 or own[-1].end - own[0].place != each.samples:
             missing = own[-1].end - own[0].place - sum(one.samples for one in own)
@@ -215,8 +215,8 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
             rate_text = f"about {(low + high) / 2:.5g}" if each.sample_rate_hz is None else f"{low:.9g}"
             way = "export the file again" if each.sample_rate_hz is None else "leave its sample_rate_hz out"
             raise InvalidRequest(
-                f"{path.name} states {rate_text} samples/s, but the mapping {rate:.9g}; correct the mapping, "
-                f"or {way}{_or_ignore(channels)}"
+                f"{path.name} states {rate_text} samples/s, but the mapping states {rate:.9g}; correct the "
+                f"mapping, or {way}{_or_ignore(channels)}"
             )
         highest_hz = mapping.measurement.excitation.band_hz[1]
         if each.time_unit == "" and 2 * highest_hz > rate:
@@ -227,7 +227,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
     if not _same(rates_hz, longest):
         raise InvalidRequest(
             f"{path.name} states {rates_hz[0]:.9g} and {rates_hz[-1]:.9g} samples/s for different channels, "
-            f"which drift apart; export them with one clock{_or_ignore(channels)}"
+            f"whose times drift apart; export the channels with one clock{_or_ignore(channels)}"
         )
     return rate
 
@@ -240,7 +240,7 @@ def _same(rates_hz: Sequence[float], samples: int) -> bool:
 
 
 def _require_one_shift(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> None:
-    """Raise InvalidRequest if channels state different delays or starts whose meaning is unclear."""
+    """Raise InvalidRequest if channels differ in facts that may shift their times in an unknown way."""
     both = zip(channels, mapping.channels, strict=True)
     unclear = [each for each, mapped in both if "delay_s" not in mapped.model_fields_set]
     for first, each in pairwise(unclear):
@@ -256,25 +256,25 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     """Return the start of each channel relative to the earliest channel, in sample intervals."""
     known = {each.start_s: each for each in channels if each.start_s is not None}
     unknown = [each.name for each in channels if each.start_s is None]
-    # Channels without a stated start begin at zero, if the other channels begin there too.
+    # If all stated starts are zero, channels without a stated start also begin at zero.
     stated = (*known, 0.0) if unknown else tuple(known)
     if not known or (max(stated) - min(stated)) * rate_hz < _APART / 100:
         return [0.0 for _ in channels]
     if unknown:
         raise InvalidRequest(
             f"{path.name} states the start of some channels, but not of {', '.join(unknown)}; choose "
-            f"only channels with a stated start, or only the others{_or_ignore(channels)}"
+            f"only channels with a stated start, or only channels without one{_or_ignore(channels)}"
         )
     offsets = [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]
     error_s = max(np.spacing(max(map(abs, known))), *(each.start_error_s for each in channels))
     if error_s * rate_hz > _APART and not _are_whole(offsets):
         raise InvalidRequest(
-            f"the channels of {path.name} start at different times, stated with too few digits to align "
-            f"them; export them with the same start{_or_ignore(channels)}"
+            f"the channels of {path.name} start at different times, which the file states with too few "
+            f"digits for alignment; export the channels with the same start{_or_ignore(channels)}"
         )
     return offsets
 
 
 def _are_whole(offsets: Sequence[float]) -> bool:
-    """Return whether channels are whole samples apart, as with one clock, so that few digits suffice."""
+    """Return whether channels start whole samples apart, as with one clock; few digits then suffice."""
     return all(abs(each - round(each)) < _APART / 100 for each in offsets)

@@ -61,7 +61,7 @@ def pack_folder(
     folder
         Folder of recordings with journals, reports and tables; it is not changed.
     crate
-        The new zip file; an existing file is not overwritten.
+        The new zip file; an existing file is never overwritten.
     facts
         Licence, authors and their organisation, title.
     untrusted
@@ -84,8 +84,8 @@ def pack_folder(
     outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
     if outside:
         raise InvalidRequest(
-            f"{outside[0]} is a link to {outside[0].resolve()}, outside of the folder; its target would "
-            "also be published, so nothing was packed. Replace the link by a copy of the file, or remove it"
+            f"{outside[0]} is a link to {outside[0].resolve()}, outside of the folder; its target would also "
+            "be published, so nothing was packed. Replace the link by a copy of the file, or remove the link"
         )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
@@ -113,7 +113,7 @@ def _require_addresses(facts: CrateFacts) -> None:
     if facts.organisation_url and not facts.organisation:
         raise InvalidRequest(
             f"{facts.organisation_url} was given without the name of the organisation; nothing was packed. "
-            "Give its name too"
+            "Give this name too"
         )
     if facts.organisation_url and not facts.organisation_url.startswith(_SCHEMES):
         raise InvalidRequest(
@@ -164,7 +164,7 @@ def _about(
 
 
 def _single_or_list(entities: list[Entity]) -> list[Entity] | Entity:
-    """Return a single entity itself instead of a list, as RO-Crate 1.1 recommends (compacted JSON-LD)."""
+    """Return a list of one entity as that entity alone, as RO-Crate 1.1 recommends (compacted JSON-LD)."""
     return entities[0] if len(entities) == 1 else entities
 
 

@@ -28,7 +28,7 @@ _MONTHS = {name: 1 + place % 12 for place, name in enumerate(_NAMES.split())}
 _DATE = r"(?P<date>\d{1,4}(?P<sign>[-/.])(?:\d\d?|[A-Za-z\u00e4]{3,9})(?P=sign)\d{2,4})"
 _TIME = (
     r"(?:(?P<hour>\d{1,3}):)?(?P<minute>\d\d?):(?P<second>\d\d)(?P<part>[.,]\d+|:\d{3})?"
-    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?:Z|[+-]\d\d:?\d\d)?"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?:Z|(?P<zone>[+-]\d\d:?\d\d))?"
 )
 _ALONE = _TIME.replace("?P<", "?P<only_")
 _CLOCK = re.compile(rf"(?<![\w:.,/-])(?:{_DATE}(?:[T ]{_TIME})?|{_ALONE})(?![\w:/-])")
@@ -49,8 +49,9 @@ class ClockTimes:
         return _CLOCK.sub(self._number, text)
 
     def _number(self, found: re.Match[str]) -> str:
-        hour, minute, second, part, half = (
-            found[name] or found[f"only_{name}"] for name in ("hour", "minute", "second", "part", "half")
+        hour, minute, second, part, half, zone = (
+            found[name] or found[f"only_{name}"]
+            for name in ("hour", "minute", "second", "part", "half", "zone")
         )
         is_known = not found["date"] or self._turns_to(found["date"])
         if not is_known or (minute and not hour and not part):
@@ -59,6 +60,8 @@ class ClockTimes:
             return str(self._day)
         hours = int(hour or 0) if half is None else int(hour or 0) % 12 + 12 * (half in "Pp")
         clock_s = 60.0 * (60 * hours + int(minute)) + float(f"{second}.{(part or '.')[1:] or 0}")
+        if zone:
+            clock_s -= int(f"{zone[0]}1") * 60.0 * (60 * int(zone[1:3]) + int(zone[-2:]))
         turn_s = _DAY_S if hour else _HOUR_S
         if self._date:
             clock_s += self._day * _DAY_S
@@ -68,7 +71,7 @@ class ClockTimes:
         return f"{clock_s:.9f}"
 
     def _turns_to(self, text: str) -> bool:
-        """Read a date in the order of its parts that is nearest to the last date; return False if invalid."""
+        """Read a date in the order of parts that puts it nearest to the last date; False if invalid."""
         if text == self._date:
             return True
         pairs = zip(_orders(self._date or text), _orders(text), strict=True)
@@ -238,14 +241,14 @@ def _require_decimals(place: int, cells: Sequence[str]) -> None:
 
 
 def _encoding(path: Path) -> str:
-    """Return the probable encoding of a text from its start, because files do not state it."""
+    """Return the probable encoding of a text, judged from its start; files do not state their encoding."""
     with path.open("rb") as file:
         head = b"".join(islice(file, LONGEST_HEAD))
     if head.startswith((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)):
         return "utf-32"
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
-    # Text contains no zero bytes, except UTF-16, where nearly every second byte is zero.
+    # Text in UTF-16 has a zero in nearly every second byte; other text contains no zero bytes.
     zeros = [2 * head[place::2].count(0) / max(len(head), 1) for place in (0, 1)]
     if max(zeros) > 0.9 and min(zeros) == 0.0:
         return "utf-16-be" if zeros[0] > zeros[1] else "utf-16-le"
@@ -355,13 +358,13 @@ def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str
 
 
 def _are_units(row: Sequence[str]) -> bool:
-    """Return whether all cells are units; the first cell may be a title."""
+    """Return whether all cells contain units; the first cell may be a title instead."""
     cells = row[1:] if TITLE.fullmatch(row[0]) else row
     return any(cells) and all(UNIT_CELL.fullmatch(each) for each in cells)
 
 
 def _row(line: str, layout: _Layout) -> list[str]:
-    """Return a heading line as one cell per column; empty if it cannot be split that way."""
+    """Return a heading line as one cell per column; empty if the line cannot be split into such cells."""
     line = re.sub(rf"^{TITLE.pattern}[:=]\s*", "", line.strip("\r\n ").lstrip("#% "), flags=re.I)
     tries = [layout.cells(line), *(replace(layout, delimiter=each).cells(line) for each in DELIMITERS)]
     tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
@@ -372,7 +375,7 @@ def _row(line: str, layout: _Layout) -> list[str]:
 
 
 def _facts(head: Sequence[str], layout: _Layout) -> Iterator[Sequence[tuple[str, float]]]:
-    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), then the common facts."""
+    """Yield for each column its own facts (such as LabVIEW's ``Delta_X``), then facts common to all."""
     own: list[list[tuple[str, float]]] = [[] for _ in range(layout.columns)]
     shared: list[tuple[str, float]] = []
     for line in head:
@@ -391,6 +394,6 @@ def _statements(line: str) -> Iterator[tuple[str, float]]:
     if (found := SENTENCE.search(line)) and _are_numbers([number := found[1] or found[3]]):
         yield f"rate {found[2] or f'{found[4]}/s'}", float(number)
     elif (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
-        # The cell after the number may be its unit, or another name.
+        # The cell after a number may contain the unit of the number, or another name.
         unit = found[3] if found[3].casefold() in UNITS else ""
         yield f"{found[1].strip()} {unit}".strip(), float(found[2].replace(",", "."))

@@ -1,16 +1,21 @@
-"""Part of a recording to export, and its metadata in a separate file if the format cannot store them."""
+"""Part of a recording to export, as a labelled dataset or with its metadata in a separate file."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from datetime import datetime, timedelta
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recording
 
 from ..errors import InvalidRequest, NotEnoughData
+from ..recordings.facts import require_checked
 from ..signals.arrays import Reals
+from ..tables import columns
 
 BLOCK_SAMPLES = 51_200
 """Number of samples per block, as in one chunk of the file; 0.4 MB per channel."""
@@ -102,7 +107,7 @@ def excerpt(
     if not 0 <= start < stop <= recording.samples:
         raise InvalidRequest(
             f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was requested; "
-            f"{recording.path.name} has 0 to {recording.duration_s:.9g} s; give a start and a later end"
+            f"{recording.path.name} covers 0 to {recording.duration_s:.9g} s; give a start and a later end"
         )
     return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)
 
@@ -121,38 +126,32 @@ def facts_path(path: Path) -> Path:
     return path.with_name(path.name + ".facts.json")
 
 
+_ORIGIN = "origin=origin.value state=state.value"
+
+
 def facts_document(excerpt: Excerpt) -> dict[str, Any]:
     """Return the facts of an excerpt; sample numbers count from the first sample of the recording."""
     recording = excerpt.recording
     return {
         "recording": excerpt.name,
-        "recording_id": recording.recording_id,
-        "started_utc": recording.started_utc,
-        "origin": recording.origin.value,
-        "state": recording.state.value,
-        "reason": recording.reason,
-        "sample_rate_hz": recording.sample_rate_hz,
+        **columns(recording, f"recording_id started_utc {_ORIGIN} reason sample_rate_hz"),
         "first_sample": excerpt.start,
         "last_sample": excerpt.stop - 1,
         "channels": [
             {
                 **asdict(each),
-                "scale_factor": each.scale_factor,
-                "add_offset": each.add_offset,
+                **columns(each, "scale_factor add_offset"),
                 "full_scale": abs(each.physical_per_volt) * each.range_v,
             }
             for each in excerpt.channels
         ],
-        "segments": [asdict(each) for each in recording.segments],
-        "events": [asdict(each) for each in recording.events],
-        "overloads": [asdict(each) for each in recording.overloads],
-        "gaps": [asdict(each) for each in recording.gaps],
-        "plan": recording.plan,
-        "bench": recording.bench,
+        **{
+            name: [asdict(each) for each in found]
+            for name, found in columns(recording, "segments events overloads gaps").items()
+        },
+        **columns(recording, "plan bench"),
         "instruments": {name: asdict(each) for name, each in recording.instruments.items()},
-        "confirmations": recording.confirmations,
-        "provenance": recording.provenance,
-        "bench_check": recording.bench_check,
+        **columns(recording, "confirmations provenance bench_check"),
     }
 
 
@@ -160,3 +159,103 @@ def write_facts(excerpt: Excerpt, path: Path) -> None:
     """Write the facts of an excerpt as JSON."""
     text = json.dumps(facts_document(excerpt), indent=2, allow_nan=False, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
+
+
+if TYPE_CHECKING:
+    import xarray
+
+QUANTITIES = {"velocity": "v", "acceleration": "a", "displacement": "d", "force": "f"}
+
+
+def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
+    """Return the channels of an excerpt in the form that SDyPy packages read; lost samples are NaN.
+
+    Parameters
+    ----------
+    excerpt
+        Excerpt of an open recording.
+
+    Returns
+    -------
+    list of dict
+        For each channel: ``data``, shape (samples,), ``name``, ``unit_str``, ``fs`` [Hz], ``quantity`` if SEP
+        005 defines a letter for it, ``start_timestamp`` of the first sample, and ``group``: its recording.
+    """
+    recording = excerpt.recording
+    rate = recording.sample_rate_hz
+    start = datetime.fromisoformat(recording.started_utc) + timedelta(seconds=excerpt.start / rate)
+    return [
+        {
+            "data": np.concatenate(list(excerpt.channel_blocks(channel.role))),
+            "name": channel.role,
+            "unit_str": channel.unit,
+            "fs": rate,
+            **({"quantity": QUANTITIES[channel.quantity]} if channel.quantity in QUANTITIES else {}),
+            "start_timestamp": start.isoformat(),
+            "group": excerpt.name,
+        }
+        for channel in excerpt.channels
+    ]
+
+
+BETWEEN = -1
+"""Segment number of samples outside all segments."""
+
+
+def xarray_dataset(
+    recording: Recording,
+    roles: Sequence[str] = (),
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> "xarray.Dataset":
+    """Return channels in physical units over ``time`` [s since the first sample], in memory.
+
+    Lost samples are NaN. ``segment`` is the segment number of each sample, -1 between segments; the attribute
+    ``segments_json`` describes the segments. A finished file that is larger than memory can be opened
+    directly: ``xarray.open_dataset(path, engine="h5netcdf")``.
+
+    Raises InvalidRequest when xarray is not installed, or the stretch is outside the recording; UnusableData
+    when the recording was changed after it was sealed.
+
+    Parameters
+    ----------
+    recording
+        An open recording; it may be closed afterwards.
+    roles
+        Channels; by default all.
+    from_s, to_s
+        Start and end of the stretch [s]; by default the whole recording.
+    """
+    try:
+        import xarray  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise InvalidRequest("xarray is not installed; pip install 'vibench[exchange]'") from error
+    require_checked(recording)
+    chosen = excerpt(recording, roles, from_s, to_s)
+    time_s = recording.time_s(chosen.start, chosen.stop)
+    numbers = np.full(chosen.samples, BETWEEN, dtype=np.int16)
+    for number, each in enumerate(recording.segments):
+        numbers[max(each.start - chosen.start, 0) : max(each.stop - chosen.start, 0)] = number
+    return xarray.Dataset(
+        {
+            each.role: ("time", recording.read(each.role, chosen.start, chosen.stop), _attributes(each))
+            for each in chosen.channels
+        },
+        coords={
+            "time": ("time", time_s, {"units": "s", "long_name": "time since the first sample"}),
+            "segment": ("time", numbers),
+        },
+        attrs={
+            "recording": chosen.name,
+            **columns(recording, f"recording_id sample_rate_hz started_utc {_ORIGIN}"),
+            "segments_json": json.dumps(
+                [{"label": each.label, **each.numbers} for each in recording.segments]
+            ),
+        },
+    )
+
+
+def _attributes(channel: ChannelHeader) -> dict[str, str | float]:
+    known = {name: value for name, value in asdict(channel).items() if value not in {None, ""}}
+    del known["role"], known["unit"]
+    return {"units": channel.unit, "long_name": channel.role.replace("_", " "), **known}

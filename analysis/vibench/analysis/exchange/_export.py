@@ -9,20 +9,75 @@ from enum import Enum, StrEnum, auto
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
-from vibench.acquisition.recording import Recording, RecordingDescription, ResultArray, SavedResult
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Recording,
+    RecordingDescription,
+    ResultArray,
+    SavedResult,
+)
+from vibench.sim.hdf5_files import open_hdf5_to_write
 from vibench.sim.operating_system.this import rename
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.facts import require_intact
 from ..tables import Table, table, write_csv
 from ._csv import write_csv_samples
-from ._excerpt import Excerpt, TransferObserver, facts_path, ignore_progress, write_facts
+from ._excerpt import BLOCK_SAMPLES, Excerpt, TransferObserver, facts_path, ignore_progress, write_facts
 from ._mat import write_mat
-from ._nexus import write_nexus
-from ._uff import UniversalFunction, write_uff, write_uff_functions, write_uff_scan
+from ._uff import UniversalFunction, write_uff, write_uff_functions
 from ._wav import write_wav
+
+ENTRY = "entry"
+SIGNAL, TIME = "values", "time"
+
+
+def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
+    """Write channels one after the other in blocks; lost samples are NaN."""
+    with open_hdf5_to_write(path, "x") as file:
+        file.attrs.update({"NX_class": "NXroot", "default": ENTRY})
+        entry = _group(file, ENTRY, "NXentry")
+        entry["title"] = f"{excerpt.name}: {excerpt.recording.plan.get('name', '')}".removesuffix(": ")
+        entry["start_time"] = excerpt.recording.started_utc
+        entry["program_name"] = "vibench"
+        # By default, plot the velocity of m0 if this channel was exported.
+        entry.attrs["default"] = "m0_velocity" if "m0_velocity" in excerpt.roles else excerpt.roles[-1]
+        for channel in excerpt.channels:
+            _write_channel(entry, excerpt, channel, observer)
+
+
+def _group(parent: h5py.Group, name: str, nexus_class: str) -> h5py.Group:
+    group = parent.create_group(name)
+    group.attrs["NX_class"] = nexus_class
+    return group
+
+
+def _write_channel(
+    entry: h5py.Group, excerpt: Excerpt, channel: ChannelHeader, observer: TransferObserver
+) -> None:
+    data = _group(entry, channel.role, "NXdata")
+    data.attrs.update({"signal": SIGNAL, "axes": [TIME], f"{TIME}_indices": 0})
+    # The title also contains the unit, because silx does not label the vertical axis.
+    data["title"] = f"{excerpt.name}: {channel.long_name or channel.role} [{channel.unit}]"
+    chunks = (min(BLOCK_SAMPLES, excerpt.samples),)
+    stored = {"shape": (excerpt.samples,), "dtype": "f8", "chunks": chunks, "compression": "gzip"}
+    values, time = data.create_dataset(SIGNAL, **stored), data.create_dataset(TIME, **stored)
+    label = f"{channel.long_name or channel.role} [{channel.unit}]"
+    values.attrs.update({"units": channel.unit, "long_name": label})
+    time.attrs.update({"units": "s", "long_name": "time [s]"})
+    errors = data.create_dataset(f"{SIGNAL}_errors", **stored, fillvalue=0.5 * abs(channel.scale_factor))
+    errors.attrs["units"] = channel.unit
+    done = 0
+    for block in excerpt.channel_blocks(channel.role):
+        place = slice(done, done + block.size)
+        values[place] = block
+        time[place] = excerpt.recording.time_s(excerpt.start + done, excerpt.start + done + block.size)
+        done += block.size
+        observer(block.size)
+
 
 UNFINISHED = ".unfinished"
 _REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -34,13 +89,13 @@ def require_unused(path: Path) -> None:
         raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
     if not path.parent.is_dir():
         raise InvalidRequest(
-            f"{path.parent} is not a folder; create it, or choose another folder for {path.name}"
+            f"{path.parent} is not a folder; create this folder, or choose another folder for {path.name}"
         )
 
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary name; rename that file to ``path`` on success, otherwise delete it.
+    """Yield the name of a temporary file; on success, rename the file to ``path``, otherwise delete it.
 
     Raises InvalidRequest when ``path`` or its temporary name exists, the folder does not exist, or writing
     fails.
@@ -50,10 +105,10 @@ def new_file(path: Path) -> Iterator[Path]:
         require_unused(each)
     try:
         yield unfinished
-        require_unused(path)  # another program may have created this file meanwhile
+        require_unused(path)  # another program may have created the file since
         rename(unfinished, path)
     except OSError as error:
-        mend = "choose another folder" if error.errno in _REFUSED else "free disk space and try again"
+        mend = "choose another folder" if error.errno in _REFUSED else "make room on the disk and try again"
         raise InvalidRequest(
             f"{path} could not be written: {error}; the incomplete file was deleted; {mend}"
         ) from error
@@ -123,7 +178,7 @@ def _tables(recording: Recording) -> Iterator[Table]:
 
 
 def _table(name: str, arrays: Mapping[str, ResultArray], axes: tuple[str, ...]) -> Table:
-    """Return one table of all arrays with the given axes, with one row per grid point."""
+    """Return one table that contains all arrays with the given axes, one row per grid point."""
     grid = np.meshgrid(*(arrays[axis].values for axis in axes), indexing="ij")
     columns = {f"{axis} [{arrays[axis].unit}]": values for axis, values in zip(axes, grid, strict=True)}
     for key, array in arrays.items():
@@ -224,7 +279,7 @@ def export_functions(
     for each in (path, facts):
         require_unused(each)
     with new_file(path) as unfinished:
-        write(excerpt, tuple(functions), unfinished)
+        write([(excerpt.recording, each) for each in functions], unfinished)
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
     return path, facts
@@ -249,11 +304,11 @@ def export_scan(
         The new file.
     """
     with new_file(path) as unfinished:
-        write_uff_scan(nodes, functions, unfinished)
+        write_uff_functions(functions, unfinished, nodes)
     return path
 
 
-WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]
+WriteFunctions = Callable[[Sequence[tuple[RecordingDescription, UniversalFunction]], Path], None]
 WriteSamples = Callable[[Excerpt, Path, TransferObserver], None]
 WriteAll = Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
 
@@ -263,7 +318,7 @@ class Exporter:
     """Functions that export to one format; each exporter is an entry of `EXPORTERS`."""
 
     write: WriteSamples | None = None
-    """Function that writes the samples; facts and results go to separate files.
+    """Function that writes the samples; facts and results are written to separate files.
 
     It raises InvalidRequest for an excerpt that the format cannot store.
     """

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from vibench.acquisition.recording import Origin
-from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, walk
+from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, system_error, walk
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
@@ -83,7 +83,7 @@ def _read(file: h5py.File, name: str, axis: int, row: int, start: int, stop: int
     for attribute in {"_FillValue", "missing_value"} & dataset.attrs.keys():
         values[raw == dataset.attrs[attribute]] = np.nan
     if dataset.chunks:
-        # HDF5 returns a fill value for samples of chunks that were never written.
+        # For samples of a chunk that was never written, HDF5 returns a fill value.
         length, corner = dataset.chunks[axis], [0] * dataset.ndim
         for corner[axis] in range(start - start % length, start + len(values), length):
             if dataset.id.get_chunk_info_by_coord(tuple(corner)).byte_offset is None:
@@ -152,7 +152,7 @@ def _value(dataset: h5py.Dataset) -> Any:
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float, place: int) -> float:
-    """Return an attribute as a number: the number at ``place`` if there is one per row or column."""
+    """Return an attribute as a number; of one number per row or column, take number ``place``."""
     numbers = np.ravel(dataset.attrs.get(name, otherwise))
     if numbers.size not in {1, min(dataset.shape)}:
         raise UnusableData(f"{dataset.name}: {name} has {numbers.size} numbers; export the file again")

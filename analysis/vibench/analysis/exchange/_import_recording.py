@@ -9,15 +9,15 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from math import frexp, inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vibench.acquisition import Block, Overload
-from vibench.acquisition.plan import AbstractExcitation, Segment, Step
+from vibench.acquisition import Block, Overload, open_recording
+from vibench.acquisition.plan import AbstractExcitation, Family, Segment, Step
 from vibench.acquisition.recording import (
     GAPS,
     ChannelHeader,
@@ -30,14 +30,111 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest, UnusableData
-from ..recordings.channels import ALIGNMENT_ERRORS, DRIVE
+from ..recordings.channels import ALIGNMENT_ERRORS, BASE, DRIVE
+from ..recordings.facts import channel_levels, require_moving_channels
 from ..signals.arrays import Reals, runs_of
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
-from ._held import held_values
-from ._mapping import ChannelMapping, ImportMapping
+from ._mapping import KNOWN_ROLES, ChannelMapping, ImportMapping
 from ._source import find_channel, open_source
 from ._source_channel import Source, SourceChannel
+
+_VIBRATING = {"velocity", "acceleration", "displacement", "force"}
+"""Quantities that vary during every test; other quantities, such as temperature, may stay constant."""
+_DRIVEN = {DRIVE, "amplifier_voltage", BASE}
+_FEWEST, _LONGER = 16, 4
+"""Minimum number of equal last samples that count as held; their minimum ratio to any other equal run."""
+_WEAK_STEPS = 3.0
+"""Largest distance of neighbours from a constant value [converter steps] in a weak signal (not held)."""
+_PATTERN, _FEWEST_VALUES = 64, 16
+"""Number of last samples that are searched for earlier in the record; minimum number of distinct ones."""
+_SEARCHED = 1 << 17
+"""Number of samples at the end of a record in which repeated samples are searched for."""
+_JUMP = 0.02
+"""Minimum jump where samples start to repeat, relative to their range; a periodic motion has no jump."""
+_SAME_TURNS = 1e-3
+"""Largest difference from whole drive periods at which repeated samples count as a periodic motion."""
+
+
+def held_values(
+    source: Source,
+    channel: SourceChannel,
+    pieces: tuple[Piece, ...],
+    mapped: ChannelMapping,
+    excitation: AbstractExcitation,
+    rate_hz: float,
+) -> Iterator[tuple[int, int, str]]:
+    """Yield first sample, end and description of each stretch without new values.
+
+    A working channel is not constant for a whole period of the lowest frequency. Exceptions are weak signals
+    of a coarse converter (also until the next hit or burst), exact zeros before a hit, and exact zeros
+    between hits or bursts in drive and base.
+    """
+    quantity, _ = mapped.kind
+    if mapped.role not in KNOWN_ROLES and quantity not in _VIBRATING:
+        return
+    is_noise, is_drive = excitation.family is Family.NOISE, mapped.role in _DRIVEN or quantity == "force"
+    runs, step = _runs(source, channel)
+    period = max(_FEWEST, int(rate_hz / excitation.band_hz[0]) + 1)
+    natural = [b - a for a, b in runs if b - a < period and b < channel.samples]
+    at_end = min(period, max(_FEWEST, _LONGER * max(natural, default=0)))
+    for start, stop in runs:
+        if not (at_end if stop == channel.samples else period) <= stop - start < channel.samples:
+            continue
+        (value,) = source.read(channel, start, start + 1)
+        near = source.read(channel, max(0, start - _FEWEST), start)
+        if not is_noise:
+            after = source.read(channel, stop, min(stop + _FEWEST, channel.samples))
+            near = np.concatenate((near, after))
+        is_weak = np.all(np.abs(near - value) <= _WEAK_STEPS * step)
+        may_rest = is_noise and value == 0.0 and (start == 0 or is_drive)
+        if not is_weak and not may_rest:
+            yield start, stop, f"holds {value:.6g}"
+    first = max(0, channel.samples - _SEARCHED)
+    times = np.concatenate([each.span(first, channel.samples) for each in pieces])
+    end = source.read(channel, channel.samples - times.size, channel.samples)
+    if repeated := _repeated(end, times / rate_hz, excitation):
+        yield channel.samples - repeated, channel.samples, "repeats earlier values"
+
+
+def _runs(source: Source, channel: SourceChannel) -> tuple[list[tuple[int, int]], float]:
+    """Return the runs of at least `_LONGER` equal values, and the smallest step between unequal values."""
+    runs: list[tuple[int, int]] = []
+    first, place, before, step = 0, 0, np.nan, np.inf
+    for block in source.blocks(channel):
+        steps = np.abs(np.diff(block, prepend=before))
+        step = min(step, float(np.min(steps, where=steps > 0, initial=np.inf)))
+        changes = place + np.flatnonzero(steps != 0)
+        place, before = place + block.size, block[-1]
+        ends = np.append(changes, place) if place == channel.samples else changes
+        starts = np.append(first, ends[:-1])
+        is_long = ends - starts >= _LONGER
+        runs += zip(starts[is_long].tolist(), ends[is_long].tolist(), strict=True)
+        first = int(changes[-1]) if changes.size else first
+    return runs, step
+
+
+def _repeated(values: Reals, times_s: Reals, excitation: AbstractExcitation) -> int:
+    """Return the number of last values that repeat earlier values exactly; 0 for a periodic motion."""
+    last = values.size - 1
+    if last < _PATTERN or np.unique(values[-_PATTERN:]).size < _FEWEST_VALUES:
+        return 0
+    found = np.arange(_PATTERN - 1, last)
+    for back in range(_PATTERN):
+        found = found[values[found - back] == values[last - back]]
+    if not found.size:
+        return 0
+    lag = last - int(found[-1])
+    differs = np.flatnonzero(values[lag:] != values[:-lag])
+    plan = excitation.model_dump(include={"frequency_hz", "frequencies_hz", "repetition_hz"})
+    lag_s = times_s[last] - times_s[last - lag]
+    turns = np.hstack([each for each in plan.values() if each is not None] or [np.nan]) * lag_s
+    if not differs.size or np.any(np.abs(turns - np.rint(turns)) < _SAME_TURNS):
+        return 0
+    start = lag + int(differs[-1]) + 1
+    first = max(lag, start - _PATTERN)
+    jump = np.max(np.abs(values[first:start] - values[first - lag : start - lag]))
+    return values.size - start if jump > _JUMP * np.ptp(values[start:]) else 0
 
 
 @dataclass(frozen=True)
@@ -50,15 +147,8 @@ class PartSpan:
     """Index one past the last sample of the part."""
 
 
-@dataclass(frozen=True)
-class _PlannedPart:
-    segment: Segment
-    settle_s: float
-    record_s: float
-
-
 def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[PartSpan, ...]:
-    """Return the plan's parts as sample ranges; parts after the end of the file are left out or cut.
+    """Return the plan's parts as sample ranges; parts beyond the end of the file are cut or left out.
 
     Raises InvalidRequest when there are too many parts, parts overlap, or no part begins inside the file.
     """
@@ -77,7 +167,7 @@ def place_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> 
     return tuple(parts)
 
 
-def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_PlannedPart]:
+def _recorded_steps(excitation: AbstractExcitation) -> Iterator[Step]:
     """Yield the parts of the plan; steps that a run records without interruption are joined."""
     joined = 0
 
@@ -86,12 +176,12 @@ def _recorded_steps(excitation: AbstractExcitation) -> Iterator[_PlannedPart]:
         joined += step.settle_s > 0
         return joined
 
-    for (segment, _), steps in groupby(excitation.steps(), key=lambda step: (step.segment, part(step))):
-        together = list(steps)
-        yield _PlannedPart(segment, together[0].settle_s, sum(each.record_s for each in together))
+    for _, steps in groupby(excitation.steps(), key=lambda step: (step.segment, part(step))):
+        first, *rest = steps
+        yield replace(first, record_s=first.record_s + sum(each.record_s for each in rest))
 
 
-def _in_turn(begins_s: float, planned: Sequence[_PlannedPart]) -> Iterator[tuple[float, float]]:
+def _in_turn(begins_s: float, planned: Sequence[Step]) -> Iterator[tuple[float, float]]:
     now_s = begins_s
     for each in planned:
         start_s = now_s + each.settle_s
@@ -99,7 +189,7 @@ def _in_turn(begins_s: float, planned: Sequence[_PlannedPart]) -> Iterator[tuple
         yield start_s, now_s
 
 
-def _stated_times(mapping: ImportMapping, planned: Sequence[_PlannedPart]) -> Iterator[tuple[float, float]]:
+def _stated_times(mapping: ImportMapping, planned: Sequence[Step]) -> Iterator[tuple[float, float]]:
     parts = mapping.parts
     if len(parts) > len(planned):
         raise InvalidRequest(
@@ -176,6 +266,7 @@ def import_recording(
     """
     with open_source(path) as source:
         found = [find_channel(source, each.source, path) for each in mapping.channels]
+        _require_own_sources(mapping, found)
         aligned = align(found, mapping, path)
         samples, rate = aligned.places, aligned.rate_hz
         wanted = tuple(map(_ChannelImport, mapping.channels, found, aligned.pieces, aligned.late_s))
@@ -183,7 +274,7 @@ def import_recording(
         parts = place_parts(mapping, rate, samples)
         planned = len(mapping.parts) or len(list(_recorded_steps(mapping.measurement.excitation)))
         if (whole := sum(each.stop <= samples for each in parts)) < planned:
-            text = f"the file contains only {whole} of {planned} planned parts completely"
+            text = f"only {whole} of {planned} planned parts are complete in the file"
             aligned = replace(aligned, remarks=(*aligned.remarks, text))
         header = RecordingHeader(
             channels=tuple(_header(path.name, source, each) for each in wanted),
@@ -203,11 +294,33 @@ def import_recording(
             _write(writer, source, wanted, parts, samples, observer)
             _require_samples(writer, path)
         except BaseException:
-            # An incomplete import is deleted; the imported file still exists.
+            # Delete the incomplete recording: the imported file still exists.
             writer.finish(RecordingState.FAILED, "the import was not completed")
             out.unlink(missing_ok=True)
             raise
-        return writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+        made = writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+        try:
+            with open_recording(made) as recording:
+                for each in channel_levels(recording):
+                    require_moving_channels((each,) * (each.overflows > 0), each.header.role)
+        except UnusableData:
+            made.unlink()
+            raise
+        return made
+
+
+def _require_own_sources(mapping: ImportMapping, found: Sequence[SourceChannel]) -> None:
+    """Refuse one source for a channel of m0 and for the drive, the base or another quantity of m0."""
+    known = [
+        (each.role, one)
+        for each, one in zip(mapping.channels, found, strict=True)
+        if each.role in KNOWN_ROLES
+    ]
+    for (role, one), (other, same) in combinations(known, 2):
+        if one is same and (role.startswith("m0_") or other.startswith("m0_")):
+            raise InvalidRequest(
+                f"{role} and {other} are both read from {one.title}; correct the source of one of them"
+            )
 
 
 def _without_held(
@@ -239,7 +352,7 @@ def _require_samples(writer: RecordingWriter, path: Path) -> None:
 
 
 def _origin(wanted: tuple[_ChannelImport, ...], mapping: ImportMapping, path: Path) -> Origin:
-    """Return the origin of the recording; one simulated channel makes the recording simulated."""
+    """Return the origin of the recording; it is simulated if at least one channel is simulated."""
     origins = {each.source.origin for each in wanted if each.source.origin is not None}
     if mapping.origin is not None and origins - {mapping.origin}:
         raise InvalidRequest(
@@ -258,13 +371,13 @@ def _header(name: str, source: Source, each: _ChannelImport) -> ChannelHeader:
         raise InvalidRequest(f"{name}: {error}") from error
     if found.stated_scale and mapped.scale is None:
         raise InvalidRequest(
-            f"{name} states {found.stated_scale} for {found.name}, but not whether its numbers are already "
+            f"{name} states {found.stated_scale} for {found.name}, but not whether the numbers are already "
             "scaled; give scale in the mapping"
         )
     if found.quantity not in {"", quantity} and mapped.role != DRIVE and not mapped.file_unit:
         raise InvalidRequest(
-            f"{name} states that {found.name} is of quantity {found.quantity}, unlike {mapped.role}; choose "
-            "another channel or role, or give file_unit if the file is wrong"
+            f"{name} gives {found.quantity} as the quantity of {found.name}, which does not fit "
+            f"{mapped.role}; choose another channel or role, or give file_unit if the file is wrong"
         )
     if found.are_counts and not (found.unit or mapped.file_unit) and mapped.scale is None:
         what, one = ("counts", "count") if found.full_scale is None else ("fractions of full scale", "1")
@@ -305,7 +418,7 @@ def _peak(source: Source, channel: SourceChannel, name: str) -> float:
         if count > 1:
             raise UnusableData(
                 f"{name} has {count} samples of exactly {peak:g} or -{peak:g} in {channel.name}, over 100 "
-                "times its other values, as if they marked lost samples; replace them by nan"
+                "times its other values, as if to mark lost samples; set such samples to nan"
             )
     return peak
 
@@ -320,7 +433,7 @@ def _power_of_two_above(peak: float, name: str) -> float:
             return 1.0
         raise UnusableData(
             f"{name} has a channel whose largest number is {peak:g}, but a recording stores only peaks from "
-            f"{LEAST_PEAK:g} to {MOST_PEAK:g}; convert it to another unit, or repair the file"
+            f"{LEAST_PEAK:g} to {MOST_PEAK:g}; convert the channel to another unit, or repair the file"
         )
     mantissa, exponent = frexp(peak)
     return 2.0 ** (exponent - 1 if mantissa == 0.5 else exponent)
@@ -333,7 +446,7 @@ def _bench(
     aligned: Alignment,
     held: Sequence[str],
 ) -> dict[str, Any]:
-    """Return the known facts of the bench, and facts on the imported file."""
+    """Return the known facts about the bench and about the imported file."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     bench: dict[str, Any] = {
@@ -383,7 +496,7 @@ def _write(
             if gaps > GAPS.capacity:
                 raise InvalidRequest(
                     f"samples are missing in more than {GAPS.capacity} places of the file, and a recording "
-                    "stores no more; import a shorter file, or one without lost samples"
+                    "cannot store more gaps; import a shorter file, or a file without lost samples"
                 )
             writer.append(block)
         observer(values.size)

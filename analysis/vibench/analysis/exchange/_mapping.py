@@ -42,7 +42,7 @@ def unit_in_name(name: str) -> str:
         unit = unit.replace("_", "/") if sign == "_" else unit
         is_letter = sign in {"", "_", "-"} and (len(unit) == 1 or unit == "in")
         is_known = _is_another_quantity(unit) or size_of_unit(unit, "V") is not None
-        # DIN 461 writes "a / Gal". More than four letters after " / " may belong to the name of the channel.
+        # DIN 461 writes "a / Gal". If more than four letters follow " / ", they may belong to the name.
         is_unknown = found[0] == " / " and _LIKE_A_UNIT.fullmatch(unit)
         before = re.split(r"[\s(\[]", name[: found.start()])[-1]
         if found[0] == "/" and is_known and size_of_unit(before, "V") is not None:
@@ -137,7 +137,7 @@ class ChannelMapping(FrozenModel):
                 f"{text}, but the recording needs {unit!r}; give scale as a number of {unit!r} per "
                 f"{file_unit!r}, choose another channel, or give file_unit if the file is wrong"
                 if volts is None
-                else f"{text}; give the sensitivity of its sensor as scale, such as '50 mV/({unit})'"
+                else f"{text}; give the sensitivity of the sensor as scale, such as '50 mV/({unit})'"
             )
         return (1.0 if size is None else size) if scale is None else scale
 
@@ -157,7 +157,7 @@ class Part(FrozenModel):
     def _rises(self) -> Self:
         if self.stop_s <= self.start_s:
             raise ValueError(
-                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g} (from file start)"
+                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g} (from the file's start)"
             )
         return self
 

@@ -35,10 +35,10 @@ from ._source_channel import (
 )
 from ._times import stated_times
 
-# The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types.
-#
-# Layout: MathWorks, MAT-File Format, "Level 5 MAT-file format". After a header of 128 bytes, each element has
-# a tag (type, bytes) and data padded to eight bytes. A matrix consists of elements, as does compressed data.
+# The elements of a MATLAB 5 file are checked before reading, because scipy crashes on wrong types. Layout:
+# MathWorks, MAT-File Format, "Level 5 MAT-file format". After a 128-byte header, each element has a tag
+# (type, number of bytes) and data padded to a multiple of eight bytes. Matrices and compressed data contain
+# further elements.
 
 HEAD_BYTES, TAG_BYTES = 128, 8
 MATRIX, COMPRESSED = 14, 15
@@ -56,7 +56,7 @@ def require_whole(path: Path) -> None:
     if len(content) < HEAD_BYTES:
         raise ValueError("it ends within its header")
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[HEAD_BYTES - 2 : HEAD_BYTES]))
-    # Version 4 files have no header of 128 bytes; scipy checks their few types itself.
+    # Files of version 4 have no 128-byte header. They have few types, which scipy itself checks.
     if order is not None:
         _look(content[HEAD_BYTES:], order, 0)
 
@@ -67,7 +67,7 @@ def _look(content: memoryview, order: str, depth: int) -> None:
         raise ValueError(f"more than {DEEPEST} nested structs or cells")
     while len(content) >= TAG_BYTES:
         kind, size = struct.unpack(f"{order}II", content[:TAG_BYTES])
-        if kind >> 16:  # small: type and size share four bytes, data are in the other four
+        if kind >> 16:  # small: four bytes for type and size, four bytes for data
             _require_plain(kind & 0xFFFF)
             if kind >> 16 > SMALL_BYTES:
                 raise ValueError(f"a small element has {kind >> 16} bytes; at most four are allowed")
@@ -97,7 +97,7 @@ def _require_plain(kind: int) -> None:
 
 
 LARGEST_BYTES = 2**31
-"""Largest MATLAB 5 file: sizes of variables have 31 bits, and many readers limit files to 31 bits too."""
+"""Largest MATLAB 5 file: sizes of variables have 31 bits, and many readers limit file sizes too."""
 VALUE_BYTES = 8
 LONGEST_NAME = 63
 """Longest name of a MATLAB variable; longer channel names are cut."""
@@ -161,7 +161,7 @@ def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
 
 
 def _segments(excerpt: Excerpt) -> dict[str, Any]:
-    """Return the segments in the excerpt as columns; their sample indices start at 1, as in MATLAB."""
+    """Return the excerpt's segments as columns; sample indices start at 1, as is usual in MATLAB."""
     touched = [
         each
         for each in excerpt.recording.segments
@@ -197,7 +197,7 @@ def open_mat(path: Path) -> Iterator[Source]:
     except (MatReadError, zlib.error) as error:  # neither error is a ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
-    # Files exported by vibench state the sample rate beside the channels.
+    # In files exported by vibench, the sample rate is stored beside the channels.
     about = tuple(_part(own, "recording").items())
     numbers = _numbers(own, "", about, tuple(_all_facts(own)), tuple(_named_facts(own)))
     yield Source({channel: read_from(values) for channel, values in numbers})
@@ -236,7 +236,9 @@ def _numbers(
         match value:
             case dict():
                 yield from _numbers(value, f"{prefix}{name}.", facts, elsewhere, named)
-            case np.ndarray() if _holds_samples(value):
+            case np.ndarray() if value.dtype.kind in "iuf" and value.ndim in {1, 2}:
+                if max(value.shape) < FEWEST_SAMPLES:
+                    continue
                 step = exact_step(value.dtype)
                 known = own_facts((*facts, *named), name)
                 times, said = stated_times((*known, *facts), elsewhere), (*known, *facts)
@@ -250,10 +252,6 @@ def _part(struct: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return a struct inside a struct; empty if there is none."""
     part = struct.get(name)
     return part if isinstance(part, dict) else {}
-
-
-def _holds_samples(values: np.ndarray[Any, Any]) -> bool:
-    return values.dtype.kind in "iuf" and values.ndim in {1, 2} and max(values.shape) >= FEWEST_SAMPLES
 
 
 def _channels(name: str, values: np.ndarray[Any, Any]) -> Iterator[tuple[SourceChannel, Any]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import shorten
-from vibench.sim.hdf5_files.door import system_error
+from vibench.sim.hdf5_files import system_error
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
@@ -95,10 +95,10 @@ def open_source(path: Path) -> Iterator[Source]:
 
 
 def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
-    """Yield the channels, each with the times that the file contains for it."""
+    """Yield the channels, each with the times that the file contains for this channel."""
     read = {each: time_axis(each, source.blocks(each)) for each in source.channels}
     axes = {each: axis for each, axis in read.items() if axis is not None}
-    for time, axis in axes.items():  # a label may contain a channel's name, such as t_v beside t
+    for time, axis in axes.items():  # a label may name a channel: t_v has the times of v
         if any(is_time_of(time.label, each.label) for each in source.channels):
             axes[time] = replace(axis, is_named=True)
     for number, each in enumerate(source.channels):
@@ -108,7 +108,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
         before = [time for time in near if time in source.channels[: number + 1]]
         chosen = before[-1:] or near[:1]
         if len({axes[time].moments for time in near if axes[time].unit is not None}) > 1:
-            # It is clear which times belong to a channel only if each time column precedes its channels.
+            # Which channels belong to a time column is clear only if every such column precedes its channels.
             order = [one in near for one in source.channels if one in near or _group(one) == _group(each)]
             is_clear = order[0] and not any(one and two for one, two in pairwise(order))
             if not (source.are_in_order and is_clear):
@@ -119,7 +119,7 @@ def _channels_with_times(source: Source) -> Iterator[SourceChannel]:
 
 
 def _rank(time: SourceChannel, channel: SourceChannel, *, is_named: bool) -> tuple[bool, bool, int]:
-    """Return a key that ranks time columns for a channel; all zero if the times cannot belong to it."""
+    """Return a key that ranks time columns for a channel; all zero if the times do not fit it."""
     if time.samples != channel.samples:
         return False, False, 0
     is_above = _group(channel).startswith(_group(time))
@@ -132,7 +132,7 @@ def _group(channel: SourceChannel) -> str:
 
 
 def _checked(read: Read, channel: SourceChannel, path: Path) -> Read:
-    """Return a function that reads a channel and converts every failure to a vibench error."""
+    """Return a function that reads a channel, with every failure as a vibench error and infinity as NaN."""
 
     def read_checked(start: int, stop: int) -> Reals:
         # Ignore the warning on a signalling NaN: it is a lost sample like any other NaN.
@@ -143,7 +143,7 @@ def _checked(read: Read, channel: SourceChannel, path: Path) -> Read:
                 f"{path.name} contains only {values.size} of the {stop - start} numbers of "
                 f"{channel.name} from sample {start} on; copy or export it again"
             )
-        return values
+        return np.where(np.isfinite(values), values, np.nan)
 
     return read_checked
 
@@ -165,7 +165,7 @@ def _readable(path: Path) -> Iterator[None]:
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     """Return the channel with the name ``wanted``, or the only channel with this label.
 
-    Raises InvalidRequest when there is none or more than one; the message lists the channels.
+    Raises InvalidRequest when no channel or several channels match; the message lists the channels.
     """
     found = [each for each in source.channels if each.name == wanted]
     found = found or [each for each in source.channels if each.label == wanted]

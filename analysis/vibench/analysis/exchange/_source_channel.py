@@ -85,11 +85,11 @@ def own_facts(facts: Iterable[tuple[str, Any]], label: str) -> tuple[tuple[str, 
 
 
 def _text_at(texts: NDArray[Any], place: int) -> str:
-    """Return the text at ``place`` in a list, or the only text; empty for numbers."""
+    """Return the text at ``place`` in a list, or the only text in it; for numbers, return an empty text."""
     if not texts.size or texts.dtype.kind not in "SUO":
         return ""
     text = texts[place if texts.size > 1 and place < texts.size else 0]
-    # h5py keeps variable-length bytes that are not UTF-8 as surrogates.
+    # If bytes of variable length are not UTF-8, h5py returns them as surrogates.
     return text_of(text if isinstance(text, bytes) else str(text).encode("utf-8", "surrogateescape")).strip()
 
 
@@ -125,7 +125,7 @@ class SourceChannel:
     """Sample rate; None if the file does not state it exactly."""
     unit: str = ""
     quantity: str = ""
-    """Quantity stated in the file, if its unit is not stated."""
+    """Quantity stated in the file, if the file states no unit for the channel."""
     step: float | None = None
     """Step between values that the file stores as integers; knowing the step allows exact storage."""
     origin: Origin | None = None
@@ -138,7 +138,7 @@ class SourceChannel:
     """Time of the first sample on the common clock of the file [s]."""
     start_error_s: float = 0.0
     runs: tuple[tuple[int, int], ...] = ()
-    """First sample of each regular stretch, and its time in sample intervals; empty without jumps."""
+    """For each regular stretch, its first sample and that sample's time in intervals; empty without jumps."""
     time_unit: str | None = None
     """Unit of the channel's times, empty if not stated; None without times."""
     stated_scale: str = ""
@@ -197,5 +197,5 @@ class Source:
 
 
 def read_from(values: Reals) -> Read:
-    """Return the function that reads a channel in memory."""
+    """Return the function that reads a channel whose samples are in memory."""
     return lambda start, stop: values[start:stop]

@@ -46,7 +46,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
         if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find no channels and raise no error
             raise UnusableData(f"{path.name} is not a TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
-        # Suppress the warnings of npTDMS on standard error; errors are still raised.
+        # Keep npTDMS from writing warnings to standard error; errors are still raised.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
         statements: dict[str, dict[int, tuple[tuple[str, Any], ...]]] = {}
@@ -68,7 +68,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
             def _update_object_properties(self, properties: Any) -> None:
                 super()._update_object_properties(properties)
                 for name in properties or ():
-                    # Near the end of a second, the text that npTDMS gives for a time is wrong by a second.
+                    # Near the end of a second, npTDMS converts a time to a text that is wrong by a second.
                     statements.setdefault(name, {})[self._before.get(name, 0)] = tuple(
                         (each, value.as_datetime64() if hasattr(value, "as_datetime64") else value)
                         for each, value in self.object_metadata[name].properties.items()
@@ -87,7 +87,7 @@ def open_tdms(path: Path) -> Iterator[Source]:
 
 
 def _unlike_segments(counts: Mapping[str, Mapping[int, int]]) -> Iterator[tuple[str, str]]:
-    """Yield path and segments of channels that are as long as another channel but have other segments.
+    """Yield path and segments of each channel that is as long as another one but has other segments.
 
     Channels that share all segments, follow one another, or take turns are left out.
     """

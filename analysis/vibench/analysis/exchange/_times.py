@@ -58,7 +58,7 @@ SAME_RATE = 1e-4
 EVEN = 1e-3
 """Largest spread of times around an even axis at which the rate counts as exact [sample intervals]."""
 _PLACED = 0.1
-"""Tolerated distance of a time from an even axis, in addition to rounding, in sample intervals."""
+"""Tolerated distance of a time from an even axis, in addition to rounding [sample intervals]."""
 _OFF, _MANY_OFF = 0.25, 0.05
 """Smallest deviation of irregular intervals from multiples of the usual interval; their largest fraction."""
 _SINGLE = 0.2
@@ -177,7 +177,7 @@ def stated_start(facts: Iterable[tuple[str, Any]]) -> tuple[float | None, float]
 
 
 def _rounding(value: Any, *, whole: float = 0.5) -> float:
-    """Return half the last digit of a number or date that is written as text; ``whole`` without decimals."""
+    """Return half a unit of the last digit of a number or date in text form; ``whole`` if none."""
     if np.asarray(value).dtype.kind not in "SUO":
         return 0.0
     digits = _LAST_DIGIT.search(_text(value))
@@ -198,7 +198,7 @@ def _moment(value: Any) -> float | None:
 def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | None":
     """Return the time axis of a channel that contains times, read once in blocks; None for other channels.
 
-    A channel that rises evenly and has no unit of another quantity counts as times or sample numbers.
+    A channel that rises evenly, without the unit of another quantity, counts as times or sample numbers.
     """
     found = _TIME.fullmatch(channel.label.strip())
     # Climate and Forecast conventions, 4.4: "seconds since 2026-03-01".
@@ -206,9 +206,9 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
     first = next(iterator := iter(blocks), np.empty(0))
     scan = _begin(first) if found is not None or unit in _NO_UNITS else None
     is_named = found is not None and unit in SECONDS
-    # Times that are all equal were rounded so coarsely that they cannot contradict the stated rate.
+    # If all times are equal, they were rounded too coarsely to contradict the stated rate.
     if is_named and scan is None and np.ptp(first) != 0 and _is_time(channel, found, first):
-        trouble = "has times that do not rise; sort its rows by time"
+        trouble = "has times that do not rise; sort the rows by time"
         return TimeAxis(float(first[0]), 1.0, 0.0, 0.0, (), trouble, unit=None, is_named=True)
     is_even = scan is not None and first.size >= _LEAST_RISING and not (scan.is_coarse or scan.is_inferred)
     if scan is None or not (is_named or is_even):
@@ -220,7 +220,7 @@ def time_axis(channel: SourceChannel, blocks: Iterable[Reals]) -> "TimeAxis | No
         return replace(axis, unit=unit or found["unit"] or "", is_named=True)
     if axis.interval == 1:
         return replace(axis, unit=None)
-    # Values under another name may have any unit, so the mapping must confirm the rate.
+    # Evenly rising values under another name may have any unit: the mapping must confirm the rate.
     uncertainty = max(axis.uncertainty, 1e-12 * axis.interval)
     return replace(axis, unit=unit if unit in SECONDS else "", uncertainty=uncertainty)
 
@@ -248,7 +248,7 @@ class TimeAxis:
     uncertainty: float
     """Uncertainty of the sample interval; 0 if exact."""
     rounding: float
-    """Uncertainty of the start time due to rounding."""
+    """Uncertainty of the start time, caused by rounding."""
     runs: tuple[tuple[int, int], ...]
     """For each regular stretch: its first sample, and the time of that sample in sample intervals."""
     trouble: str = ""
@@ -260,11 +260,11 @@ class TimeAxis:
 
     @property
     def moments(self) -> tuple[object, ...]:
-        """Start and runs of the times; both are equal for channels sampled at the same times."""
+        """Start and runs of the times; channels sampled at the same times have the same start and runs."""
         return round(self.start / self.interval, 2), self.runs
 
     def of(self, channel: SourceChannel) -> SourceChannel:
-        """Return a channel with these times, and an error text if they contradict its stated rate.
+        """Return a channel with these times, and an error text if the times contradict its stated rate.
 
         Sample numbers (no unit) only show which samples are missing.
         """
@@ -285,7 +285,7 @@ class TimeAxis:
             channel,
             sample_rate_hz=rate if rate is not None or not is_exact or bounds is None else bounds[0],
             rate_bounds_hz=None if is_exact else bounds,
-            # If the times begin at zero, they are relative to the stated start of the channel.
+            # Times that begin at zero are relative to the channel's stated start.
             start_s=self.start * second
             + ((channel.start_s or 0.0) if abs(self.start) < self.interval else 0.0),
             start_error_s=self.rounding * second + channel.start_error_s,
@@ -296,7 +296,7 @@ class TimeAxis:
 
 
 def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
-    """Return whether a rate is within bounds, widened by the largest difference of two clocks."""
+    """Return whether a rate is within bounds that are widened by the largest difference of two clocks."""
     low, high = bounds_hz
     return low * (1 - SAME_RATE) <= rate_hz <= high * (1 + SAME_RATE)
 
@@ -307,7 +307,7 @@ def _begin(block: Reals) -> "_Scan | None":
     rising = intervals[intervals > 0]
     if not rising.size or np.count_nonzero(intervals >= 0) < _RISING * intervals.size or block.size < 2:
         return None
-    # A lost sample doubles an interval; rounding lengthens one by at most a third if samples can be counted.
+    # A lost sample doubles an interval. Rounding adds at most a third if samples can be counted at all.
     typical = float(np.median(rising[rising <= 1.4 * np.quantile(rising, _SINGLE)]))
     is_near = np.abs(intervals / typical - 1) <= _OFF
     # Repeated and coarse times have intervals of zero, which lost samples do not explain.
@@ -320,8 +320,8 @@ def _begin(block: Reals) -> "_Scan | None":
         rounding = float(np.quantile(rising, 0.01)) if is_repeated else digit
         return _Scan(mean, rounding, is_inferred=True)
     are_many_lost = bool(np.count_nonzero(~is_near) > many)
-    # Intervals of 1.04 last digits, rounded to whole digits, look like one lost sample in 25. Losses move all
-    # later times away from a line; rounding moves each time by half a digit at most.
+    # Rounding to whole last digits makes intervals of 1.04 digits look like one lost sample in 25. But a loss
+    # moves all later times away from a line, while rounding moves each time by at most half a digit.
     off = np.abs(intervals[~is_near] - typical)
     is_digit = off.size >= _LEAST_ROUNDED and 0.9 * float(np.min(off)) < digit
     if is_digit and _distance_from_line(block) < _COARSE_SPREAD * digit:
@@ -365,7 +365,7 @@ def _jitter(times: Reals, distance: Reals, interval: float, unit: float) -> floa
     off = off - np.mean(off, axis=1, keepdims=True)
     off = off - np.outer(off @ place / np.sum(place**2), place)
     low, high = np.quantile(off, (_OUTLIERS, 1 - _OUTLIERS), axis=1)
-    # The unit of the next row may be larger, and its times may already begin within a row.
+    # The next row may have a larger unit, and the times with that unit may begin within this row.
     return float(np.max(high - low - _COARSE_SPREAD * np.maximum(units, np.append(units[1:], 0.0))))
 
 
@@ -424,7 +424,7 @@ class _Scan:
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
         scale = np.array([1.0, 1.0 / span])
-        # The errors of rounding cancel in a line through all times.
+        # In a line fitted to all times, rounding errors cancel.
         offset, slope = np.linalg.lstsq(
             self._squares * np.outer(scale, scale), self._products * scale, rcond=None
         )[0].tolist()
@@ -436,22 +436,22 @@ class _Scan:
         trouble = self._trouble or _time_fault(self._runs, self._samples, span)
         if not trouble and spread > allowed:
             trouble = (
-                f"has times up to {spread / interval:.3g} sample intervals off an evenly spaced axis: they "
-                "are uneven, or have too few digits to count lost samples"
+                f"has times that deviate by up to {spread / interval:.3g} sample intervals from an evenly "
+                "spaced axis: they are uneven, or have too few digits to count lost samples"
             )
         if not trouble and self._jitter > _JITTER * interval:
             trouble = (
-                f"has times that jitter by {self._jitter / interval:.2g} sample intervals, more than their "
-                "digits explain"
+                f"has times that jitter by {self._jitter / interval:.2g} sample intervals, more than the "
+                "rounding of their digits explains"
             )
         is_exact = spread < EVEN * interval
         if is_exact:
             before, place = self._last or (self._start + interval, 1)
             interval = (before - self._start) / place if place else interval
-        # Rounded times may have equal intervals even if samples are lost, so the mapping must state the rate.
+        # Rounded times may have equal intervals in spite of lost samples: the mapping must state the rate.
         uncertainty = 1e-12 * interval * self.is_inferred if is_exact else spread / span
         start = self._start if is_exact else self._start + offset
-        # If the times repeat a pattern, all may be shifted by the part of a digit that their spread leaves.
+        # If rounding repeats a pattern, all times may be shifted by the part of a digit beyond their spread.
         local = min(spread, float(np.median(self._spreads or [0.0])), self._digit) * (not is_exact)
         rounding = 2 * self._digit / max(self._samples, 1) ** 0.5 + (self._digit - local) / 2
         return TimeAxis(start, interval, uncertainty, rounding, tuple(self._runs), trouble)

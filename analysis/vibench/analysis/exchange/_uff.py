@@ -86,7 +86,7 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
     rate = recording.sample_rate_hz
     kind, *exponents = QUANTITIES.get(channel.quantity, UNKNOWN)
     yield DELIMITER
-    # Little-endian IEEE numbers after eleven lines of text.
+    # These numbers announce eleven lines of text, and then little-endian IEEE values.
     yield f"{58:6d}b{1:6d}{2:6d}{11:12d}{excerpt.samples * DOUBLE_BYTES:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
     yield id_line(channel.role)
     yield id_line(f"{excerpt.name} {recording.recording_id}")
@@ -118,6 +118,8 @@ HEADER_LINES = 11
 UNITS = "164"
 LENGTHS = {1.0: "m", 100.0: "cm", 1000.0: "mm", 39.37: "in"}
 """Unit of length, keyed by the number of units per metre (dataset 164)."""
+CODES = {"1": "m", "3": "m", "5": "mm", "6": "cm", "7": "in", "8": "mm", "10": "mm"}
+"""Unit of length, keyed by the code of dataset 164."""
 MOTIONS = {8: "m", 11: "m/s", 12: "m/s2"}
 """Units of displacement, velocity and acceleration, keyed by data type."""
 LEAST_TEXT = 2
@@ -178,9 +180,10 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
             continue
         kind = _line(file)
         if kind.strip() == UNITS:
-            begin, _, factors = file.tell(), _line(file), _line(file)
+            begin, code, factors = file.tell(), _line(file)[:10].strip(), _line(file)
             per_metre = _real(factors[:25]) or 0.0
-            length = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
+            stated = LENGTHS.get(round(per_metre, 2), f"m/{per_metre:g}")
+            length = " or ".join(sorted({CODES.get(code, stated), stated}))
             first = first or length
             file.seek(begin)
         if kind[:6].strip() != "58":
@@ -190,7 +193,7 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
         found.append((header, length, _body(file, kind, header)))
     for number, (header, length, body) in enumerate(found, start=1):
         if body is not None:
-            # The dataset of units may also follow the functions.
+            # Create the channels last, because the dataset of units may follow the functions.
             yield _channel(number, header, length or first), body
 
 
@@ -199,32 +202,28 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     ordinate, count, spacing = (_whole(header[6][at : at + 10]) for at in (0, 10, 20))
     if count < 0:
         raise ValueError(f"a dataset of {count} numbers")
-    offset = file.tell()
-    is_binary = kind[6:7].lower() == "b"
-    if is_binary:
+    offset, order = file.tell(), 0
+    if kind[6:7].lower() == "b":
         order, numbers, length = (_whole(kind[a:b]) for a, b in ((7, 13), (13, 19), (31, 43)))
         if order not in BYTE_ORDERS:
             raise ValueError(f"its byte order is {order}; only 1 (little-endian) and 2 (big) can be read")
         if numbers != IEEE:
             raise ValueError(f"its binary numbers are of kind {numbers}; only {IEEE} (IEEE) can be read")
         file.seek(offset + (count * SIZES[ordinate] if ordinate in SIZES else length))
-        _skip_text(file)
-    else:
-        order = 0
-        _skip_text(file)
-        if (most := (file.tell() - offset) // LEAST_TEXT) < count:
-            raise ValueError(f"it states {count} numbers, but contains at most {most}")
+    _skip_text(file)
+    if not order and (most := (file.tell() - offset) // LEAST_TEXT) < count:
+        raise ValueError(f"it states {count} numbers, but contains at most {most}")
     is_time = _whole(header[5][:5]) in TIME_FUNCTIONS and _whole(header[7][:10]) in {0, TIME_AXIS}
     if not is_time or ordinate not in SIZES or spacing != EVENLY_SPACED or count < 2:
         return None
-    return _Body(offset, file.tell(), count, ordinate, BYTE_ORDERS[order] if is_binary else "")
+    return _Body(offset, file.tell(), count, ordinate, BYTE_ORDERS.get(order, ""))
 
 
 def _whole(text: str) -> int:
     try:
         return int(text)
     except ValueError as error:
-        raise ValueError(f"a dataset 58 has {text.strip()!r} in place of a whole number") from error
+        raise ValueError(f"a dataset 58 has {text.strip()!r} instead of a whole number") from error
 
 
 def _line(file: BinaryIO) -> str:
@@ -302,13 +301,12 @@ def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
 
 
 # Universal File Format for functions of frequency, as text: frequency responses, coherences and densities.
-#
 # Layout: SDRC universal dataset 58, records 1 to 12, function types 4 (frequency response function), 6
 # (coherence) and 9 (power spectral density), double precision. Frequencies have six digits, so lines are
-# written as evenly spaced only if six digits represent the first line and the spacing. Modal programs expect
-# evenly spaced lines that begin at a multiple of their spacing. A frequency response or coherence at
-# multiples of another spacing is therefore interpolated to the nearest six-digit spacing. All other lines are
-# written with their frequencies.
+# written as evenly spaced only if six digits represent the first line and the spacing exactly. Modal programs
+# expect evenly spaced lines that begin at a multiple of the spacing. If the spacing needs more digits, a
+# frequency response or coherence is therefore interpolated to the nearest six-digit spacing. All other
+# functions are written with the frequency of each line.
 
 _COMPLEX_DOUBLE = 6
 _COLOUR = 11
@@ -360,29 +358,23 @@ class UniversalFunction:
     response: FunctionAxis
     reference: FunctionAxis
     note: str
-    """Description of the estimate, for ID line 4."""
+    """Description of how the function was estimated, for ID line 4."""
 
 
-def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction], path: Path) -> None:
-    """Write the units, then one dataset per function."""
-    with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
-        file.write(SI_UNITS)
-        for number, each in enumerate(functions, start=1):
-            file.writelines(f"{line}\n" for line in _dataset(excerpt.recording, each, number))
-
-
-def write_uff_scan(
-    nodes: Mapping[int, tuple[float, float, float]],
+def write_uff_functions(
     functions: Sequence[tuple[RecordingDescription, UniversalFunction]],
     path: Path,
+    nodes: Mapping[int, tuple[float, float, float]] | None = None,
 ) -> None:
-    """Write the node coordinates as dataset 15, then one dataset 58 per function."""
+    """Write the units, the coordinates of nodes as dataset 15, then one dataset 58 per function."""
     with path.open("x", encoding="ascii", errors="replace", newline="\n") as file:
-        file.write(f"{SI_UNITS}{DELIMITER}\n{15:6d}\n")
-        for node, place in nodes.items():
-            coordinates = "".join(f"{each:13.5E}" for each in place)
-            file.write(f"{node:10d}{0:10d}{0:10d}{_COLOUR:10d}{coordinates}\n")
-        file.write(f"{DELIMITER}\n")
+        file.write(SI_UNITS)
+        if nodes is not None:
+            file.write(f"{DELIMITER}\n{15:6d}\n")
+            for node, place in nodes.items():
+                coordinates = "".join(f"{each:13.5E}" for each in place)
+                file.write(f"{node:10d}{0:10d}{0:10d}{_COLOUR:10d}{coordinates}\n")
+            file.write(f"{DELIMITER}\n")
         for number, (recording, each) in enumerate(functions, start=1):
             file.writelines(f"{line}\n" for line in _dataset(recording, each, number))
 
@@ -452,7 +444,7 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
     """Return a frequency that is a multiple of a spacing, and this spacing; zeros if there is no such pair.
 
-    Both have six digits. pyEMA and sdypy-EMA count the lines below this frequency; rounding may add one.
+    Both have six digits. pyEMA and sdypy-EMA count the lines below this frequency; rounding may add one line.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))
@@ -476,7 +468,7 @@ def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[
     if frequency_hz is not None:
         columns.insert(0, [f"{hz:13.5E}" for hz in frequency_hz])
     points = ["".join(row) for row in zip(*columns, strict=True)]
-    # Four numbers per line; with frequencies, two real values or one complex value.
+    # A line contains four numbers; with frequencies, it contains two real values or one complex value.
     width = _PER_LINE // len(parts) // (1 if frequency_hz is None else 2)
     for start in range(0, len(points), width):
         yield "".join(points[start : start + width])

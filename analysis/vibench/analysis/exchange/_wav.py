@@ -28,7 +28,7 @@ FULL_COUNT = 2**31
 
 
 def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_progress) -> None:
-    """Write all channels in blocks; lost samples become zero, larger values are clipped to full scale.
+    """Write all channels in blocks; lost samples become zero, and values beyond full scale are clipped.
 
     Counts of converters of up to 32 bits stay exact. Raises InvalidRequest for a fractional sample rate, or
     too many samples for a WAV file.
@@ -59,17 +59,17 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = ignore_
 
 
 ORDERS = {b"RIFF": "<", b"RIFX": ">"}
-"""Byte order by first bytes of the file; RF64 files above 4 GiB store sizes elsewhere and are not read."""
+"""Byte order, keyed by the file's first bytes; RF64 (above 4 GiB) stores sizes elsewhere and is not read."""
 FIRST_CHUNK = 12
 FORMAT_BYTES, EXTENSIBLE_BYTES = 16, 40
-"""Size of a plain format chunk, and of one that states the number of used bits per sample."""
+"""Sizes of two format chunks: the plain chunk, and one with the number of used bits per sample."""
 UNKNOWN_SIZE = 2**32 - 1
 """Size field of a streamed file, written before the size was known."""
 
 
 @contextmanager
 def open_wav(path: Path) -> Iterator[Source]:
-    """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped except for 24 bits.
+    """Open a WAV file with channels ``"1"``, ``"2"``, ..., memory-mapped unless samples have 24 bits.
 
     Floats from -1 to 1 are fractions of full scale too, as audio programs write them.
 
@@ -122,7 +122,7 @@ def _valid_bits(path: Path) -> int:
                 raise ValueError(f"it states {size} bytes {what}, but contains {left}")
             chunks += name == b"data"
             if chunks > 1:
-                raise ValueError("it has samples in several chunks; only one can be read")
+                raise ValueError("it has samples in several chunks; only one chunk can be read")
             after = file.tell() + size + size % 2
             if name == b"fmt " and size >= FORMAT_BYTES:
                 bits = _format_bits(file.read(EXTENSIBLE_BYTES), order, size)
@@ -145,7 +145,7 @@ def _read(path: Path) -> tuple[int, NDArray[Any]]:
         try:
             return wavfile.read(path, mmap=True)
         except ValueError:
-            # Samples of 24 bits cannot be memory-mapped; scipy reads them as the upper bytes of 32 bits.
+            # scipy cannot memory-map samples of 24 bits, but reads them into the upper bytes of 32 bits.
             return wavfile.read(path)
 
 

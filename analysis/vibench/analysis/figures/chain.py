@@ -13,9 +13,9 @@ from ..tables import Table, rows, table
 from . import style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
-"""Height [in] of the figure without runs and with runs."""
+"""Height [inches] of the figure without runs and with runs."""
 _SMALLEST = 1e-8
-"""Smallest transmission drawn; smaller values are drawn at this value."""
+"""Smallest transmission drawn; smaller transmissions are drawn at this value."""
 _DECADES = 4.0
 """Number of decades shown below the largest motion."""
 _NOTHING = 1e-300
@@ -25,8 +25,7 @@ _NOTHING = 1e-300
 def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
     """Draw waves and transmission; if there are runs, also motion, energies and impacts of the last run."""
     last = found.shown_run
-    with style.figure_style():
-        figure = style.new_figure(_WAVES_IN if last is None else _RUNS_IN)
+    with style.drawing(_WAVES_IN if last is None else _RUNS_IN) as figure:
         if last is None:
             waves, across = figure.subplots(2, 1, sharex=True)
         else:
@@ -45,8 +44,8 @@ def chain_figure(found: ChainAnswer) -> style.DrawnFigure:
     if last is not None:
         what = "x of m0" if found.request.drive is ChainDrive.STEADY else "root mean square of x of m0"
         caption += (
-            f" Map: {what} over place and time in the last run; dots: impacts. Bottom: mean energy with "
-            "standard error, and number of impacts, of each cell."
+            f" Map: {what} over place and time in the last run; dots: impacts. Bottom: for each cell, its "
+            "mean energy with standard error, and its number of impacts."
         )
     return style.DrawnFigure(
         name="chain",

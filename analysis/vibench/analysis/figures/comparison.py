@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 
 from vibench.acquisition import printable
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
+from ..comparison import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
-from ..overlay.ensemble import CurveDifference
-from ..tables import Table, rows, table
+from ..tables import Table, columns, rows, table
 from . import style
 
 Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
@@ -23,6 +22,7 @@ _STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
     CurveOrigin.PREDICTED: ((0, (9, 3)), (0, (5, 2, 1, 2, 1, 2))),
     CurveOrigin.STABLE: ("-", ":"),
     CurveOrigin.UNSTABLE: ("--", "-."),
+    CurveOrigin.UNDECIDED: ((0, (1, 3)), (0, (5, 2, 1, 2, 1, 2))),
 }
 """Line styles by origin: the first for transmission and Response I, the second for Response II."""
 _LONE = 1
@@ -50,9 +50,8 @@ def comparison_figure(
     if not curves:
         raise InvalidRequest("a figure without curves was requested; choose one or more curves")
     difference = None if pair is None else curve_difference(*pair)
-    with style.figure_style():
-        count = 1 if difference is None else 2
-        figure = style.new_figure(_HEIGHT_IN + (count - 1) * _DIFFERENCE_IN)
+    count = 1 if difference is None else 2
+    with style.drawing(_HEIGHT_IN + (count - 1) * _DIFFERENCE_IN) as figure:
         panels = figure.subplots(count, 1, sharex=True, height_ratios=(3.2, 1.0)[:count], squeeze=False)[:, 0]
         top: Axes = panels[0]
         sources = list(dict.fromkeys(each.source for each in curves))
@@ -61,7 +60,9 @@ def comparison_figure(
         style.magnitude_axis(top)
         top.set(ylim=_heights(curves), ylabel="|x / U|  (m0 over base)")
         if difference is not None and pair is not None:
-            _difference(panels[1], difference)
+            panels[1].plot(difference.frequency_hz, difference.decibel, color=style.MEASURED, linewidth=0.8)
+            panels[1].axhline(0, color=style.BOUNDS, linewidth=0.6)
+            panels[1].set_ylabel("difference\n[dB]")
         for marker_hz in markers_hz:
             for axes in panels:
                 axes.axvline(marker_hz, color=style.BOUNDS, linewidth=0.8, linestyle="-.")
@@ -95,12 +96,6 @@ def _curve(axes: Axes, curve: Curve, colour: str) -> None:
     )
 
 
-def _difference(axes: Axes, difference: CurveDifference) -> None:
-    axes.plot(difference.frequency_hz, difference.decibel, color=style.MEASURED, linewidth=0.8)
-    axes.axhline(0, color=style.BOUNDS, linewidth=0.6)
-    axes.set_ylabel("difference\n[dB]")
-
-
 def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
     """Return limits of the magnitude axis that fit the curves; bounds may exceed these limits."""
     known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
@@ -121,8 +116,8 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
     if pair is not None:
         difference = curve_difference(*pair)
         sentences.append(
-            f"Difference of {pair[0].name} from {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
-            f"root mean square {difference.rms_db:.2g} dB."
+            f"Difference between {pair[0].name} and {pair[1].name}: median {difference.median_abs_db:.2g} "
+            f"dB, root mean square {difference.rms_db:.2g} dB."
         )
     return " ".join(sentences)
 
@@ -134,9 +129,11 @@ def comparison_tables(
     found = [
         table(
             f"{name}_{number}_{_file_word(curve)}",
-            frequency_hz=curve.frequency_hz,
-            magnitude_displacement_over_displacement=curve.magnitude,
-            relative_standard_deviation=curve.relative_sd,
+            **columns(
+                curve,
+                "frequency_hz magnitude_displacement_over_displacement=magnitude "
+                "relative_standard_deviation=relative_sd",
+            ),
         )
         for number, curve in enumerate(curves, start=1)
     ]
@@ -150,15 +147,8 @@ def comparison_tables(
             )
         )
     if pair is not None:
-        difference = curve_difference(*pair)
-        found.append(
-            table(
-                f"{name}_difference",
-                frequency_hz=difference.frequency_hz,
-                difference_db=difference.decibel,
-                standard_errors=difference.standard_errors,
-            )
-        )
+        keys = "frequency_hz difference_db=decibel standard_errors"
+        found.append(table(f"{name}_difference", **columns(curve_difference(*pair), keys)))
     return tuple(found)
 
 

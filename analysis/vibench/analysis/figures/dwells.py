@@ -1,28 +1,102 @@
-"""Figure of dwells at one frequency and several levels: time signals and spectra (Fig. 14 of the paper)."""
+"""Figures of dwells: time signals and spectra (Fig. 14 of the paper), phase portraits."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..chaos.verdict import MotionKind
+from vibench.sim import Specimen
+
+from ..chaos.verdict import MotionKind, MotionVerdict
 from ..overlay.overlay import SPECTRUM, DwellOverlay
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
-from ..tables import Table, plus_minus, table
+from ..tables import Table, columns, plus_minus, table
 from . import style
 from .ensemble_band import (
-    ModelResonances,
     band_columns,
     draw_band,
     label_resonances,
     mark_resonances,
-    model_resonances,
     run_text,
     simulated_label,
 )
+
+_PANEL_IN = 2.9
+_COLUMNS = 3
+_ORBIT_PERIODS = 60.0
+"""Number of drive periods drawn, up to the end of the dwell; more would fill the panel."""
+_MOST_POINTS = 2000
+
+
+def portraits_figure(analyses: Sequence[DwellAnalysis]) -> style.DrawnFigure:
+    """Draw m0's velocity over displacement with one point per drive period, one panel for each level."""
+    rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
+    rows = -(-len(rising) // _COLUMNS)
+    with style.drawing(0.5 + _PANEL_IN * rows) as figure:
+        panels = figure.subplots(rows, min(_COLUMNS, len(rising)), squeeze=False).ravel()
+        for axes, analysis in zip(panels, rising, strict=False):
+            _portrait(axes, analysis)
+        for unused in panels[len(rising) :]:
+            unused.set_axis_off()
+        style.legend_above(figure, [panels[0]], columns=2)
+    return style.DrawnFigure(
+        name="portraits_" + "_".join(each.facts.name for each in rising),
+        title=f"Phase portraits at {rising[0].excitation.frequency_hz:g} Hz",
+        caption=_caption(rising),
+        figure=figure,
+        tables=tuple(
+            table(
+                f"section_{each.facts.name}",
+                **columns(each.motion.section, "time_s displacement_m velocity_m_per_s"),
+            )
+            for each in rising
+        ),
+    )
+
+
+def verdict_text(verdict: MotionVerdict) -> str:
+    """Return the kind of motion in a dwell, in a few words."""
+    match verdict:
+        case MotionVerdict(kind=MotionKind.PERIODIC, period=period) if period is not None and period > 1:
+            return f"periodic, {period} drive periods"
+        case _:
+            return verdict.kind.value
+
+
+def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
+    section = analysis.motion.section
+    length, unit = style.with_prefix(float(np.max(np.abs(section.orbit_displacement_m))), "m")
+    speed, speed_unit = style.with_prefix(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
+    rate = analysis.response.displacement.sample_rate_hz
+    shown = round(_ORBIT_PERIODS / section.drive_hz * rate)
+    orbit = length * section.orbit_displacement_m[-shown:], speed * section.orbit_velocity_m_per_s[-shown:]
+    label = f"last {_ORBIT_PERIODS:g} drive periods"
+    axes.plot(*orbit, color=style.BOUNDS, linewidth=0.4, label=label)
+    points = length * section.displacement_m[-_MOST_POINTS:], speed * section.velocity_m_per_s[-_MOST_POINTS:]
+    axes.plot(*points, ".", color=style.SIMULATED, markersize=2.5, label="once per drive period")
+    axes.set(
+        xlabel=f"x of {analysis.facts.mass} [{unit}]",
+        ylabel=f"velocity of {analysis.facts.mass} [{speed_unit}]",
+        title=f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}",
+    )
+
+
+def _caption(rising: Sequence[DwellAnalysis]) -> str:
+    sentences = []
+    for each in rising:
+        verdict = each.motion.verdict
+        text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
+        if verdict.least_exponent_per_s is not None:
+            text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
+        sentences.append(text)
+    return (
+        f"Velocity over displacement of {rising[0].facts.mass} (grey), and one point per recorded drive "
+        f"period, always at the same phase (colour). {'. '.join(sentences)}."
+    )
+
 
 _ROW_IN = 1.75
 _FRAME_IN = 1.1
@@ -35,9 +109,8 @@ Pair = tuple[DwellAnalysis, DwellOverlay | None]
 def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
     """Draw one row per level, weak to strong: whole dwell, last periods, spectrum of the analysed window."""
     rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
-    at = model_resonances(specimen_of(rising[0][0].facts.bench))
-    with style.figure_style():
-        figure = style.new_figure(_FRAME_IN + _ROW_IN * len(rising))
+    at = specimen_of(rising[0][0].facts.bench)
+    with style.drawing(_FRAME_IN + _ROW_IN * len(rising)) as figure:
         panels = figure.subplots(len(rising), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.5))
         for row, (analysis, overlay) in zip(panels, rising, strict=True):
             _whole(row[0], analysis)
@@ -47,7 +120,7 @@ def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
             axes.set_xlabel(label)
         panels[0, 0].set_title("whole dwell")
         panels[0, 1].set_title(f"last {_ZOOM_PERIODS:g} periods")
-        label_resonances(panels[0, 2], ModelResonances((), at.bound_hz))
+        label_resonances(panels[0, 2], at, without_contact=False)
         style.legend_above(figure, [panels[0, 1], panels[0, 0], panels[0, 2]], columns=3)
         figure.align_ylabels(panels[:, 0])
     return style.DrawnFigure(
@@ -90,8 +163,8 @@ def _zoom(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None) -> 
     axes.set(xlim=(1e3 * float(time_s[0]), 0), ylabel=f"x [{unit}]")
 
 
-def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None, at: ModelResonances) -> None:
-    mark_resonances(axes, ModelResonances((), at.bound_hz))
+def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None, at: Specimen) -> None:
+    mark_resonances(axes, at, without_contact=False)
     frequency_hz, size = spectrum_columns(response)
     axes.plot(frequency_hz, size, color=style.MEASURED, linewidth=1.0)
     if overlay is not None:
@@ -122,12 +195,12 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
     window_s = rising[0][0].response.window_s
     text = (
         f"Displacement of {rising[0][0].facts.mass} and its spectrum over the last {window_s:.3g} s "
-        f"(largest line in each {COLUMN_HZ:g} Hz). {' '.join(sentences)}"
+        f"(the largest line within each {COLUMN_HZ:g} Hz). {' '.join(sentences)}"
     )
     if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
         return text
     return (
-        f"{text} Chaotic motions, measured and simulated, can agree in their statistics only, not in their "
+        f"{text} Measured and simulated chaotic motions can agree only in their statistics, not in their "
         "time signals; one simulated run is shown."
     )
 

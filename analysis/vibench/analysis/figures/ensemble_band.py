@@ -1,7 +1,6 @@
 """Median and 95 % band of simulated runs (draws), for figures, tables and captions."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,14 +9,20 @@ from matplotlib.axes import Axes
 from vibench.sim import Specimen
 
 from ..overlay.draws import SimulatedRun
-from ..overlay.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, SteppedSineOverlay, SweepOverlay
-from ..overlay.prediction import ResponsePrediction
+from ..overlay.overlay import (
+    RESPONSE_I,
+    RESPONSE_II,
+    AbstractOverlay,
+    ResponsePrediction,
+    SteppedSineOverlay,
+    SweepOverlay,
+)
 from ..signals.arrays import Reals
 from ..tables import Table, columns, table
 from . import style
 
 ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
-"""Attribute of a result that contains each response to sines, keyed by the name of the response."""
+"""Names of the attributes in which a result stores its responses to sines, keyed by response."""
 RESPONSE_LABELS = {RESPONSE_I: "Response I\nmax |x| / A0", RESPONSE_II: "Response II\n|x at f| / A0"}
 
 
@@ -49,7 +54,7 @@ def draw_band(
     found = overlay.quantity(name)
     if found is None or overlay.run.draws == 1:
         return None
-    # The label omits the number of draws, which differs between recordings; the caption states it.
+    # The number of draws differs between recordings: the caption states the number, the label does not.
     look: dict[str, Any] = {"color": style.SIMULATED, "alpha": 0.25, "zorder": 1.5, "label": "95 % of draws"}
     axes.fill_between(along, shown(found.lower), shown(found.upper), **look)
     return shown(found.median)
@@ -64,7 +69,7 @@ def run_text(overlay: AbstractOverlay[Any]) -> str:
             f"Simulated from the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
             f"median difference {overlay.difference.median_abs_db:.2g} dB, "
             f"{100 * overlay.difference.share_within_two:.0f} % of the values within two standard errors. "
-            "Simulated impacts do not move the recorded base, so chaotic motions differ from measured ones."
+            "Simulated impacts do not move the recorded base, so simulated chaos differs from measured chaos."
         )
     parts = [
         (
@@ -123,43 +128,22 @@ _FREE_LABEL = "resonances without contact"
 _BOUND_LABEL = "terminal resonances (m1 stuck to m2)"
 
 
-@dataclass(frozen=True)
-class ModelResonances:
-    """Resonances of the model [Hz]: without contact, and with m1 stuck to m2."""
-
-    free_hz: tuple[float, ...]
-    bound_hz: tuple[float, ...]
-
-
-def model_resonances(specimen: Specimen) -> ModelResonances:
-    """Return the undamped natural frequencies without contact, and those with m1 stuck to m2."""
-    return ModelResonances(
-        tuple(float(each) for each in specimen.natural_frequencies_hz),
-        tuple(float(each) for each in specimen.bound_frequencies_hz),
-    )
-
-
-def mark_resonances(axes: Axes, at: ModelResonances) -> None:
+def mark_resonances(axes: Axes, of: Specimen, *, without_contact: bool = True) -> None:
     """Draw dashed lines at resonances without contact, and dotted lines at those with m1 stuck to m2."""
-    for frequency in at.free_hz:
-        axes.axvline(
-            frequency, color=style.BOUNDS, linestyle="--", linewidth=0.8, label=_FREE_LABEL, zorder=1
-        )
-    for frequency in at.bound_hz:
-        axes.axvline(
-            frequency, color=style.TERMINAL, linestyle=":", linewidth=1.0, label=_BOUND_LABEL, zorder=1
-        )
+    look: dict[str, Any] = {"linestyle": "--", "linewidth": 0.8, "label": _FREE_LABEL, "zorder": 1}
+    for frequency in of.natural_frequencies_hz if without_contact else ():
+        axes.axvline(frequency, color=style.BOUNDS, **look)
+    look |= {"linestyle": ":", "linewidth": 1.0, "label": _BOUND_LABEL}
+    for frequency in of.bound_frequencies_hz:
+        axes.axvline(frequency, color=style.TERMINAL, **look)
 
 
-def label_resonances(axes: Axes, at: ModelResonances) -> None:
+def label_resonances(axes: Axes, of: Specimen, *, without_contact: bool = True) -> None:
     """Write the frequencies of the resonances above the panel."""
-    _write(axes, at.free_hz, "#555555")
-    _write(axes, at.bound_hz, style.TERMINAL)
-
-
-def _write(axes: Axes, frequencies_hz: Sequence[float], colour: str) -> None:
     low, high = axes.get_xlim()
-    for frequency in frequencies_hz:
-        if low <= frequency <= high:
-            place: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
-            axes.text(frequency, _LABEL_HEIGHT, f"{frequency:.0f}", fontsize=7, color=colour, **place)
+    place: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+    free_hz = of.natural_frequencies_hz if without_contact else ()
+    for frequencies_hz, colour in ((free_hz, "#555555"), (of.bound_frequencies_hz, style.TERMINAL)):
+        for frequency in frequencies_hz:
+            if low <= frequency <= high:
+                axes.text(frequency, _LABEL_HEIGHT, f"{frequency:.0f}", fontsize=7, color=colour, **place)

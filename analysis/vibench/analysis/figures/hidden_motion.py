@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..hidden_motion import Hidden, HiddenMotion, measured_gaps
+from ..signals.arrays import envelope
 from ..tables import Table, columns, table
 from . import style
 
@@ -19,8 +20,7 @@ _POINTS = 200
 
 def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw p between the stops over the whole analysed part of the recording, and enlarged over a few ms."""
-    with style.figure_style():
-        figure = style.new_figure(4.4)
+    with style.drawing(4.4) as figure:
         whole, zoom = figure.subplots(2, 1)
         _whole(whole, motion)
         tables = _zoom(zoom, motion)
@@ -31,7 +31,7 @@ def hidden_motion_figure(motion: HiddenMotion) -> style.DrawnFigure:
         title=f"Hidden motion of {motion.name}",
         caption=(
             "Relative displacement p = y - z of m1, estimated from base acceleration and m0's velocity. "
-            "Above: its extremes; grey where it was not tracked. Below: "
+            "Above: extremes of p, grey where p was not tracked. Below: "
             f"{1e3 * _ZOOM_S:g} ms with impacts, tracked with 95 % bounds, and without a contact model. "
             + " ".join(motion.sentences)
         ),
@@ -53,20 +53,14 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
     for gone in motion.tracked.not_followed:
         first, last = (motion.first_sample + each for each in (gone.first, gone.stop))
         axes.axvspan(first / rate, last / rate, color=style.COLLIDING, label="not followed")
-    length = max(1, motion.tracked.p.size // _COLUMNS)
-    count = motion.tracked.p.size // length
-    pieces = motion.tracked.p[: count * length].reshape(count, length)
-    has_any = ~np.isnan(pieces).all(axis=1)
-    low, high = np.full(count, np.nan), np.full(count, np.nan)
-    low[has_any], high[has_any] = np.nanmin(pieces[has_any], axis=1), np.nanmax(pieces[has_any], axis=1)
-    time_s = motion.time_s[: count * length : length]
-    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=style.MEASURED)
+    shape = envelope(motion.tracked.p, rate, bins=_COLUMNS, start_s=motion.first_sample / rate)
+    axes.fill_between(shape.time_s, _MICRO * shape.lower, _MICRO * shape.upper, color=style.MEASURED)
     _stops(axes, motion)
     axes.set(xlim=(motion.time_s[0], motion.time_s[-1]), xlabel="time [s]")
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
-    # Enlarge the part around the middle impact; without impacts, the middle of the motion.
+    # Enlarge the part around the middle impact. If there are no impacts, enlarge the middle of the motion.
     count = round(_ZOOM_S * motion.sample_rate_hz)
     impacts = motion.tracked.collisions.samples
     middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
@@ -88,8 +82,7 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
 
 def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
     """Draw impulses over time, force over penetration, energy lost at each impact, and measured gaps."""
-    with style.figure_style():
-        figure = style.new_figure(5.2)
+    with style.drawing(5.2) as figure:
         (impulses, force), (energy, gaps) = figure.subplots(2, 2)
         _impulses(impulses, motion)
         law = _force(force, motion)
@@ -99,11 +92,11 @@ def hidden_impacts_figure(motion: HiddenMotion) -> style.DrawnFigure:
         name=f"hidden_impacts_{motion.name}",
         title=f"Collisions of {motion.name}",
         caption=(
-            "Above left: impulse of every impact on m1 (dots: tracked; crosses: no contact model). "
-            "Above right: force of a stop over penetration from tracking, with 95 % bounds where determined. "
-            "Below left: share of the energy of relative motion that each impact dissipated, without a "
-            "contact model. Below right: gap from each impact without a contact model, and the gaps used for "
-            "tracking (orange)."
+            "Above left: impulse of every impact on m1 (dots: tracked; crosses: no contact model). Above "
+            "right: force of a stop over penetration from tracking, with 95 % bounds where determined. "
+            "Below left: share of the energy of relative motion that each impact dissipated, estimated "
+            "without a contact model. Below right: gap from each impact without a contact model, and the "
+            "gaps used for tracking (orange)."
         ),
         figure=figure,
         tables=(*_impact_tables(motion), *law),
@@ -132,7 +125,7 @@ def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
     if not is_determined or at_1um is None or exponent is None:
         axes.set_title("as described (not determined by this motion)", fontsize="small")
         return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
-    # The envelope of all force laws whose two parameters lie within their bounds.
+    # Draw the envelope of all force laws with both parameters within their bounds.
     exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
     laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
     low, high = np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from vibench.sim import Parameter, PowerLaw, RigidStops, Specimen, spring_of
-from vibench.sim.accuracy_benchmark.curve import CurvePoint
+from vibench.sim.accuracy_benchmark import CurvePoint
 
 from ..dynamics import ExponentSpectrum
 from ..signals.arrays import Reals
@@ -29,7 +29,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
 
     """
     methods = list(dict.fromkeys(each.method for points in curves.values() for each in points))
-    # Methods beyond the number of colours have other markers.
+    # If there are more methods than colours, the further methods have other markers.
     looks = {
         method: (
             style.LEVELS[place % len(style.LEVELS)],
@@ -39,8 +39,7 @@ def curve_figure(curves: Mapping[str, Sequence[CurvePoint]]) -> style.DrawnFigur
         for place, method in enumerate(methods)
     }
     columns = min(2, len(curves))
-    with style.figure_style():
-        figure = style.new_figure(4.6 if len(curves) == 1 else 6.6)
+    with style.drawing(4.6 if len(curves) == 1 else 6.6) as figure:
         panels = figure.subplots(-(-len(curves) // columns), columns, squeeze=False, sharex=True, sharey=True)
         for axes, (scene, points) in zip(panels.flat, curves.items(), strict=False):
             for method, (colour, line, more) in looks.items():
@@ -88,8 +87,7 @@ def exponent_spectrum_figure(found: ExponentSpectrum) -> style.DrawnFigure:
     request = found.request
     is_frequency = request.along is Parameter.FREQUENCY
     place = found.column("frequency_hz") if is_frequency else 1e6 * found.column("amplitude_m")
-    with style.figure_style():
-        figure = style.new_figure(_SPECTRUM_HEIGHT_IN)
+    with style.drawing(_SPECTRUM_HEIGHT_IN) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         _exponents(upper, place, found)
         middle, low, high = (found.column(n) for n in ("dimension", "dimension_low", "dimension_high"))
@@ -145,7 +143,7 @@ def _numbers(found: ExponentSpectrum) -> Table:
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6
-"""Range of p drawn before and beyond a stop [m]; the paper fits its contact laws up to 1 um beyond."""
+"""Range of p drawn before and beyond a stop [m]; the paper fits its contact laws up to 1 um past it."""
 _GREY = "#9a9a9a"
 _SPEED_M_PER_S = 0.1
 """Speed at which laws with losses are drawn: the impact speed of the paper's specimen at 5 um, 260 Hz."""
@@ -160,8 +158,7 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigur
     """
     rows = -(-len(specimens) // _COLUMNS)
     tables = []
-    with style.figure_style():
-        figure = style.new_figure(0.6 + 2.1 * rows)
+    with style.drawing(0.6 + 2.1 * rows) as figure:
         panels = figure.subplots(rows, min(_COLUMNS, len(specimens)), squeeze=False).flat
         for axes, named in zip_longest(panels, specimens.items()):
             if named is None:
@@ -172,9 +169,9 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> style.DrawnFigur
         name="contact_forces",
         title="Forces of the contact laws",
         caption=(
-            "Force that pushes m1 back from a stop (grey) over p = y - z; at the opposite stop, its sign is "
-            f"reversed. A law with losses is shown at {_SPEED_M_PER_S:g} m/s, while loading (solid) and "
-            "unloading (dashed)."
+            "Force that pushes m1 back from a stop (grey) over p = y - z; at the opposite stop, the sign of "
+            f"the force is reversed. A law with losses is shown at {_SPEED_M_PER_S:g} m/s, while loading "
+            "(solid) and unloading (dashed)."
         ),
         figure=figure,
         tables=tuple(tables),
@@ -185,7 +182,7 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
     below_m, above_m = specimen.gaps_m
     nearer_m = min(below_m, above_m)
     first_m = -nearer_m if isinstance(specimen.contact, PowerLaw) else nearer_m - _BEFORE_M
-    # p goes from free motion into the nearer stop; `side` is the sign of p at this stop.
+    # The plotted p extends from free motion into the nearer stop; `side` is the sign of p at this stop.
     side = -1.0 if below_m < above_m else 1.0
     stop_m, p = side * nearer_m, side * np.linspace(first_m, nearer_m + _BEYOND_M, _POINTS)
     axes.axvline(1e6 * stop_m, color=_GREY, linewidth=0.8)
@@ -196,14 +193,13 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
         axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3)
         axes.set(ylim=(min(-0.1 * side, side), max(-0.1 * side, side)), yticks=[0.0])
         return []
-    pressed, let_go = (_force(specimen, p, side * each) for each in (_SPEED_M_PER_S, -_SPEED_M_PER_S))
+    # Adding zero turns "-0" into "0" in tables.
+    pressed, let_go = (
+        np.asarray(spring_of(specimen).force(p, np.full_like(p, side * speed))) + 0.0
+        for speed in (_SPEED_M_PER_S, -_SPEED_M_PER_S)
+    )
     axes.plot(1e6 * p, pressed, color=style.MEASURED)
     if not np.array_equal(pressed, let_go):
         axes.plot(1e6 * p, let_go, color=style.SIMULATED, linestyle="--")
     name = re.sub(r"\W+", "_", label).strip("_")
     return [table(f"contact_forces_{name}", p_m=p, pressed_n=pressed, let_go_n=let_go)]
-
-
-def _force(specimen: Specimen, p: Reals, speed: float) -> Reals:
-    # Adding zero turns "-0" into "0" in tables.
-    return np.asarray(spring_of(specimen).force(p, np.full_like(p, speed))) + 0.0

@@ -1,11 +1,12 @@
-"""Figure of Responses I and II at each frequency or level of a stepped sine, for steps up and down."""
+"""Figures of stepped sines: Responses I and II of each step, and the backbone of tracked resonances."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from vibench.acquisition.plan import (
     EXCITATION_KINDS,
@@ -18,8 +19,17 @@ from vibench.acquisition.plan import (
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
 from ..signals.arrays import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
-from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis, feedback_sentences, noted_jumps
-from ..tables import columns, plus_minus, table
+from ..sine.stepped_response import (
+    SteppedResponse,
+    SteppedSineAnalysis,
+    TrackedResonance,
+    backbone_sentence,
+    feedback_sentences,
+    lost_levels,
+    noted_jumps,
+    tracked_resonances,
+)
+from ..tables import columns, plus_minus, rows, table
 from . import style
 from .ensemble_band import (
     ATTRIBUTES,
@@ -53,8 +63,7 @@ def stepped_sine_figure(
 ) -> style.DrawnFigure:
     """Draw Responses I and II over the stepped quantity, with a different marker for each direction."""
     along = look.along(analysis.response)
-    with style.figure_style():
-        figure = style.new_figure(_HEIGHT_IN)
+    with style.drawing(_HEIGHT_IN) as figure:
         first, second = figure.subplots(2, 1, sharex=True)
         _responses(first, along, analysis, overlay, RESPONSE_I)
         _responses(second, along, analysis, overlay, RESPONSE_II)
@@ -69,10 +78,11 @@ def stepped_sine_figure(
     if overlay is not None:
         content |= simulated_responses(overlay)
     name = f"stepped_sine_{analysis.facts.name}"
+    caption = [look.caption(analysis.excitation, found), *feedback_sentences(analysis.facts.feedback)]
     return style.DrawnFigure(
         name=name,
         title=look.title(analysis.excitation, found),
-        caption=_caption(analysis, overlay, look),
+        caption=" ".join(caption if overlay is None else [*caption, run_text(overlay)]),
         figure=figure,
         tables=(table(name, **content),),
     )
@@ -91,8 +101,8 @@ def _responses(
         axes.plot(along[chosen], values, marker, color=style.MEASURED, label=f"measured, {direction}")
         if overlay is not None:
             _draw_simulated(axes, along, chosen, overlay, what, (marker, direction))
-    for jump in noted_jumps(analysis.facts.feedback):
-        axes.axvspan(jump.low_hz, jump.high_hz, color=style.MEASURED, alpha=0.3)
+    for low_hz, high_hz, _ in noted_jumps(analysis.facts.feedback):
+        axes.axvspan(low_hz, high_hz, color=style.MEASURED, alpha=0.3)
     style.magnitude_axis(axes)
     axes.set_ylabel(RESPONSE_LABELS[what])
 
@@ -110,17 +120,6 @@ def _draw_simulated(
     label = f"{simulated_label(overlay.run)}, {direction}"
     empty: dict[str, Any] = {"markerfacecolor": "none", "elinewidth": 0.8, "capsize": 1.5}
     axes.errorbar(along[chosen], values, reach, fmt=marker, color=style.SIMULATED, label=label, **empty)
-
-
-def _caption(
-    analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, look: SteppedLook[Any]
-) -> str:
-    """Return the caption, with the agreement of the simulation if there is one."""
-    text = look.caption(analysis.excitation, analysis.response)
-    text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
-    if overlay is None:
-        return text
-    return f"{text} {run_text(overlay)}"
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
@@ -175,3 +174,107 @@ TRACKED_RESONANCE: SteppedLook[ResonanceTracking] = SteppedLook(
     title=lambda _, found: f"Tracked resonance, around {np.median(found.frequency_hz):.4g} Hz",
     caption=lambda _, found: tracked_caption(found),
 )
+
+
+_BACKBONE_HEIGHT_IN = 4.2
+_MARGIN = 0.15
+"""Margin around the points, relative to their range, so that no point lies on the frame."""
+_MOST_MARKS = 5
+"""Maximum number of tick intervals on the backbone's frequency axis; labels such as 266.385 are wide."""
+_COLUMNS = "base_m_per_s2 frequency_hz u_frequency_hz mode_hz u_mode_hz damping_ratio amplitude_m"
+_LEVEL = "base acceleration [m/s²]"
+_PHASE = "phase resonance, ± two standard uncertainties"
+_MODE = "natural frequency of the mode"
+_LOST = "no resonance found at this level"
+_SIMULATED = "simulated from the recorded base motion"
+_MARK: dict[str, Any] = {"color": style.BOUNDS, "linestyle": "--", "linewidth": 0.8, "zorder": 1}
+_MEASURED: dict[str, Any] = {"color": style.MEASURED, "marker": "o", "capsize": 2, "linewidth": 0.8}
+
+
+def backbone_figure(
+    analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None = None
+) -> style.DrawnFigure:
+    """Draw resonance and amplitude over base level, and the backbone; mark levels without a resonance."""
+    levels = tracked_resonances(analysis.facts.feedback)
+    base = np.array([each.base_m_per_s2 for each in levels])
+    simulated_m = _simulated_m(levels, analysis, overlay)
+    lost = lost_levels(analysis.facts.feedback)
+    drawn = rows(_interrupt(levels, lost), _COLUMNS)
+    scale, unit = style.with_prefix(float(np.nanmax(drawn["amplitude_m"], initial=0.0)), "m")
+    size = scale * drawn["amplitude_m"]
+    with style.drawing(_BACKBONE_HEIGHT_IN) as figure:
+        places = figure.subplot_mosaic([["frequency", "backbone"], ["amplitude", "backbone"]])
+        frequencies, amplitudes, backbone = (places[each] for each in ("frequency", "amplitude", "backbone"))
+        _frequencies(frequencies, drawn)
+        amplitudes.plot(drawn["base_m_per_s2"], size, color=style.MEASURED, marker="o", linewidth=0.8)
+        if simulated_m is not None:
+            look: dict[str, Any] = {"color": style.SIMULATED, "markerfacecolor": "none", "label": _SIMULATED}
+            amplitudes.plot(base, scale * simulated_m, "s", **look)
+        amplitudes.set_xlabel(_LEVEL)
+        backbone.errorbar(drawn["frequency_hz"], size, xerr=2 * drawn["u_frequency_hz"], **_MEASURED)
+        backbone.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
+        what = "phase resonance" if levels[0].is_fundamental else "drive at phase resonance"
+        backbone.set_xlabel(f"{what} [Hz]")
+        for axes in places.values():
+            axes.margins(_MARGIN)
+        for axes in (amplitudes, backbone):
+            highest = (1.0 + _MARGIN) * axes.dataLim.ymax
+            axes.set(ylabel=f"m0 {_order_text(levels[0])} [{unit}]", ylim=(0.0, highest))
+        for axes in (frequencies, amplitudes):
+            for level in lost:
+                axes.axvline(level, label=_LOST, **_MARK)
+            axes.set_xlim(0.0, (1 + _MARGIN) * max((*base, *lost)))
+        frequencies.sharex(amplitudes)
+        frequencies.tick_params(labelbottom=False)
+        style.legend_above(figure, [frequencies, amplitudes], columns=2)
+    name = f"backbone_{analysis.facts.name}"
+    columns = rows(levels, _COLUMNS)
+    if simulated_m is not None:
+        columns["amplitude_m_simulated"] = simulated_m
+    feedback = feedback_sentences(analysis.facts.feedback)
+    sentences = tracked_caption(analysis.response), backbone_sentence(levels), *feedback
+    return style.DrawnFigure(
+        name=name,
+        title=f"Tracked resonance, around {np.median(columns['frequency_hz']):.4g} Hz",
+        caption=" ".join(filter(None, sentences)),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _interrupt(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
+    """Insert NaN at the levels without a resonance, so that lines are interrupted there."""
+    nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
+    gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
+    return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
+
+
+def _frequencies(axes: Axes, drawn: Mapping[str, Reals]) -> None:
+    base = drawn["base_m_per_s2"]
+    axes.errorbar(base, drawn["frequency_hz"], 2 * drawn["u_frequency_hz"], **_MEASURED, label=_PHASE)
+    if np.isfinite(drawn["mode_hz"]).any():
+        axes.errorbar(
+            base, drawn["mode_hz"], 2 * drawn["u_mode_hz"], color=style.PREDICTED, marker="D",
+            markerfacecolor="none", linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
+        )  # fmt: skip
+    axes.set_ylabel("frequency [Hz]")
+
+
+def _order_text(level: TrackedResonance) -> str:
+    """Return the order of the drive at which the amplitude was measured, for a label."""
+    if level.subharmonic > 1:
+        return f"at 1/{level.subharmonic} of the drive"
+    return f"at {level.harmonic} times the drive" if level.harmonic > 1 else "at resonance"
+
+
+def _simulated_m(
+    levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None
+) -> Reals | None:
+    """Return m0's simulated amplitude at each level; None if a level has no simulated amplitude."""
+    if overlay is None or overlay.response.left_out or analysis.response.left_out:
+        return None
+    if not levels[0].is_fundamental:
+        return None
+    found = overlay.response.response_ii * overlay.response.drive_amplitude_m
+    numbers = [each.number for each in levels]
+    return found[numbers] if max(numbers) < found.size else None

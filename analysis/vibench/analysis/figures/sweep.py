@@ -1,4 +1,4 @@
-"""Figures of a sweep: envelope over time, responses over frequency, collisions (Fig. 13 d of the paper)."""
+"""Figures of sweeps: envelope, responses, collisions (Fig. 13 d of the paper), orders, hysteresis."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals.arrays import Reals
-from ..sine.collision_region import Collisions
+from ..sine.jumps import Jump, hysteresis
 from ..sine.sweep import SweepResponse
-from ..sine.sweep_analysis import SweepAnalysis
+from ..sine.sweep_analysis import Collisions, SweepAnalysis
 from ..tables import Table, columns, plus_minus, table
-from ..tones.order_tracking import order_label
+from ..tones import order_label
 from . import style
 from .ensemble_band import (
     ATTRIBUTES,
@@ -23,15 +23,13 @@ from .ensemble_band import (
     simulated_responses,
     sines_table,
 )
-from .hysteresis import jumps_text
 
 _HEIGHT_IN = 6.4
 
 
 def sweep_figure(analysis: SweepAnalysis, overlay: SweepOverlay | None = None) -> style.DrawnFigure:
     """Draw the envelope over time with a frequency axis, and Responses I and II over frequency."""
-    with style.figure_style():
-        figure = style.new_figure(_HEIGHT_IN)
+    with style.drawing(_HEIGHT_IN) as figure:
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
         _envelope(envelope, analysis, overlay)
         _responses(first, analysis, overlay, RESPONSE_I)
@@ -121,12 +119,11 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
         f"Response II has {jumps_text(analysis.jumps)}.",
     ]
     if overlay is not None:
-        outside = ~analysis.collisions.is_colliding
-        apart = overlay.difference.where(outside)
+        apart = overlay.difference.where(~analysis.collisions.is_colliding)
         smooth = (
             f" Outside of the measured collisions: median difference {apart.median_abs_db:.2g} dB, "
             f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors."
-            if outside.any()
+            if np.isfinite(apart.median_abs_db)
             else ""
         )
         sentences += [
@@ -180,9 +177,8 @@ _ORDER_STYLES = ("-", "-", "--", "-.", ":")
 
 
 def sweep_orders_figure(analysis: SweepAnalysis) -> style.DrawnFigure:
-    """Draw the spectrogram of the velocity, and the displacement at multiples (orders) of the drive."""
-    with style.figure_style():
-        figure = style.new_figure(_ORDERS_HEIGHT_IN)
+    """Draw the velocity's spectrogram, and the displacement at multiples (orders) of the drive frequency."""
+    with style.drawing(_ORDERS_HEIGHT_IN) as figure:
         picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))
         _picture(figure, picture, analysis)
         _orders(orders, analysis)
@@ -243,7 +239,66 @@ def _caption(analysis: SweepAnalysis) -> str:
     )
     return (
         f"Above: velocity spectrum, lines {found.resolution_hz:.2g} Hz wide at half power. Below: "
-        f"displacement of {analysis.facts.mass} at orders of the recorded drive, grey where the "
-        f"masses collide; there, orders also contain chaotic motion near their frequency. Strongest after "
+        f"displacement of {analysis.facts.mass} at orders of the recorded drive, grey where the masses "
+        "collide; there, the orders also contain chaotic motion at nearby frequencies. Strongest after "
         f"order 1: {loudest[1]}, {20 * np.log10(loudest[0]):.0f} dB re order 1 (median)."
+    )
+
+
+_HYSTERESIS_HEIGHT_IN = 3.4
+
+
+def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> style.DrawnFigure:
+    """Draw Response II of both sweeps, the jumps, and the bands in which the sweeps differ."""
+    found = hysteresis(up.response, down.response, up.jumps, down.jumps)
+    with style.drawing(_HYSTERESIS_HEIGHT_IN) as figure:
+        axes = figure.subplots()
+        axes.fill_between(
+            found.frequency_hz,
+            0,
+            1,
+            where=found.differs.tolist(),
+            transform=axes.get_xaxis_transform(),
+            color=style.COLLIDING,
+            label="the sweeps differ",
+        )
+        for curve, jumps, colour, line, label in (
+            (found.up, up.jumps, style.LEVELS[0], "-", "up"),
+            (found.down, down.jumps, style.LEVELS[2], "--", "down"),
+        ):
+            axes.plot(found.frequency_hz, curve, color=colour, linestyle=line, label=f"sweep {label}")
+            for jump in jumps:
+                axes.axvspan(jump.lower_hz, jump.upper_hz, color=colour, alpha=0.4, linewidth=0.5)
+        style.magnitude_axis(axes)
+        axes.set(
+            xlim=(float(found.frequency_hz[0]), float(found.frequency_hz[-1])),
+            xlabel="drive frequency [Hz]",
+            ylabel="Response II\n|x at f| / A0",
+        )
+        style.legend_above(figure, [axes])
+    name = f"hysteresis_{up.facts.name}_{down.facts.name}"
+    content = columns(found, "frequency_hz response_ii_up=up response_ii_down=down")
+    widths = "; ".join(
+        f"hysteresis {width:.1f} Hz wide ({low:.1f} to {high:.1f})" for width, low, high in found.widths_hz
+    )
+    share = float(np.mean(found.differs))
+    return style.DrawnFigure(
+        name=name,
+        title=f"Sweeps up and down, {up.excitation.amplitude_vpp:g} Vpp",
+        caption=f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
+        f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
+        f"Grey: the sweeps differ by more than 1.5 dB ({100 * share:.0f} % of the band).",
+        figure=figure,
+        tables=(table(name, **content, differs=found.differs.astype(np.int64)),),
+    )
+
+
+def jumps_text(jumps: tuple[Jump, ...]) -> str:
+    """Return jumps of a response, with the bounds of their frequencies, as text."""
+    if not jumps:
+        return "no jump"
+    return " and ".join(
+        f"a jump of {each.decibel:+.1f} dB at {each.frequency_hz:.1f} Hz ({each.lower_hz:.1f} to "
+        f"{each.upper_hz:.1f})"
+        for each in jumps
     )

@@ -1,24 +1,32 @@
-"""Figure of the transmission at one noise level, with coherence and bounds (Fig. 13 a to c of the paper)."""
+"""Figures of noise: transmission (Fig. 13 a to c of the paper), scans, distortion, and several levels."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
-from vibench.sim import base_transmissibility
+from vibench.sim import Specimen, base_transmissibility
 
-from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
-from ..frequency_response.request import MagnitudeScale
+from ..frequency_response.noise_response import (
+    Distortion,
+    NoiseAnalysis,
+    NoiseResponse,
+    distortion,
+)
+from ..frequency_response.periodic import PeriodicFrequencyResponse
+from ..frequency_response.results import MagnitudeScale
+from ..frequency_response.scan import Scan
 from ..overlay.overlay import TRANSMISSION, NoiseOverlay
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, columns, plus_minus, table
 from . import style
 from .ensemble_band import (
-    ModelResonances,
     band_columns,
     draw_band,
     label_resonances,
     mark_resonances,
-    model_resonances,
     run_text,
     simulated_label,
     sines_table,
@@ -26,7 +34,7 @@ from .ensemble_band import (
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
-"""Largest ratio of drawn bounds to the curve; wider bounds would fill the figure."""
+"""Largest ratio of the drawn bounds to the curve; wider bounds would fill the whole figure."""
 _DIFFERENCE_LIMIT_DB = 12.0
 _LINEAR_POINTS = 4000
 _HALF_TURN_DEG = 180.0
@@ -36,9 +44,8 @@ _BELOW = 0.5
 
 def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = None) -> style.DrawnFigure:
     """Draw the measured and simulated transmission, their difference, and bounds, phase and coherence."""
-    at = model_resonances(specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen)
-    with style.figure_style():
-        figure = style.new_figure(_HEIGHT_IN)
+    at = specimen_of(analysis.facts.bench) if overlay is None else overlay.run.specimen
+    with style.drawing(_HEIGHT_IN) as figure:
         rows = 3 if overlay is None else 4
         panels = figure.subplots(
             rows, 1, sharex=True, height_ratios=(3.6, 1.2, 1.0, 1.0)[:rows], squeeze=False
@@ -64,9 +71,7 @@ def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = 
     )
 
 
-def _magnitudes(
-    axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances
-) -> None:
+def _magnitudes(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: Specimen) -> None:
     view = analysis.view
     measured = view.apply(analysis.response.frequency_response)
     size = measured.magnitude
@@ -107,7 +112,7 @@ def _magnitudes(
     axes.set_ylabel(view.label(analysis.facts.mass))
 
 
-def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: ModelResonances) -> None:
+def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, at: Specimen) -> None:
     """Draw the phase from -180 to 180 degrees, with bounds where these are narrower than a full turn."""
     view = analysis.view
     measured = view.apply(analysis.response.frequency_response)
@@ -134,7 +139,7 @@ def _cut_wrap(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
     return np.insert(frequency_hz, wraps, frequency_hz[wraps]), np.insert(phase_deg, wraps, np.nan)
 
 
-def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None:
+def _coherence(axes: Axes, analysis: NoiseAnalysis, at: Specimen) -> None:
     measured = analysis.response.frequency_response
     mark_resonances(axes, at)
     axes.plot(measured.frequency_hz, measured.coherence, color=style.MEASURED, linewidth=0.8)
@@ -142,12 +147,12 @@ def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None
     axes.set(ylim=(0, 1.05), ylabel="coherence")
 
 
-def _differences(axes: Axes, overlay: NoiseOverlay, at: ModelResonances) -> None:
+def _differences(axes: Axes, overlay: NoiseOverlay, at: Specimen) -> None:
     mark_resonances(axes, at)
     shown = np.clip(overlay.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
     axes.plot(overlay.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
     axes.axhline(0, color=style.MEASURED, linewidth=0.6)
-    reach = max(1.0, float(np.nanmax(np.abs(shown))) * 1.1)
+    reach = 1.1 * float(np.nanmax(np.abs(shown), initial=1.0))
     axes.set(ylim=(-reach, reach), ylabel="meas. − sim.\n[dB]")
 
 
@@ -179,7 +184,7 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
         sentences.append(
             f"{run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
             f"The blue curve is the predicted Response I to sines instead of noise "
-            f"({overlay.amplitude_basis}); it is not fitted."
+            f"({overlay.amplitude_basis}); this curve is not fitted."
         )
     return " ".join(sentences)
 
@@ -228,3 +233,236 @@ def _tables(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> tuple[Tabl
     found["magnitude_simulated"] = view.apply(overlay.response.frequency_response).magnitude
     found |= columns(overlay.difference, "difference_db=decibel difference_standard_errors=standard_errors")
     return table(name, **found), sines_table(name, overlay.prediction)
+
+
+_SCAN_HEIGHT_IN = 4.6
+_MOST_NAMES = 16
+"""Largest number of points named at the axis; if there are more, node numbers replace the names."""
+
+
+def scan_figure(scan: Scan) -> style.DrawnFigure:
+    """Draw the operating deflection shape at each resonance."""
+    view, points = scan.analyses[0].request.view, scan.points
+    places = np.arange(len(points))
+    columns: dict[str, ArrayLike] = {
+        "node": np.array(scan.nodes),
+        **{f"{axis}_m": np.array([getattr(each, f"{axis}_m") for each in points]) for axis in "xyz"},
+    }
+    with style.drawing(_SCAN_HEIGHT_IN) as figure:
+        magnitudes, phases = figure.subplots(2, 1, sharex=True)
+        for number, shape in enumerate(scan.shapes):
+            look = {
+                "color": style.LEVELS[number % len(style.LEVELS)],
+                "linestyle": style.LEVEL_STYLES[number % len(style.LEVEL_STYLES)],
+                "marker": "o",
+                "markersize": 3.5,
+                "capsize": 2,
+                "linewidth": 1.0,
+            }
+            size = np.abs(shape.values)
+            drawn = view.place(size)
+            low, high = (view.place(each) for each in shape.magnitude_bounds)
+            high = np.where(np.isfinite(high), high, drawn)
+            magnitudes.errorbar(
+                places, drawn, (drawn - low, high - drawn), label=f"{shape.frequency_hz:.1f} Hz", **look
+            )
+            phases.errorbar(places, shape.phase_deg, shape.phase_half_width_deg, **look)
+            at = f"{shape.frequency_hz:.1f}hz"
+            columns |= {f"magnitude_{at}": size, f"phase_deg_{at}": shape.phase_deg}
+            columns[f"relative_half_width_{at}"] = shape.half_width
+        if view.scale is MagnitudeScale.LOG:
+            style.magnitude_axis(magnitudes)
+        magnitudes.set_ylabel(view.label("point"))
+        phases.set(ylabel="phase [°]", ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
+        few = len(points) <= _MOST_NAMES
+        names = [
+            style.plain_label(each.name) if few else str(node)
+            for node, each in zip(scan.nodes, points, strict=True)
+        ]
+        shown = places if few else places[:: -(-len(points) // _MOST_NAMES)]
+        phases.set_xticks(shown, [names[place] for place in shown])
+        phases.set_xlabel("point" if few else "node")
+        style.legend_above(figure, [magnitudes], columns=4)
+    return style.DrawnFigure(
+        name=f"scan_{scan.analyses[0].facts.name}",
+        title=f"Scan {scan.name}: shapes at the resonances",
+        caption=scan_caption(scan),
+        figure=figure,
+        tables=(table(f"scan_{scan.analyses[0].facts.name}", **columns),),
+    )
+
+
+def scan_caption(scan: Scan) -> str:
+    """Return the caption with the resonances and the meaning of the bars."""
+    where = ", ".join(f"{each.frequency_hz:.1f}" for each in scan.shapes)
+    confidence = scan.analyses[0].response.frequency_response.settings.confidence
+    return (
+        f"Measured transmission from base to {len(scan.points)} points, and its phase, at "
+        f"{f'the resonances {where} Hz' if where else 'no resonance, because none is significant'}. "
+        f"Values and bars ({100 * confidence:g} % bounds): at the spectral line nearest to each resonance."
+    )
+
+
+_DISTORTION_HEIGHT_IN = 4.6
+_DISTORTION_LOW_HEIGHT_IN = 3.0
+_EVEN, _ODD = style.LINEAR, style.SIMULATED
+
+
+def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> style.DrawnFigure:
+    """Draw standard deviations due to noise and distortion, and levels at undriven spectral lines."""
+    lines = periodic.detection
+    has_quiet_lines = lines.order.size > 0
+    with style.drawing(_DISTORTION_HEIGHT_IN if has_quiet_lines else _DISTORTION_LOW_HEIGHT_IN) as figure:
+        panels: list[Axes] = list(figure.subplots(1 + has_quiet_lines, 1, sharex=True, squeeze=False)[:, 0])
+        _shares(panels[0], periodic)
+        if has_quiet_lines:
+            _detection(panels[1], periodic)
+        panels[-1].set_xlabel("frequency [Hz]")
+        driven_hz = periodic.frequency_response.frequency_hz
+        style.frequency_axis(panels[0], float(driven_hz[0]), float(driven_hz[-1]))
+        style.legend_above(figure, panels)
+        figure.align_ylabels()
+    name = f"distortion_{analysis.facts.name}"
+    varied = periodic.distortion_variance
+    columns = {
+        "frequency_hz": driven_hz,
+        "noise_share": _share(periodic.noise_variance, periodic),
+        **({} if varied is None else {"distortion_share": _share(varied, periodic)}),
+        "detection_frequency_hz": lines.frequency_hz,
+        "detection_order": lines.order,
+        "detection_m_per_s": lines.response_amplitude,
+        "detection_noise_m_per_s": lines.noise_amplitude,
+    }
+    return style.DrawnFigure(
+        name=name,
+        title=f"Noise and distortion, {analysis.excitation.amplitude_vpp:g} Vpp noise",
+        caption=distortion_caption(periodic),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
+    return np.asarray(np.sqrt(variance) / periodic.frequency_response.magnitude)
+
+
+def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
+    frequency_hz = periodic.frequency_response.frequency_hz
+    noise = _share(periodic.noise_variance, periodic)
+    label = "not repeating (noise or chaos), one realisation"
+    axes.plot(frequency_hz, noise, color=style.BOUNDS, linewidth=0.9, label=label)
+    varied = periodic.distortion_variance
+    if varied is not None:
+        # If noise explains the whole scatter, there is no distortion to draw.
+        seen = np.where(varied > 0, _share(varied, periodic), np.nan)
+        axes.plot(frequency_hz, seen, ".-", color=style.MEASURED, linewidth=0.7, label="nonlinear distortion")
+    style.magnitude_axis(axes)
+    axes.set_ylabel("sd over |H|")
+
+
+def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
+    lines = periodic.detection
+    is_even = lines.order % 2 == 0
+    for chosen, colour, marker, label in (
+        (is_even, _EVEN, "o", "even lines, not driven"),
+        (~is_even, _ODD, "x", "odd lines, not driven"),
+    ):
+        size = lines.response_amplitude[chosen]
+        axes.plot(lines.frequency_hz[chosen], size, marker, color=colour, markersize=2.5, label=label)
+    label = "noise or chaos on these lines"
+    axes.plot(lines.frequency_hz, lines.noise_amplitude, ":", color=style.BOUNDS, linewidth=0.9, label=label)
+    style.magnitude_axis(axes)
+    axes.set_ylabel("velocity of the mass [m/s]")
+
+
+def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
+    """Return the caption with the contributions of noise and distortion to the scatter."""
+    found = distortion(periodic)
+    parts = [
+        (
+            f"From {periodic.realisations} realisations: standard deviation of one realisation, relative to "
+            f"the transmission (median): {_percent(found.noise_share)} due to channel noise or chaos of "
+            "the specimen, which do not repeat each period"
+        )
+    ]
+    if found.distortion_share is None:
+        parts.append("; one realisation cannot show distortion.")
+    else:
+        # Near a narrow mode with a drifting frequency, a part of the drift counts as distortion.
+        most = "at most " if found.drift and found.drift.frequency_share + found.drift.common_share else ""
+        parts.append(f"; {most}{_percent(found.distortion_share)} due to distortion.")
+    if periodic.drift is not None:
+        parts.append(f" The {periodic.drift.text}; this is not distortion.")
+    return "".join(parts) + _quiet_text(found)
+
+
+def _percent(share: float) -> str:
+    """Return a percentage with two digits, not as a power of ten, because it often exceeds 100 % in chaos."""
+    return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
+
+
+def _quiet_text(found: Distortion) -> str:
+    levels = {"even": found.even_m_per_s, "odd": found.odd_m_per_s}
+    shown = [f"{1e6 * level:.3g} µm/s on {name} lines" for name, level in levels.items() if level is not None]
+    if not shown or found.detection_noise_m_per_s is None:
+        return ""
+    return (
+        f" Level of the lines that were not driven: {' and '.join(shown)} (rms, without the non-repeating "
+        f"part, {1e6 * found.detection_noise_m_per_s:.2g} µm/s). This level is the even and odd distortion "
+        "of the whole path from the drive voltage to the mass."
+    )
+
+
+_LEVELS_HEIGHT_IN = 4.0
+
+
+def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.DrawnFigure:
+    """Draw the transmissions at one or more noise levels, weak to strong."""
+    rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
+    view = rising[0].view
+    at = specimen_of(rising[0].facts.bench)
+    with style.drawing(_LEVELS_HEIGHT_IN) as figure:
+        axes = figure.subplots()
+        mark_resonances(axes, at)
+        for number, each in enumerate(rising):
+            found = view.apply(each.response.frequency_response)
+            level = each.response.base_level.rms_acceleration
+            label = f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)"
+            line = style.LEVEL_STYLES[number % len(style.LEVELS)]
+            colour = style.LEVELS[number % len(style.LEVELS)]
+            size = view.place(found.magnitude)
+            axes.plot(found.frequency_hz, size, line, color=colour, linewidth=1.0, label=label)
+        if view.scale is MagnitudeScale.LOG:
+            style.magnitude_axis(axes)
+        axes.set(ylabel=view.label(rising[0].facts.mass), xlabel="frequency [Hz]")
+        lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
+        highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
+        style.frequency_axis(axes, min(lows), max(highs))
+        label_resonances(axes, at)
+        style.legend_above(figure, [axes], columns=2)
+    columns = {}
+    for each in rising:
+        columns[f"frequency_hz_{each.facts.name}"] = each.response.frequency_response.frequency_hz
+        columns[f"magnitude_{each.facts.name}"] = view.apply(each.response.frequency_response).magnitude
+    return style.DrawnFigure(
+        name="transmission_levels",
+        title=f"{view.title} at all noise levels",
+        caption=transmission_levels_caption(rising),
+        figure=figure,
+        tables=(table("transmission_levels", **columns),),
+    )
+
+
+def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
+    """Return the caption with the resonances at each noise level."""
+    levels = []
+    for each in rising:
+        peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]
+        plural = "s" * (len(peaks) > 1)
+        where = f"resonance{plural} at {', '.join(peaks)} Hz" if peaks else "no clear resonance"
+        levels.append(f"{each.excitation.amplitude_vpp:g} Vpp: {where}")
+    return (
+        f"Measured {rising[0].view.symbol} of {rising[0].facts.response} at {len(rising)} noise levels. "
+        f"{'; '.join(levels)}. Dashed: resonances of the model without contact; dotted: with m1 stuck to "
+        "m2 (limit of strong collisions)."
+    )

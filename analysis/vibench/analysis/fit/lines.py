@@ -1,7 +1,9 @@
-"""Spectral lines of a measured transmission, and the fit of a specimen to them."""
+"""Parameters of a specimen, and their fit to the spectral lines of a measured transmission."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import ClassVar, assert_never
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -12,16 +14,132 @@ from vibench.sim import Specimen
 from ..errors import NotEnoughData
 from ..frequency_response.results import FrequencyResponse
 from ..signals.arrays import Complexes, Reals
-from ..signals.confidence import chi_square_limit, chi_square_of
-from ..signals.window import line_correlation
-from .parameters import LINEAR, Parameter, parameter_value, with_values
+from ..signals.averaging import chi_square_limit, chi_square_of, line_correlation
+from ..tables import unit_of
+
+
+class Parameter(StrEnum):
+    """Parameter of a specimen."""
+
+    DAMPING_TIME = "damping_time_s"
+    """Damping time c_i / k_i, common to all links."""
+    F0 = "f0_hz"
+    F1 = "f1_hz"
+    F2 = "f2_hz"
+    """Frequencies of the single oscillators, f_i = sqrt(k_i / m_i) / 2 pi."""
+    M0 = "m0_kg"
+    M1 = "m1_kg"
+    M2 = "m2_kg"
+    """Masses; only one mass can be fitted at a time, because motion determines only ratios of masses."""
+    C0 = "c0_ns_per_m"
+    C1 = "c1_ns_per_m"
+    C2 = "c2_ns_per_m"
+    """Individual dampers, independent of the common damping time."""
+    GAP = "gap_m"
+
+
+LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
+"""Parameters fitted by default to a transmission without collisions."""
+MASSES = (Parameter.M0, Parameter.M1, Parameter.M2)
+DAMPERS = (Parameter.C0, Parameter.C1, Parameter.C2)
+ALSO_FREE = MASSES + DAMPERS
+"""Parameters that may be fitted in addition."""
+SHOWN = {
+    Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),
+    Parameter.F0: ("f0", 1.0, "Hz"),
+    Parameter.F1: ("f1", 1.0, "Hz"),
+    Parameter.F2: ("f2", 1.0, "Hz"),
+    Parameter.M0: ("m0", 1e3, "g"),
+    Parameter.M1: ("m1", 1e3, "g"),
+    Parameter.M2: ("m2", 1e3, "g"),
+    Parameter.C0: ("c0", 1.0, "N s/m"),
+    Parameter.C1: ("c1", 1.0, "N s/m"),
+    Parameter.C2: ("c2", 1.0, "N s/m"),
+    Parameter.GAP: ("gap of the nearer side", 1e6, "µm"),
+}
+"""Name, factor from SI units, and unit of each parameter in texts."""
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """A fitted parameter with its interval."""
+
+    OWN_UNITS: ClassVar = dict.fromkeys(("value", "low", "high", "sd", "nominal"), "{0.unit}")
+    DOCUMENT: ClassVar = "value low high sd bench=nominal"
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    """Bounds at the confidence level of the fit."""
+    sd: float
+    """Standard deviation; NaN if only bounds are known."""
+    nominal: float
+    """Value of the parameter in the bench configuration."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values, SI."""
+        return unit_of(self.parameter)
+
+
+def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
+    """Return the value of a parameter; for the damping time, the value of link 0 (other links may differ)."""
+    masses, stiffnesses = specimen.masses, specimen.stiffnesses
+    match parameter:
+        case Parameter.DAMPING_TIME:
+            return specimen.dampings[0] / stiffnesses[0]
+        case Parameter.F0 | Parameter.F1 | Parameter.F2:
+            link = LINEAR.index(parameter) - 1
+            return float(np.sqrt(stiffnesses[link] / masses[link]) / (2.0 * np.pi))
+        case Parameter.M0 | Parameter.M1 | Parameter.M2:
+            return masses[MASSES.index(parameter)]
+        case Parameter.C0 | Parameter.C1 | Parameter.C2:
+            return specimen.dampings[DAMPERS.index(parameter)]
+        case Parameter.GAP:
+            return min(specimen.gaps_m)
+        case _:
+            assert_never(parameter)
+
+
+def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
+    """Return a specimen with changed parameters; a changed mass leaves the frequencies unchanged.
+
+    Dampers that are not given stay proportional to stiffness, and the ratio of the two gaps is kept.
+    """
+    old = parameter_value(specimen, Parameter.DAMPING_TIME)
+    beta = values.get(Parameter.DAMPING_TIME, old)
+    shares = [
+        c / k / old if old else 1.0 for c, k in zip(specimen.dampings, specimen.stiffnesses, strict=True)
+    ]
+    m0, m1, m2 = masses = tuple(values.get(each, parameter_value(specimen, each)) for each in MASSES)
+    k0, k1, k2 = stiffnesses = [
+        mass * (2.0 * np.pi * values.get(name, parameter_value(specimen, name))) ** 2
+        for mass, name in zip(masses, LINEAR[1:], strict=True)
+    ]
+    c0, c1, c2 = (
+        values.get(each, share * beta * k)
+        for each, share, k in zip(DAMPERS, shares, stiffnesses, strict=True)
+    )
+    nearest = min(specimen.gaps_m)
+    wider = values.get(Parameter.GAP, nearest) / nearest
+    lower, upper = specimen.gaps_m
+    return replace(
+        specimen,
+        masses=(m0, m1, m2),
+        stiffnesses=(k0, k1, k2),
+        dampings=(c0, c1, c2),
+        gap_m=wider * upper,
+        lower_gap_m=None if specimen.lower_gap_m is None else wider * lower,
+    )
+
 
 LEAST_RELATIVE_SD = 1e-4
 """Smallest relative scatter assumed for a spectral line; calibrations and clocks are no more accurate."""
 _LEAST_CLEAR = 10.0
 """Smallest ratio of a line's magnitude to the median scatter nearby, so that ln(magnitude) is normal.
 
-The line's own scatter is estimated from few averages. If it were used, lines with a small scatter by chance
+The line's own scatter is estimated from few averages. If it were used, lines whose scatter is small by chance
 would be selected, and a correct model refused.
 """
 _NEIGHBOURS = 31
@@ -70,7 +188,7 @@ def own_response(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes
 
 @dataclass(frozen=True)
 class Freedom:
-    """Additional parameters of a fit."""
+    """Additional parameters that a fit determines."""
 
     parameters: tuple[Parameter, ...] = ()
     model: Model = own_response
@@ -90,7 +208,7 @@ class LineFit:
     covariance: Reals
     """Covariance of the parameters' logarithms, for a correct model."""
     freedoms: Reals
-    """Degrees of freedom of each parameter's uncertainty; few if only few lines determine the parameter."""
+    """Degrees of freedom of each parameter's uncertainty; small if only a few lines determine it."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -189,7 +307,7 @@ def lines_of(
     if count < needed:
         raise NotEnoughData(
             f"only {count} lines of the transmission are at least {_LEAST_CLEAR:.2g} times as large as the "
-            f"scatter, but {len(free)} parameters need {needed}; measure longer or with more drive"
+            f"scatter, but {len(free)} parameters need {needed}; measure longer, or with a stronger drive"
         )
     spreads = np.concatenate(
         [frequency_response.relative_sd_magnitude[used], frequency_response.sd_phase_rad[used]]
@@ -211,13 +329,15 @@ def fit_lines(lines: Lines) -> LineFit:
     usual = Freedom()
     best = _fit_from(lines, usual, lines.start)
     if 2.0 * best.cost > lines.limit * lines.freedom:
-        # The starting point may be wrong by a turn of phase: restart from stiffer and softer specimens.
-        others = [_fit_from(lines, usual, lines.start + _stiffer_start(lines, scale)) for scale in SCALES]
+        # The fit may be off by a whole turn of phase, so start again from stiffer and softer specimens.
+        stiffer = np.zeros(lines.start.size)
+        stiffer[: len(lines.free)] = [each in LINEAR[1:] for each in lines.free]
+        others = [_fit_from(lines, usual, lines.start + np.log(scale) * stiffer) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
     if np.isinf(best.cost):
         raise NotEnoughData(
             f"the {lines.frequency_hz.size} lines of the transmission above the scatter do not determine "
-            f"{', '.join(lines.free)}; measure longer or with more drive"
+            f"{', '.join(lines.free)}; measure longer, or with a stronger drive"
         )
     return _fit_from_description(lines, usual, best)
 
@@ -231,18 +351,7 @@ def fit_lines_further(lines: Lines, allowed: Freedom, usual: LineFit) -> LineFit
     return _fit_from_description(opened, allowed, min(found, key=lambda each: each.cost))
 
 
-def _stiffer_start(lines: Lines, scale: float) -> Reals:
-    steps = [np.log(scale) if each in LINEAR[1:] else 0.0 for each in lines.free]
-    return np.array([*steps, *np.zeros(lines.start.size - len(lines.free))])
-
-
-@dataclass(frozen=True, eq=False)
-class _FitEnd:
-    x: Reals
-    cost: float
-
-
-def _fit_from(lines: Lines, allowed: Freedom, start: Reals) -> _FitEnd:
+def _fit_from(lines: Lines, allowed: Freedom, start: Reals) -> OptimizeResult:
     """Fit by least squares, which converges from a distant start, and then by likelihood."""
     open_ended = np.full(start.size - len(allowed.low), np.inf)
     bounds = (np.concatenate([-open_ended, allowed.low]), np.concatenate([open_ended, allowed.high]))
@@ -254,13 +363,14 @@ def _fit_from(lines: Lines, allowed: Freedom, start: Reals) -> _FitEnd:
         return lines.students(plain(at))
 
     near = _descent(plain, start, bounds)
+    if not lines.is_away(near.x):
+        left = likely(near.x)
+        near.update(cost=0.5 * float(left @ left))
+        if left @ left <= _HOPELESS * lines.limit * lines.freedom:
+            near = _descent(likely, near.x, bounds)
     if lines.is_away(near.x):
-        return _FitEnd(near.x, np.inf)
-    left = likely(near.x)
-    if left @ left > _HOPELESS * lines.limit * lines.freedom:
-        return _FitEnd(near.x, 0.5 * float(left @ left))
-    found = _descent(likely, near.x, bounds)
-    return _FitEnd(found.x, np.inf if lines.is_away(found.x) else float(found.cost))
+        near.update(cost=np.inf)
+    return near
 
 
 def _descent(
@@ -278,18 +388,20 @@ def _descent(
     )
 
 
-def _fit_from_description(lines: Lines, allowed: Freedom, found: _FitEnd) -> LineFit:
+def _fit_from_description(lines: Lines, allowed: Freedom, found: OptimizeResult) -> LineFit:
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
-    # The scatter is estimated, so the likelihood is Student's t. The variance of its slope is (spread + 2)
-    # / spread times its curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
+    # The scatter is estimated, so the likelihood is Student's t. The variance of the likelihood's slope is
+    # (spread + 2) / spread times the curvature (Huber 1967; 1.25 times for 8 degrees of freedom).
     squared = lines.misfit(lines.residuals(found.x, allowed.model))
-    slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
+    around = ((found.x + step, found.x - step) for step in _STEP * np.eye(found.x.size))
+    pairs = [[lines.residuals(at, allowed.model) for at in both] for both in around]
+    slopes = np.stack([(above - below) / (2 * _STEP) for above, below in pairs], axis=1)
     slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]
     wider = lines.correlation[0] * (spread + 2) / spread
     whole = np.asarray(wider * np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True), np.float64)
-    # Welch and Satterthwaite (JCGM 100:2008, G.4): magnitude and phase of a line share its scatter.
+    # By Welch and Satterthwaite (JCGM 100:2008, G.4); the magnitude and phase of a line share one scatter.
     squares = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
     shares = squares[:, : lines.frequency_hz.size] + squares[:, lines.frequency_hz.size :]
     shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
@@ -302,8 +414,3 @@ def _fit_from_description(lines: Lines, allowed: Freedom, found: _FitEnd) -> Lin
         further=found.x[count + CHANNEL_PHASES + (lines.scale_sd > 0.0) :],
         chi_square=float(2.0 * found.cost),
     )
-
-
-def _slopes(residuals: Callable[[Reals], Reals], at: Reals) -> Reals:
-    steps = _STEP * np.eye(at.size)
-    return np.stack([(residuals(at + each) - residuals(at - each)) / (2 * _STEP) for each in steps], axis=1)

@@ -15,17 +15,17 @@ from vibench.sim import Hertz, HuntCrossley, LinearGap, Specimen
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
 from ..overlay.draws import StretchDraws, stretch_draws
-from ..overlay.shaker_fit import FittedShaker
+from ..overlay.driven_rig import FittedShaker
 from ..signals.arrays import Flags, Integers, Reals
 from .specimen_fit import SpecimenFit
 
 # Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.
-#
-# Parameters are drawn from a box (their ranges), and each draw is simulated in one run. Each parameter is
-# regressed on the statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and Prangle 2012). The
-# posterior is the prediction for the observed statistics plus leave-one-out errors. Its intervals have the
-# stated coverage for parameters in the box, even for a poor regression (conformal prediction; Vovk, Gammerman
-# and Shafer 2005). Then the box is narrowed and sampled again (Deistler, Goncalves and Macke 2022).
+# Parameters are drawn at random from a box (the ranges of all parameters); each draw is simulated in one run.
+# Each parameter is regressed on the statistics of the runs (Beaumont, Zhang and Balding 2002; Fearnhead and
+# Prangle 2012). The posterior is the prediction for the observed statistics plus leave-one-out errors. Its
+# intervals have the stated coverage for parameters in the box, even for a poor regression (conformal
+# prediction; Vovk, Gammerman and Shafer 2005). Then the box is narrowed and sampled again (Deistler,
+# Goncalves and Macke 2022).
 
 ROUNDS = (120, 120, 240)
 """Number of simulated runs in each box (range of parameters), from the widest to the narrowest box."""
@@ -35,7 +35,7 @@ _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
 """Number of principal components of the statistics along which the observed statistics are checked."""
 _FAR = 1.05
-"""Largest distance of the observed statistics at which the model fits, relative to the furthest run.
+"""Largest distance of the observed statistics at which the model fits, relative to the furthest run's.
 
 A correct model exceeds the furthest of n runs in at most one of n + 1 cases. The margin allows for small
 differences between rig and recording.
@@ -45,7 +45,7 @@ _CONFIDENCE = 0.95
 _BOUNDS = (0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE)
 
 Runs = Callable[[Reals], Reals]
-"""Function from parameters, shape (draws, parameters), to run statistics, shape (draws, statistics)."""
+"""Map parameters, shape (draws, parameters), to the statistics of the runs, shape (draws, statistics)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Posterior:
     draws: Reals
     """Random parameters from the posterior, shape (draws, parameters)."""
     distance: float
-    """Distance of the observed statistics relative to the furthest run; infinite for values out of range."""
+    """Distance of the observed statistics relative to the furthest run; infinite if any is out of range."""
 
     @property
     def fits(self) -> bool:
@@ -87,7 +87,7 @@ def posterior(
         inside = np.all((parameters >= box[:, 0]) & (parameters <= box[:, 1]), axis=1)
         parameters, statistics = parameters[inside], statistics[inside]
         new = rng.uniform(box[:, 0], box[:, 1], (wanted - len(parameters), len(box)))
-        # If the box did not change, it contains all earlier runs, and no new ones are needed.
+        # If the box did not change, all earlier runs lie in it, and no new runs are needed.
         if len(new):
             parameters = np.concatenate([parameters, new])
             statistics = np.concatenate([statistics, runs(new)])
@@ -129,14 +129,14 @@ def _leave_one_out_errors(u: Reals, sizes: Reals, target: Reals, ridge: float) -
 def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     """Return the distance of the observed statistics from the model, relative to the furthest run.
 
-    The effect of the fitted parameters is removed. The remainder is measured along its largest components and
-    outside of them. Each run is compared only with the other runs; including the run itself would shorten its
-    distance.
+    The effect of the fitted parameters is removed. The remainder is measured along the largest components and
+    outside of these components. Each run is compared only with the other runs; including the run itself would
+    shorten its distance.
 
     Parameters
     ----------
     parameters
-        Fitted parameters, with those of the observation in the last row, shape (draws + 1, parameters).
+        Fitted parameters; the last row belongs to the observation, shape (draws + 1, parameters).
     statistics
         Statistics of runs, shape (draws, statistics).
     observed
@@ -183,8 +183,8 @@ def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> R
     """Return statistics of a stretch of irregular motion, shape (statistics,).
 
     Statistics are the logarithmic band powers of base acceleration and m0's velocity, and their coherence per
-    band. Further statistics are spread, skewness and tails of m0's velocity and displacement, and for a sine
-    drive the harmonics. Even harmonics distinguish the two stops.
+    band. Further statistics are spread, skewness and tails of m0's velocity and displacement, and, for a sine
+    drive, harmonics. Even harmonics distinguish the two stops.
 
     Parameters
     ----------
@@ -307,7 +307,7 @@ def statistical_numbers(
     fitted
         Fitted shaker, if the bench describes none.
     linear
-        Fit of the linear parameters; each run draws them within its uncertainty.
+        Fit of the linear parameters; each run draws random values within their uncertainty.
     rounds
         Number of runs in each box; boxes become narrower.
     """
@@ -319,20 +319,25 @@ def statistical_numbers(
     measured = draws.recorded_motion
     if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
         raise NotEnoughData(
-            f"{measured.shape[1] / rate_hz:.3g} s of this motion at {rate_hz:g} samples/s are too little for "
+            f"{measured.shape[1] / rate_hz:.3g} s of this motion at {rate_hz:g} samples/s are too short for "
             f"statistics; record at least {_LEAST_S:g} s at {_LEAST_RATE_HZ:g} samples/s or more"
         )
     if np.isnan(measured).any():
         raise UnusableData("samples were lost, so statistics cannot be compared with a simulation")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
     made = _Runs(draws, specimen, linear, drive_hz, above_sensor_noise(observed, draws.noise_rms, rate_hz))
-    _require_likely(made, measured)
+    seen, drawn = (float(np.std(each[0])) for each in (measured, draws.draw(specimen, made.rng)))
+    if not 1 / _LIKELY < seen / drawn < _LIKELY:
+        raise UnusableData(
+            f"the recorded voltage should give {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} "
+            "m/s2 were recorded, so no simulation is possible; correct the described amplifier and shaker"
+        )
     reach = np.log(list(_AROUND.values()))
     found = posterior(made, observed[made.heard], np.stack([-reach, reach], axis=1), _SEED, rounds)
     if not found.fits:
         raise UnusableData(
             f"no simulated specimen has similar statistics (distance {found.distance:.2g} times the scatter "
-            "of repeated simulations): another value in the description of rig or specimen is wrong"
+            "of repeated simulations): some other value in the description of rig or specimen is wrong"
         )
     return tuple(_determined_parameters(found, specimen)), found.distance
 
@@ -383,17 +388,6 @@ def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
     return replace(other.specimen, contact=replace(specimen.contact, stiffness=other.steepness))
 
 
-def _require_likely(made: _Runs, measured: Reals) -> None:
-    """Raise UnusableData if the rms base acceleration of a first run is far from the recorded one."""
-    first = made.draws.draw(made.specimen, made.rng)
-    seen, drawn = (float(np.std(each[0])) for each in (measured, first))
-    if not 1 / _LIKELY < seen / drawn < _LIKELY:
-        raise UnusableData(
-            f"the recorded voltage should give {drawn:.3g} m/s2 rms on the described rig, but {seen:.3g} "
-            "m/s2 were recorded, so no simulation is possible; correct the described amplifier and shaker"
-        )
-
-
 def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
     described = tracked_specimen(specimen)
     parts = _relative(found.draws.T)
@@ -406,7 +400,7 @@ def _determined_parameters(found: Posterior, specimen: Specimen) -> Iterator[Fou
         value = value_of(described, what)
         low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "statistics of the motion give no narrower bounds than the description" if flat else ""
-        # The value is the centre of the bounds, because results are written with a half width.
+        # Results are written as a value with a half width, so the value is the centre of the bounds.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "not varied: all simulations have the exponent and loss of the description"
     for untold in (Hidden.EXPONENT, Hidden.LOSS):

@@ -1,6 +1,6 @@
 """Fit the parameters of the specimen on the shaker to the recordings of one campaign."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,27 +12,29 @@ from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
 from vibench.sim.background import Observer, ignore_progress
 
 from ..errors import AnalysisError, NotEnoughData
-from ..frequency_response.distortion import scatters_beyond_noise
-from ..frequency_response.noise_response import NoiseAnalysis, scatter_over_silence
-from ..kinds.analysis_kind import NoiseResult
-from ..overlay.driven_rig import described_shaker
-from ..overlay.shaker_fit import fit_shaker
+from ..frequency_response.noise_response import NoiseAnalysis, scatter_over_silence, scatters_beyond_noise
+from ..kinds import NoiseResult
+from ..overlay.driven_rig import described_shaker, fit_shaker
 from ..recordings.channels import RecordedChannels
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Tabular, columns, plain, plus_minus
 from ..uncertainty.budget import stated_uncertainties
-from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, track_recordings
-from .gap_fit import bracketed_gap, fit_gap
-from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
-from .specimen_fit import SpecimenFit, fit_specimen, not_linear
-from .suspects import Assumption, Suspect
+from .collision_numbers import (
+    CollisionNumbers,
+    Way,
+    numbers_from_statistics,
+    onset_gap,
+    track_recordings,
+)
+from .lines import LINEAR, SHOWN, FittedValue, Parameter, with_values
+from .specimen_fit import Assumption, SpecimenFit, Suspect, fit_specimen, not_linear
 
 _SURELY = 3.3
 """Deviation [standard deviations] that one correct description in a thousand exceeds."""
 _LARGEST_SCATTER = 100.0
-"""Largest ratio of variance about a linear response to variance in silence; light collisions exceed 1000."""
-_WEAKER = "so masses may collide or rub; measure weaker noise"
+"""Largest variance about a linear response, relative to silence; light collisions exceed 1000."""
+_WEAKER = "so masses may collide or rub; measure with weaker noise"
 _LEAST_RELATIVE_SD = 2e-3
 """Relative error of the fitted table mass due to coil, filters and sample-and-hold output."""
 
@@ -60,7 +62,7 @@ class TableFit:
         sentence = (
             f"a moving table of {1e3 * self.mass_kg:.4g} g instead of {1e3 * self.described_kg:.4g} "
             f"({100 * (ratio - 1):+.3g} %), or all three masses of the specimen "
-            f"{100 * (1 / ratio - 1):+.3g} % together (motion determines only ratios of masses)"
+            f"changed by {100 * (1 / ratio - 1):+.3g} % (motion determines only ratios of masses)"
         )
         return (Suspect(Assumption.TABLE_MASS, sentence, self.reduced_chi_square, mends=True, behind=0.0),)
 
@@ -72,7 +74,7 @@ class TableFit:
 
 
 def fit_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None:
-    """Fit the shaker to weak noise and compare its mass with the described one; None without a description.
+    """Fit the shaker to weak noise and compare its mass with the described one; None if it is not described.
 
     The reaction of the specimen's resonances on the base determines the mass. Raises UnusableData when no
     shaker explains the transmission from voltage to base.
@@ -102,7 +104,7 @@ class UpdatedSpecimen(Tabular):
     linear: SpecimenFit | None
     """Linear fit to the recording of the weakest noise; None without such a recording."""
     linear_from: str
-    """Name of the recording that gives damping and frequencies; empty if none."""
+    """Name of the recording that gives damping and frequencies; empty without such a recording."""
     table: TableFit | None
     not_determined: tuple[str, ...]
     """One sentence for each value that stays as described, with the reason."""
@@ -126,7 +128,7 @@ class UpdatedSpecimen(Tabular):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Contradicted assumptions: of the linear fit (most likely first), table mass, and collisions."""
+        """Contradicted assumptions about the linear fit (most likely first), table mass and collisions."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
         return (*linear, *table, *_contradictory_suspects(self.collisions))
@@ -152,7 +154,7 @@ class UpdatedSpecimen(Tabular):
 
     @property
     def description(self) -> SpecimenDescription:
-        """Fitted specimen in the form of a specimen file; other values as in the bench configuration."""
+        """Fitted specimen in the form of a specimen file; values not fitted are as in the configuration."""
         lower, upper = self.specimen.gaps_m
         fitted = {each.parameter.value for each in self.values}
         if self.collisions is not None:
@@ -243,7 +245,7 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     named = ", or ".join(alike)
     if not best.mends:
         return (
-            "no single changed assumption makes the model fit; the best one, with chi² = "
+            "no single changed assumption makes the model fit; the best assumption, with chi² = "
             f"{best.reduced_chi_square:.3g}, is {named}"
         )
     choice = "the model fits with any of these, which the data do not distinguish: " if len(alike) > 1 else ""
@@ -260,7 +262,7 @@ def _contradictory_suspects(found: CollisionNumbers | None) -> tuple[Suspect, ..
 def _in_words(found: FittedValue) -> str:
     name, scale, unit = SHOWN[found.parameter]
     half = 0.5 * (found.high - found.low)
-    # Round to the second digit of the half width, so that the printed lower and upper bounds differ.
+    # Round to the second digit of the half width: the printed lower and upper bounds then differ.
     places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
         f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
@@ -278,8 +280,8 @@ def update_model(
     Damping and frequencies come from the weakest noise. The gap of each side, m1, c1 and the contact law come
     from a tracked colliding motion, or else from statistics of chaos (minutes of simulation). If both fail,
     the smaller gap comes from the onset of collisions in sweeps or dwells. The table mass comes from the
-    transmission from voltage to base. Raises NotEnoughData when nothing can be fitted: no noise, no trackable
-    motion, no onset of collisions.
+    transmission from voltage to base. Raises NotEnoughData when nothing can be fitted, because there is no
+    noise, no motion that can be tracked, and no onset of collisions.
 
     Parameters
     ----------
@@ -291,16 +293,16 @@ def update_model(
         Receives the progress.
     """
     of_m0 = tuple(each for each in results.results if each.analysis.facts.mass == "m0")
-    results = replace(results, results=of_m0)  # scan points may be on masses other than m0
+    results = replace(results, results=of_m0)  # scan points may be on other masses
     if not of_m0:
-        raise NotEnoughData(f"{results.name!r} has no result for m0, to which a specimen could be fitted")
+        raise NotEnoughData(f"{results.name!r} has no result for m0, so no specimen can be fitted")
     described = described_specimen(results.facts[0].bench)
     nominal = described.specimen()
     reasons: list[str] = []
     if len({described_specimen(each.bench).specimen() for each in results.facts}) > 1:
         reasons.append(
-            "The recordings describe different specimens; the fit takes them as one, described as in "
-            f"{results.facts[0].name}."
+            "The recordings describe different specimens; the fit takes them as one specimen, described as "
+            f"in {results.facts[0].name}."
         )
     free = (*LINEAR, *(Parameter(each) for each in also_free))
     linear = _linear(results, nominal, free, reasons)
@@ -335,7 +337,7 @@ def _linear(
         channels = RecordedChannels(recording, response=facts.response)
         scatter = scatter_over_silence(channels, results.noise[0].analysis.excitation, weakest)
     if scatter > _LARGEST_SCATTER:
-        why = f"m0 scatters about any linear response, {np.sqrt(scatter):.2g} times as much as in silence"
+        why = f"the linear response leaves {np.sqrt(scatter):.2g} times as much scatter of m0 as in silence"
         return not_linear(nominal, f"{why}, {_WEAKER}")
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
@@ -376,33 +378,14 @@ def _with_gaps(
         updated = replace(updated, collisions=found, specimen=found.on(updated.specimen))
         if found.gap_fields:
             return updated
-    gap = _onset_gap(results, updated.specimen, updated.linear, reasons)
-    if gap is None:
+    sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
+    try:
+        gap = onset_gap(sweeps, dwells, updated.specimen, updated.linear)
+    except NotEnoughData as error:
+        reasons.append(f"The gap stays as described: {error}.")
         return updated
     return replace(
         updated,
         specimen=with_values(updated.specimen, {Parameter.GAP: gap.value}),
         values=(*updated.values, gap),
     )
-
-
-def _onset_gap(
-    results: CampaignResults, model: Specimen, linear: SpecimenFit | None, reasons: list[str]
-) -> FittedValue | None:
-    """Return the gap with the narrower bounds, from sweeps or from dwells."""
-    sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
-    ways: tuple[Callable[[], FittedValue], ...] = (
-        lambda: fit_gap(sweeps, model, linear),
-        lambda: bracketed_gap(dwells, model),
-    )
-    found: list[FittedValue] = []
-    why: list[str] = []
-    for tell in ways:
-        try:
-            found.append(tell())
-        except NotEnoughData as error:
-            why.append(str(error))
-    if not found:
-        reasons.append(f"The gap stays as described: {'; '.join(why)}.")
-        return None
-    return min(found, key=lambda each: each.high / each.low)

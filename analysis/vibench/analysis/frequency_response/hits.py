@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotEnoughData
-from ..recordings.channels import Channels, Stretch
+from ..recordings.channels import RecordedChannels, Stretch
 from ..signals.arrays import Complexes, Reals
-from ..signals.window import Window
-from ..spectra.spectra import SpectralAverages
+from ..signals.averaging import Window
+from ..spectra import SpectralAverages
 from .modal_fit import Resonance
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import frequency_response_of
@@ -17,13 +17,13 @@ _BLOCK = 1 << 19
 _PIECE_S, _FEWEST_PIECES = 0.01, 100
 """Usual length [s] and minimum number of the pieces into which the drive is divided to compare energies."""
 _SHORT, _MOST_ENERGY = 0.05, 0.9
-"""In the strongest 0.05 of the time, a drive of hits has over 0.9 of its energy, and noise has 0.06."""
+"""The strongest 0.05 of the time contains over 0.9 of the energy of hits, but 0.06 of that of noise."""
 _TRIGGER = 0.1
 """Trigger level of a hit relative to the peak of the hardest hit."""
 _LEAD_PERIODS = 2.0
 """Time from the start of a segment to the trigger, in periods of the highest frequency."""
 _REMAINDER = 1e-3
-"""Largest rms of the windowed response in the last part of a segment, relative to the strongest part."""
+"""Largest rms of the windowed response in a segment's last part, relative to its strongest part."""
 _PARTS = 20
 """Number of equal parts into which a segment is divided; the rms values of the parts show the decay."""
 _NOTHING = 1e-300
@@ -44,7 +44,7 @@ class Hits:
 
 
 def find_hits(
-    channels: Channels, stretch: Stretch, band_hz: tuple[float, float], segment_s: float | None
+    channels: RecordedChannels, stretch: Stretch, band_hz: tuple[float, float], segment_s: float | None
 ) -> Hits | None:
     """Return the segments of the hits in the drive; None if the drive does not consist of hits.
 
@@ -86,7 +86,7 @@ def find_hits(
     return Hits(tuple(int(each) for each in kept), int(segment), int(starts.size - kept.size))
 
 
-def _drive(channels: Channels, start: int, stop: int) -> Reals:
+def _drive(channels: RecordedChannels, start: int, stop: int) -> Reals:
     """Return the drive without its offset; lost samples are zero."""
     drive = np.nan_to_num(channels.read(start, stop)[0])
     return np.asarray(drive - np.median(drive))
@@ -113,7 +113,7 @@ class HitSpectra:
 
     @property
     def count(self) -> int:
-        """Number of hits."""
+        """Number of hits in the spectra."""
         return len(self.spectra)
 
     def response(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
@@ -135,7 +135,7 @@ class HitSpectra:
         )  # fmt: skip
 
     def without_each(self) -> tuple["HitSpectra", ...]:
-        """Return one set of spectra for each hit, in which that hit is left out."""
+        """For each hit, return the set of spectra without that hit."""
         return tuple(
             replace(self, spectra=np.delete(self.spectra, each, axis=0)) for each in range(self.count)
         )
@@ -160,7 +160,7 @@ def hit_spectra(
         Whether to apply an exponential window if the response has not decayed by the end of a segment.
     """
     rate, size = settings.sample_rate_hz, hits.segment_samples
-    # A free body keeps its velocity after a hit, so only the level before the hit is known to be zero.
+    # A free body still moves after a hit, so the velocity is known to be zero only before the hit.
     data = data - np.mean(data[..., : max(round(rate / high_hz), 1)], axis=2, keepdims=True)
     levels = np.sqrt([np.mean(part**2) for part in np.array_split(data[:, 2], _PARTS, axis=1)])
     lasting = np.log(max(levels[-1] / max(np.max(levels), _NOTHING) / _REMAINDER, 1.0)) if fades else 0.0
@@ -176,7 +176,7 @@ def hit_spectra(
 
 def with_assumed_scatter(response: FrequencyResponse) -> FrequencyResponse:
     """Return a single hit's response with an assumed scatter, for a fit without bounds."""
-    # Assume equal noise on all lines of the velocity, and in addition an equal relative error.
+    # Assume that all lines of the velocity have the same noise and, in addition, the same relative error.
     size = response.magnitude / response.frequency_hz
     assumed = _ASSUMED_SD * np.hypot(1.0, np.max(size) / np.maximum(size, _NOTHING))
     return replace(

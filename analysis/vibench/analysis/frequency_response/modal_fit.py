@@ -9,8 +9,7 @@ import numpy as np
 import scipy
 
 from ..signals.arrays import Complexes, Flags, Integers, Reals
-from ..signals.confidence import chi_square_limit, chi_square_of
-from ..signals.window import Window, cosine_weights, hop_samples, taper
+from ..signals.averaging import Window, chi_square_limit, chi_square_of, cosine_weights, hop_samples, taper
 from .results import FrequencyResponse
 
 SMALLEST_RELATIVE_SD = 1e-6
@@ -41,7 +40,7 @@ class Resonance:
     peak_magnitude: float
     sd_peak_magnitude: float
     reduced_chi_square: float
-    """Reduced chi-square of the lines about the mode; a value above 1 widens the standard deviations."""
+    """Reduced chi-square of the lines about the mode; values above 1 increase standard deviations."""
     chi_square_limit: float
     """Reduced chi-square that one correct fit in a thousand exceeds."""
     lines_used: int
@@ -52,7 +51,7 @@ class Resonance:
 
     @property
     def is_explained(self) -> bool:
-        """Whether the fitted modes describe the lines about this mode, within their scatter."""
+        """Whether the fitted modes describe the lines about this mode within the lines' scatter."""
         # Chi-square is NaN for a single hit, whose lines have no known scatter.
         return not self.reduced_chi_square > max(self.chi_square_limit, WELL_FITTED)
 
@@ -65,13 +64,8 @@ class Resonance:
             return ""
         return (
             f"one mode does not describe the lines near {self.frequency_hz:.5g} Hz (reduced chi² = "
-            f"{self.reduced_chi_square:.3g}, at most {max(self.chi_square_limit, WELL_FITTED):.3g} by chance)"
+            f"{self.reduced_chi_square:.3g}; by chance at most {max(self.chi_square_limit, WELL_FITTED):.3g})"
         )
-
-    @property
-    def quality_factor(self) -> float:
-        """Quality factor: 1 / (2 x damping ratio)."""
-        return 0.5 / self.damping_ratio
 
     @property
     def half_power_bandwidth_hz(self) -> float:
@@ -82,9 +76,9 @@ class Resonance:
 # The window of averaged segments smears modes and correlates the errors of neighbouring lines.
 #
 # Segments are w(t) r(t), w(t) x(t) and w(t) y(t) with y = h * x; r and x have the cross density G. The
-# averaged estimate is |W|^2 convolved with G H, divided by |W|^2 convolved with G. Its error is
-# R* V / (R* X). The residual V = Y - H X of a segment is sensor noise n windowed by w, plus cut-off ringing:
-# dH/df times x windowed by w' / (2 pi i).
+# averaged estimate is (|W|^2 convolved with G H) / (|W|^2 convolved with G). Its error is R* V / (R* X). The
+# residual V = Y - H X of a segment is sensor noise n windowed by w, plus cut-off ringing: dH/df times x
+# windowed by w' / (2 pi i).
 
 _PROXY_SAMPLES = 1024
 """Window length for computing correlations [samples]; the length does not change the result."""
@@ -115,7 +109,7 @@ class Leakage:
         slope g of the density [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
-        # Lines and window terms differ by whole periods per segment, so exp(scaled) is the same for all.
+        # For all lines and window terms, exp(scaled) is the same: they differ by whole periods per segment.
         rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
@@ -161,7 +155,7 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
     how = found.settings
     window, segment_s = Window(how.window), how.segment_samples / how.sample_rate_hz
     noise, ringing = _line_correlations(window, how.overlap, found.segments_used)
-    # Real and imaginary part each have half the variance of the mean; w' is per second, the slope per hertz.
+    # Real and imaginary part each have half the mean's variance; w' is per second, the slope is per hertz.
     scale = 1 / (8 * np.pi**2 * found.n_eff * segment_s**2)
     return Leakage(segment_s, window, noise, scale * ringing)
 
@@ -212,10 +206,12 @@ def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Comple
     """Return the integrals of exp(q t) and (1 - t) exp(q t) from 0 to 1; `rest` is exp(q) - 1."""
     near = np.abs(exponent) < _NEAR
     q = np.where(near, 1.0, exponent)
-    once, small = rest / q, np.where(near, exponent, 0.0)
-    first = 1 + small / 2 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5)))
-    second = 0.5 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5 * (1 + small / 6))))
-    return np.where(near, first, once), np.where(near, second, (once - 1) / q)
+    once = rest / q
+    twice = (once - 1) / q
+    small = exponent[near]
+    once[near] = 1 + small / 2 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5)))
+    twice[near] = 0.5 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5 * (1 + small / 6))))
+    return once, twice
 
 
 Background = Callable[[Reals], Complexes]
@@ -255,7 +251,7 @@ class Lines:
         self._off_hz = -0.5j / np.pi * (band.settings.decay_per_s or 0.0)
         slope = band.drive_slope_per_hz
         self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
-        # A scatter smoothed over lines is as reliable as one from more averages.
+        # Smoothing the scatter over lines has the same effect as more averages.
         self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
         self._root: Complexes | None = None
         self.ringing_share = np.zeros(self.value.size)
@@ -370,7 +366,7 @@ class _Sums:
 
     def misfit_rates(self, poles: Reals) -> Reals:
         """Return the derivatives of the residual with respect to each pole."""
-        # The dependence of the factors on the poles leaves the gradient unchanged (Kaufman 1975, BIT 15, 49).
+        # The factors also depend on the poles, which does not change the gradient (Kaufman 1975, BIT 15, 49).
         factors, _, onto = self.factors(poles)
         rates = self.pole_rates(poles, factors)
         return np.asarray(onto @ (onto.T @ rates) - rates)
@@ -415,7 +411,7 @@ def modal_fit(
     if not result.success or np.any(np.minimum(poles - low, high - poles) < _EDGE * reach):
         return None
     found, left, _ = sums.factors(poles)
-    # Joint Jacobian and covariance of poles and factors.
+    # Compute the joint Jacobian and covariance of the poles and factors.
     follows = np.hstack((sums.pole_rates(poles, found), sums.basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     # If the factor of a mode is exactly zero, its pole is undetermined.
@@ -425,7 +421,7 @@ def modal_fit(
     chi_square = float(np.sum(squares)) / freedom
     alone = np.diag(np.linalg.inv(curvature))
     hidden = lines.modes(_poles_between(poles))
-    # Three modes with very different damping may also fit two overlapping peaks, so allow for a third mode.
+    # Two overlapping peaks may also be three modes with very different damping: allow for a third mode.
     columns = np.hstack((follows, lines.independent(hidden)))
     curvature = np.asarray(columns.T @ columns)
     if _condition(curvature) > _WORST_CONDITION:
@@ -452,7 +448,7 @@ def modal_fit(
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
         top_hz = np.array([natural_hz])
-        # The second pass searches only between the neighbours of the highest point.
+        # In the second pass, search only between the two neighbours of the highest point.
         for reach_hz in (2 * half_hz, 4 * half_hz / _FINE_POINTS):
             fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
             top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
@@ -479,7 +475,7 @@ def modal_fit(
 
 
 def _poles_between(poles: Reals) -> Reals:
-    """Return poles half way between pairs of overlapping modes; none within groups of three or more."""
+    """Return poles half way between pairs of overlapping modes; none within groups of three or more modes."""
     modes = poles.reshape(-1, 2)
     modes = modes[np.argsort(modes[:, 0])]
     mean_bandwidth = np.exp(modes[:-1, 1]) + np.exp(modes[1:, 1])

@@ -5,7 +5,8 @@ between periods is noise. Additional scatter between realisations is distortion 
 Schoukens, System Identification, 2nd ed., section 4.3, with the drive as reference).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
@@ -16,15 +17,14 @@ from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals.arrays import Complexes, Flags, Integers, Reals
-from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance
+from ..signals.averaging import DEFAULT_CONFIDENCE, Window, coherence_significance
 from ..signals.interpolation import REACH, TRUSTED_BAND, interpolate
-from ..signals.window import Window
 from ..tables import Tabular
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd
 
 _SHORTFALL = 1e-3
-"""Fraction of a period that may be missing at the end of a record, which is then continued periodically."""
+"""Fraction of a period that may be missing at a record's end; the record is then extended periodically."""
 _WEAKEST_LINE = 1e-3
 """Minimum amplitude of a driven line relative to the strongest line: -60 dB, above quantisation."""
 _ITERATIONS = 8
@@ -41,7 +41,7 @@ class Repetition:
     """Period of a drive, measured with the converter clock."""
 
     period_samples: float
-    """Converter samples per period; may be fractional."""
+    """Number of converter samples per period; need not be an integer."""
     sd_samples: float
     """Standard deviation of the period due to noise of the drive channel."""
     periods: int
@@ -51,7 +51,7 @@ class Repetition:
 def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetition:
     """Measure the true period of a recorded drive from the phase advance of its lines per period.
 
-    Weighted least squares of the phases of driven lines over the periods, repeated until convergence. The
+    The phases of driven lines over the periods are fitted by weighted least squares until convergence. The
     first pass uses only low lines, whose phase changes by less than a quarter turn at 200 ppm. Raises
     NotEnoughData for fewer than two periods, and UnusableData when the drive is silent or does not repeat.
     """
@@ -90,7 +90,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
     the repetition frequency, up to `TRUSTED_BAND` of the sample rate.
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
-    # Continue the record periodically, as far as the interpolation reaches.
+    # Continue the record periodically beyond both ends, as far as the interpolation needs samples.
     size = samples.shape[-1]
     missing = max(0, int(np.ceil(periods * period_samples)) - size)
     before = interpolate(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)
@@ -146,7 +146,7 @@ _MOST = 0.5
 _SMALL = 0.03
 """Lines up to this relative deviation are used to find a drift; deviations near narrow modes are larger."""
 _OFTEN = 3.0
-"""To find a drift, deviations above `_SMALL` are used up to this multiple of the median deviation."""
+"""Lines up to this multiple of the median deviation are also used to find a drift."""
 
 
 class Scatter(StrEnum):
@@ -160,7 +160,7 @@ class Scatter(StrEnum):
 
 @dataclass(frozen=True)
 class Drift:
-    """Changes between realisations that all spectral lines share, and that are not distortion."""
+    """Changes between realisations that are common to all spectral lines, and therefore not distortion."""
 
     OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1", "common_share": "1"}
 
@@ -184,34 +184,15 @@ class Drift:
         return f"realisations differ because of a drift of {shares}"
 
 
-@dataclass(frozen=True)
-class BestLinearApproximation:
-    """Response over base at the driven lines; arrays of shape (lines,)."""
-
-    value: Complexes
-    coherence: Reals
-    relative_sd: Reals
-    """Standard deviation of ln(magnitude), and equally of the phase [rad]."""
-    steady_relative_sd: Reals
-    """`relative_sd` smoothed over neighbouring spectral lines."""
-    noise_variance: Reals
-    """Variance of the complex response of one realisation due to noise."""
-    distortion_variance: Reals | None
-    """Variance of the complex response beyond noise and drift; None for a single realisation."""
-    drift: "Drift | None"
-    scatter: Scatter
-    averages: int
-    """Number of independent values for the scatter: realisations, or the periods of a single realisation."""
-
-
 def best_linear_approximation(
     drive: Complexes,
     base: Complexes,
     response: Complexes,
     covariance: Complexes,
-    periods: int,
+    repetitions: tuple[Repetition, ...],
     frequency_hz: Reals,
-) -> BestLinearApproximation:
+    settings: FrequencyResponseSettings,
+) -> tuple[FrequencyResponse, Reals, Reals | None, Drift | None]:
     """Estimate response over base, referenced to the drive, and separate noise from distortion.
 
     H = sum Y U* / sum X U*, with residuals v = Y - H X; Var(H) = s_v^2 sum |U|^2 / |sum X U*|^2
@@ -224,10 +205,15 @@ def best_linear_approximation(
     covariance
         Covariance of the averages of (X, Y) from the scatter of the periods, mean over realisations, shape
         (2, 2, lines).
-    periods
-        Periods per realisation.
+    repetitions
+        Measured period of each realisation.
     frequency_hz
         Frequencies of the lines.
+
+    Returns
+    -------
+    The response at the lines, the variance of one realisation's value due to noise, the variance beyond
+    noise and drift, and the drift; the last two are None for a single realisation.
     """
     count = len(drive)
     through = np.sum(base * np.conj(drive), axis=0)
@@ -240,41 +226,38 @@ def best_linear_approximation(
         0.0,
     )
     noise_variance = to_one * noise
-    if count == 1:
-        signal = np.abs(value) ** 2
-        relative_sd = np.sqrt(noise_variance / 2) / np.abs(value)
-        return BestLinearApproximation(
-            value=value,
-            coherence=signal / (signal + periods * noise_variance),
-            relative_sd=relative_sd,
-            steady_relative_sd=steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (periods - 1)),
-            noise_variance=noise_variance,
-            distortion_variance=None,
-            drift=None,
-            scatter=Scatter.PERIODS,
-            averages=periods,
-        )
     residual = response - value * base
-    variance = to_one * np.sum(np.abs(residual) ** 2, axis=0) / (count - 1)
+    if count == 1:
+        averages, variance = repetitions[0].periods, noise_variance
+        coherent = np.abs(value) ** 2 / (np.abs(value) ** 2 + averages * noise_variance)
+    else:
+        averages, variance = count, to_one * np.sum(np.abs(residual) ** 2, axis=0) / (count - 1)
+        of_base, of_response = (np.sum(np.abs(each) ** 2, axis=0) for each in (base, response))
+        coherent = coherence(of_base, of_response, np.sum(np.conj(base) * response, axis=0))
     relative_sd = np.sqrt(variance / count / 2) / np.abs(value)
-    steady_sd = steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (count - 1))
-    drift, left = _without_drift(residual / (value * base), value, frequency_hz, noise_variance, steady_sd)
-    varied = to_one * np.sum(np.abs(left * value * base) ** 2, axis=0) / (count - 1)
-    return BestLinearApproximation(
+    steady_sd = steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (averages - 1))
+    distortion_variance = drift = None
+    if count > 1:
+        off = residual / (value * base)
+        drift, left = _without_drift(off, value, frequency_hz, noise_variance, steady_sd)
+        varied = to_one * np.sum(np.abs(left * value * base) ** 2, axis=0) / (count - 1)
+        distortion_variance = np.maximum(varied - noise_variance, 0.0)
+    estimate = FrequencyResponse(
+        frequency_hz=frequency_hz,
         value=value,
-        coherence=coherence(
-            np.sum(np.abs(base) ** 2, axis=0),
-            np.sum(np.abs(response) ** 2, axis=0),
-            np.sum(np.conj(base) * response, axis=0),
-        ),
-        relative_sd=relative_sd,
+        coherence=coherent,
+        n_eff=float(averages),
+        relative_sd_magnitude=relative_sd,
+        sd_phase_rad=relative_sd,
+        half_width=scipy.stats.t.ppf((1 + settings.confidence) / 2, 2 * (averages - 1)) * relative_sd,
+        coherence_significance=coherence_significance(averages, settings.confidence),
+        resolution_hz=0.0,
+        segments_used=sum(one.periods for one in repetitions),
+        segments_excluded=0,
         steady_relative_sd=steady_sd,
-        noise_variance=noise_variance,
-        distortion_variance=np.maximum(varied - noise_variance, 0.0),
-        drift=drift,
-        scatter=Scatter.REALISATIONS,
-        averages=count,
+        settings=settings,
     )
+    return estimate, noise_variance, distortion_variance, drift
 
 
 def _without_drift(
@@ -283,7 +266,7 @@ def _without_drift(
     """Return the drift between realisations, None if insignificant, and the deviations without drift.
 
     Distortion with random phases is independent between lines, so a part common to all lines is a drift. The
-    drift must explain most of the scatter beyond noise, and far more than chance.
+    drift must explain most of the scatter beyond noise, and far more than chance would.
 
     Parameters
     ----------
@@ -293,7 +276,7 @@ def _without_drift(
         Transmission, frequencies, complex variance due to noise, and relative standard deviation of the mean.
     """
     count = len(off)
-    # A common shift of frequencies stretches the displacement ratio, which is value * frequency.
+    # The ratio of displacements is value * frequency, so a common shift of frequencies scales the ratio.
     moved = value * frequency_hz
     stretch = frequency_hz * _slope(moved, frequency_hz) / moved
     known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
@@ -363,7 +346,7 @@ def _slope(value: Complexes, frequency_hz: Reals) -> Complexes:
     steps = np.diff(value) / np.diff(frequency_hz)
     across = (value[2:] - value[:-2]) / (frequency_hz[2:] - frequency_hz[:-2])
     product = steps[1:] * steps[:-1]
-    # At smooth extrema and in modes narrower than three lines, the modal slope would be too large.
+    # The modal slope would be too large at smooth extrema, and in modes narrower than three lines.
     is_mode = np.abs(product) < np.abs(across) ** 2
     slope[1:-1][is_mode] = product[is_mode] / across[is_mode]
     return np.asarray(slope)
@@ -430,8 +413,6 @@ class PeriodicSums:
         Nominal repetition frequency of the drive; the true frequency is measured.
     confidence
         Probability that the bounds of a line contain the true value.
-    begun_with
-        Realisations to start with.
     """
 
     def __init__(
@@ -440,7 +421,6 @@ class PeriodicSums:
         repetition_hz: float,
         *,
         confidence: float = DEFAULT_CONFIDENCE,
-        begun_with: Sequence[_Realisation] = (),
     ) -> None:
         if not 0 < repetition_hz < sample_rate_hz / 4:
             raise InvalidRequest(
@@ -450,7 +430,8 @@ class PeriodicSums:
         self._sample_rate_hz = sample_rate_hz
         self._repetition_hz = repetition_hz
         self._confidence = confidence
-        self._realisations = list(begun_with)
+        self.realisations: list[_Realisation] = []
+        """Realisations added so far."""
 
     def add(
         self, drive: Reals, base: Reals, response: Reals, *, repetition: Repetition | None = None
@@ -479,17 +460,14 @@ class PeriodicSums:
         deviation = motion - motion.mean(axis=1, keepdims=True)
         freedom = repetition.periods * (repetition.periods - 1)
         covariance = np.einsum("ipk,jpk->ijk", np.conj(deviation), deviation) / freedom
-        self._realisations.append(_Realisation(repetition, spectra.mean(axis=1), covariance))
+        self.realisations.append(_Realisation(repetition, spectra.mean(axis=1), covariance))
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Yield, for each realisation, the spectra of all other realisations; nothing for a single one."""
-        for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
-            yield PeriodicSums(
-                self._sample_rate_hz,
-                self._repetition_hz,
-                confidence=self._confidence,
-                begun_with=[*self._realisations[:place], *self._realisations[place + 1 :]],
-            )
+        """Yield, for each realisation, the spectra of all other realisations; nothing for one alone."""
+        for place in range(len(self.realisations) if len(self.realisations) > 1 else 0):
+            others = copy(self)
+            others.realisations = [*self.realisations[:place], *self.realisations[place + 1 :]]
+            yield others
 
     def motion(self) -> Complexes:
         """Return the mean spectra of base and response, shape (realisations, 2, lines)."""
@@ -497,8 +475,8 @@ class PeriodicSums:
 
     def _spectra(self) -> Complexes:
         """Return the mean spectra of drive, base and response, shape (realisations, 3, lines)."""
-        lines = min(one.spectra.shape[1] for one in self._realisations)
-        return np.stack([one.spectra[:, :lines] for one in self._realisations])
+        lines = min(one.spectra.shape[1] for one in self.realisations)
+        return np.stack([one.spectra[:, :lines] for one in self.realisations])
 
     def frequency_response(
         self, *, delay_s: float = 0.0, orders: Integers | None = None
@@ -516,68 +494,47 @@ class PeriodicSums:
             Driven lines as multiples of the repetition frequency. By default they are the strong lines of the
             drive, which may include noise and images of a sample-and-hold output.
         """
-        if not self._realisations:
+        if not self.realisations:
             raise NotEnoughData("no realisation was added; give at least one")
         drive, base, response = self._spectra().transpose(1, 0, 2)
         lines = drive.shape[1]
-        covariance = np.mean([one.covariance[:, :, :lines] for one in self._realisations], axis=0)
-        period = float(np.mean([one.repetition.period_samples for one in self._realisations]))
+        covariance = np.mean([one.covariance[:, :, :lines] for one in self.realisations], axis=0)
+        period = float(np.mean([one.repetition.period_samples for one in self.realisations]))
         frequency_hz = np.arange(lines, dtype=np.float64) * (self._sample_rate_hz / period)
         driven = driven_lines(drive) if orders is None else _lines_of(orders, frequency_hz)
-        periods = self._realisations[0].repetition.periods
-        estimate = best_linear_approximation(
+        repetitions = tuple(one.repetition for one in self.realisations)
+        estimate, noise_variance, distortion_variance, drift = best_linear_approximation(
             drive[:, driven],
             base[:, driven],
             response[:, driven],
             covariance[:, :, driven],
-            periods,
+            repetitions,
             frequency_hz[driven],
-        )
-        strong = np.flatnonzero(driven)
-        inside = np.arange(strong[0], strong[-1] + 1)
-        quiet = inside[~driven[inside]]
-        return PeriodicFrequencyResponse(
-            frequency_response=self._frequency_response(frequency_hz[driven], estimate, period).without_delay(
-                delay_s
-            ),
-            noise_variance=estimate.noise_variance,
-            distortion_variance=estimate.distortion_variance,
-            drift=estimate.drift,
-            scatter=estimate.scatter,
-            realisations=len(self._realisations),
-            repetitions=tuple(one.repetition for one in self._realisations),
-            detection=DetectionLines(
-                order=quiet,
-                frequency_hz=frequency_hz[quiet],
-                response_amplitude=np.sqrt(np.mean(np.abs(response[:, quiet]) ** 2, axis=0)),
-                noise_amplitude=np.sqrt(covariance[1, 1].real[quiet]),
-            ),
-        )
-
-    def _frequency_response(
-        self, frequency_hz: Reals, estimate: BestLinearApproximation, period: float
-    ) -> FrequencyResponse:
-        quantile = float(scipy.stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
-        return FrequencyResponse(
-            frequency_hz=frequency_hz,
-            value=estimate.value,
-            coherence=estimate.coherence,
-            n_eff=float(estimate.averages),
-            relative_sd_magnitude=estimate.relative_sd,
-            sd_phase_rad=estimate.relative_sd,
-            half_width=quantile * estimate.relative_sd,
-            coherence_significance=coherence_significance(estimate.averages, self._confidence),
-            resolution_hz=0.0,
-            segments_used=sum(one.repetition.periods for one in self._realisations),
-            segments_excluded=0,
-            steady_relative_sd=estimate.steady_relative_sd,
-            settings=FrequencyResponseSettings(
+            FrequencyResponseSettings(
                 estimator=Estimator.DRIVE,
                 sample_rate_hz=self._sample_rate_hz,
                 segment_samples=round(period),
                 window=Window.BOXCAR.value,
                 overlap=0.0,
                 confidence=self._confidence,
+            ),
+        )
+        strong = np.flatnonzero(driven)
+        inside = np.arange(strong[0], strong[-1] + 1)
+        quiet = inside[~driven[inside]]
+        return PeriodicFrequencyResponse(
+            frequency_response=estimate.without_delay(delay_s),
+            noise_variance=noise_variance,
+            distortion_variance=distortion_variance,
+            drift=drift,
+            scatter=Scatter.PERIODS if len(repetitions) == 1 else Scatter.REALISATIONS,
+            realisations=len(repetitions),
+            repetitions=repetitions,
+            detection=DetectionLines(
+                order=quiet,
+                frequency_hz=frequency_hz[quiet],
+                response_amplitude=np.sqrt(np.mean(np.abs(response[:, quiet]) ** 2, axis=0)),
+                noise_amplitude=np.sqrt(covariance[1, 1].real[quiet]),
             ),
         )
 

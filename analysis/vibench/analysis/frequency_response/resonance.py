@@ -6,10 +6,11 @@ from itertools import chain
 
 import numpy as np
 import scipy
+from threadpoolctl import threadpool_limits
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Complexes, Reals
-from ..signals.confidence import standard_uncertainty
+from ..signals.averaging import standard_uncertainty
 from .modal_fit import (
     LARGEST_DAMPING,
     SMALLEST_RELATIVE_SD,
@@ -22,7 +23,7 @@ from .modal_fit import (
 from .results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
-"""Largest distance from a peak [half-power bandwidths] at which spectral lines are used in its fit."""
+"""Largest distance from a peak [half-power bandwidths] at which its fit uses spectral lines."""
 _LEAST_LINES = 8
 """Minimum number of lines for a fit: 8 complex values determine a pole (2) and up to 10 linear parameters."""
 _LEAST_RISE = 3.0
@@ -69,10 +70,12 @@ def resonances(
     found: list[tuple[Resonance, ...]] = []
     if band.steady_relative_sd is not None:
         band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
-    for line, width in _significant_peaks(band):
-        together = _refit(band, width, _fit_peak(band, line, width, 1))
-        found.append(tuple(each for each in together if low_hz <= each.frequency_hz <= high_hz))
-    return _fit_jointly(band, _distinct(found))
+    # The matrices are small, and several threads of linear algebra would wait for each other in busy loops.
+    with threadpool_limits(limits=1, user_api="blas"):
+        for line, width in _significant_peaks(band):
+            together = _refit(band, width, _fit_peak(band, line, width, 1))
+            found.append(tuple(each for each in together if low_hz <= each.frequency_hz <= high_hz))
+        return _fit_jointly(band, _distinct(found))
 
 
 def scattered_resonances(
@@ -89,7 +92,7 @@ def scattered_resonances(
     found
         Resonances from all realisations.
     without
-        Resonances of each subset, which leaves out one realisation.
+        Resonances of each subset; each subset leaves out one realisation.
     """
     widened = []
     for each in found:
@@ -131,12 +134,12 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smooth(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
-    # Require a rise of ln(magnitude) that noise does not explain.
+    # At a peak, ln(magnitude) must rise by more than noise explains.
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
         width = _half_power_lines(size, int(line))
-        # Peaks as wide as the band would all be fitted to the same spectral lines, so keep only the largest.
+        # Of the peaks as wide as the band, keep only the largest: all would be fitted to the same lines.
         is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
         if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
             result.append((int(line), width))
@@ -144,7 +147,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
 
 
 def _smooth(size: Reals, spread: Reals) -> Reals:
-    """Average ln(magnitude) over up to 9 lines to reduce its scatter to about 2 %; small scatter is kept."""
+    """Average ln(magnitude) over up to 9 lines to reduce its scatter to about 2 %; small scatter remains."""
     lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
     if lines <= 1:
         return size
@@ -260,7 +263,7 @@ def _fit_jointly(band: FrequencyResponse, found: list[Resonance]) -> tuple[Reson
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        # One pole fitted to two modes may end far from both, so also split its starting value.
+        # A pole that was fitted to two modes may lie far from both modes, so also split its start value.
         split = (_split_poles(each[worst : worst + 1], 2) for each in (poles, starts[0]))
         starts = [np.vstack((rest, two.reshape(2, 2))) for two in chain.from_iterable(split)]
     return best
@@ -295,7 +298,12 @@ def _background(frequency_hz: Reals) -> Complexes:
 def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
     """Keep one fit of each pole, because ripples of one resonance give the same pole."""
     kept: list[Resonance] = []
-    for together in sorted(filter(None, found), key=lambda fit: min(map(_sort_key, fit))):
+
+    def rank(fit: tuple[Resonance, ...]) -> tuple[bool, float]:
+        """Rank fits that explain their lines first, then by relative uncertainty of damping."""
+        return min((not each.is_explained, each.sd_damping_ratio / each.damping_ratio) for each in fit)
+
+    for together in sorted(filter(None, found), key=rank):
         known = tuple(kept)
         for each in together:
             half = 0.5 * each.half_power_bandwidth_hz
@@ -305,8 +313,3 @@ def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
             ):
                 kept.append(each)
     return sorted(kept, key=lambda one: one.frequency_hz)
-
-
-def _sort_key(found: Resonance) -> tuple[bool, float]:
-    """Return a sort key: fits that explain their lines first, then by relative uncertainty of damping."""
-    return not found.is_explained, found.sd_damping_ratio / found.damping_ratio

@@ -10,7 +10,7 @@ import numpy as np
 from vibench.acquisition.plan import ScanPoint
 
 from ..signals.arrays import Complexes, Reals
-from ..signals.confidence import magnitude_bounds, phase_half_width
+from ..signals.averaging import magnitude_bounds, phase_half_width
 from .noise_response import NoiseAnalysis
 
 _SAME = 0.03
@@ -66,7 +66,7 @@ class Scan:
 
     @property
     def shapes(self) -> tuple[ScanShape, ...]:
-        """Deflection shape at each resonance that at least one point shows."""
+        """Deflection shape at each resonance that occurs at one or more points."""
         found = sorted(mode.frequency_hz for each in self.analyses for mode in each.response.resonances)
         groups = np.split(np.array(found), np.flatnonzero(np.diff(found) > _SAME * np.array(found[1:])) + 1)
         return tuple(self._shape(float(np.median(each))) for each in groups if each.size)
@@ -82,7 +82,7 @@ class Scan:
 def scans_of(analyses: Sequence[NoiseAnalysis]) -> Iterator[Scan]:
     """Yield the scans among noise measurements, given in the order of their start.
 
-    A later attempt at a recording replaces the earlier one. Repeated recordings are separate scans.
+    A later attempt at a recording replaces the earlier attempt. Repeated recordings are separate scans.
     """
     latest = {
         (re.sub(r"\.\d+$", "", each.facts.name), point.node): (point, each)

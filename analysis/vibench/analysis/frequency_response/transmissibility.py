@@ -7,9 +7,15 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
-from ..signals.window import Window
-from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
+from ..signals.averaging import (
+    DEFAULT_CONFIDENCE,
+    Window,
+    by_name,
+    coherence_significance,
+    relative_sd,
+    student_half_width,
+)
+from ..spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings, require_estimator
 
 _ENOUGH_FREEDOM = 24.0
@@ -43,7 +49,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     freedom
         Degrees of freedom of each line's own variance.
     """
-    # With nearly full overlap, the number of independent averages may approach one.
+    # If the segments overlap almost fully, the number of independent averages may approach one.
     freedom = max(freedom, 1.0)
     lines = min(ceil(_FREEDOM / freedom), value.size)
     if freedom >= _ENOUGH_FREEDOM or lines * freedom <= _FEWEST_FREEDOM:
@@ -54,7 +60,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         steps = np.nan_to_num(np.abs(np.gradient(value)) ** 2)
     known = np.isfinite(variance)
     shapes = np.where(known, [np.ones_like(gain), gain, steps], 0.0)
-    # Stretches overlap by half; between their centres, the factors of the shapes are interpolated.
+    # Stretches overlap by half. Interpolate the factors of the shapes between the centres of stretches.
     last = value.size - lines
     firsts = np.append(np.arange(0, last, max(lines // 2, 1)), last)
     around = firsts[:, None] + np.arange(lines)
@@ -84,50 +90,11 @@ def _sizes(variance: Reals, shapes: Reals) -> Reals:
     return np.asarray(sizes * level / heights)[..., 0]
 
 
-def estimator_by_name(estimator: Estimator | str) -> Estimator:
-    """Return the estimator with this name; raises InvalidRequest for unknown names."""
-    try:
-        return Estimator(estimator)
-    except ValueError as unknown:
-        raise InvalidRequest(
-            f"estimator {estimator!r} is not known; use one of {', '.join(Estimator)}"
-        ) from unknown
-
-
 def coherence(s_xx: Reals, s_yy: Reals, s_xy: Complexes) -> Reals:
     """Return the coherence |S_xy|^2 / (S_xx S_yy); 0 for a dead channel."""
     power = s_xx * s_yy
     ratio = np.divide(np.abs(s_xy) ** 2, power, out=np.zeros_like(power), where=power > 0)
     return np.asarray(np.clip(ratio, 0.0, 1.0))
-
-
-def h1(s_xx: Reals, s_xy: Complexes) -> Complexes:
-    """Return the estimate h1, S_xy / S_xx."""
-    return _ratio(s_xy, s_xx.astype(np.complex128))
-
-
-def h2(s_yy: Reals, s_xy: Complexes) -> Complexes:
-    """Return the estimate h2, S_yy / conj(S_xy)."""
-    return _ratio(s_yy.astype(np.complex128), np.conj(s_xy))
-
-
-def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complexes:
-    """Return the total least squares estimate for r = S_nn / S_mm, response noise over drive noise.
-
-    [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0 is
-    h2. r is needed because the result would otherwise depend on the units of the channels.
-    """
-    difference = s_yy - noise_ratio * s_xx
-    root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
-    # For a negative difference the sum loses digits by cancellation; the conjugate form does not.
-    stable = np.divide(
-        4 * noise_ratio * np.abs(s_xy) ** 2,
-        root - difference,
-        out=np.zeros_like(root),
-        where=(root - difference) > 0,
-    )
-    numerator = np.where(difference > 0, difference + root, stable)
-    return _ratio(numerator.astype(np.complex128), 2 * np.conj(s_xy))
 
 
 def least_squares(
@@ -140,15 +107,34 @@ def least_squares(
     """
     match estimator, noise_ratio:
         case Estimator.H1, _:
-            return h1(s_xx, s_xy)
+            return _ratio(s_xy, s_xx.astype(np.complex128))
         case Estimator.H2, _:
-            return h2(s_yy, s_xy)
+            return _ratio(s_yy.astype(np.complex128), np.conj(s_xy))
         case Estimator.HV, float(ratio):
-            return hv(s_xx, s_yy, s_xy, ratio)
+            return _hv(s_xx, s_yy, s_xy, ratio)
         case _:
             raise InvalidRequest(
                 f"{estimator.value} needs a third channel; use h1, h2, or hv with a noise ratio"
             )
+
+
+def _hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complexes:
+    """Return the total least squares estimate for r = S_nn / S_mm, response noise over drive noise.
+
+    [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0 is
+    h2. r is needed because the result would otherwise depend on the units of the channels.
+    """
+    difference = s_yy - noise_ratio * s_xx
+    root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
+    # If the difference is negative, the sum loses digits by cancellation; use the conjugate form.
+    stable = np.divide(
+        4 * noise_ratio * np.abs(s_xy) ** 2,
+        root - difference,
+        out=np.zeros_like(root),
+        where=(root - difference) > 0,
+    )
+    numerator = np.where(difference > 0, difference + root, stable)
+    return _ratio(numerator.astype(np.complex128), 2 * np.conj(s_xy))
 
 
 def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: float) -> Reals:
@@ -189,33 +175,17 @@ _ROWS = ("drive", "response", "reference")
 class FrequencyResponseSums:
     """Averages for the transmission of a record that arrives in blocks, in constant memory.
 
-    Blocks have a row for the drive, one for the response
-    and, for the drive-referenced estimator, one for the reference.
+    Each block has a row for the drive, a row for the response and, for the drive-referenced estimator, a row
+    for the reference.
     """
 
-    def __init__(
-        self,
-        sample_rate_hz: float,
-        *,
-        segment_samples: int,
-        window: Window | str = Window.HANN,
-        overlap: float = 0.5,
-        estimator: Estimator | str = Estimator.H1,
-        noise_ratio: float | None = None,
-        confidence: float = DEFAULT_CONFIDENCE,
-    ) -> None:
-        self._settings = FrequencyResponseSettings(
-            estimator=estimator_by_name(estimator),
-            sample_rate_hz=sample_rate_hz,
-            segment_samples=segment_samples,
-            window=str(window),
-            overlap=overlap,
-            confidence=confidence,
-            noise_ratio=None if noise_ratio is None else float(noise_ratio),
+    def __init__(self, settings: FrequencyResponseSettings) -> None:
+        _check(settings)
+        self._settings = settings
+        self._channels = 3 if settings.estimator is Estimator.DRIVE else 2
+        self._spectra = SegmentSpectra(
+            self._channels, settings.segment_samples, window=settings.window, overlap=settings.overlap
         )
-        _check(self._settings)
-        self._channels = 3 if self._settings.estimator is Estimator.DRIVE else 2
-        self._spectra = SegmentSpectra(self._channels, segment_samples, window=window, overlap=overlap)
 
     def add(self, block: Reals, valid: Flags | None = None) -> None:
         """Add the next samples, shape (2 or 3, samples); see `SegmentSpectra.add` for ``valid``."""
@@ -227,7 +197,7 @@ class FrequencyResponseSums:
         self._spectra.add(block, valid)
 
     def frequency_response(self) -> FrequencyResponse:
-        """Return the transmission of all samples so far.
+        """Return the transmission of all samples added so far.
 
         Raises NotEnoughData for fewer than two valid segments, whose coherence would always be 1.
         """
@@ -244,8 +214,8 @@ class FrequencyResponseSums:
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:
             raise NotEnoughData(
-                f"valid segments of {averages.segment_samples} samples: {averages.segments_used}; "
-                f"{averages.segments_excluded} others contain invalid samples. A coherence needs at least "
+                f"{averages.segments_used} segments of {averages.segment_samples} samples are valid, and "
+                f"{averages.segments_excluded} contain invalid samples. A coherence needs at least "
                 f"{_LEAST_SEGMENTS}: use shorter segments or a longer record"
             )
         return frequency_response_of(averages, settings)
@@ -300,13 +270,15 @@ def transmissibility(
     """
     signals = (x, y) if reference is None else (x, y, reference)
     sums = FrequencyResponseSums(
-        sample_rate_hz,
-        segment_samples=segment_samples,
-        window=window,
-        overlap=overlap,
-        estimator=estimator,
-        noise_ratio=noise_ratio,
-        confidence=confidence,
+        FrequencyResponseSettings(
+            estimator=by_name(Estimator, estimator),
+            sample_rate_hz=sample_rate_hz,
+            segment_samples=segment_samples,
+            window=str(window),
+            overlap=overlap,
+            confidence=confidence,
+            noise_ratio=None if noise_ratio is None else float(noise_ratio),
+        )
     )
     for block, marks in pieces(signals, valid):
         sums.add(block, marks)
@@ -327,17 +299,18 @@ def frequency_response_of(
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     s_xy = products[_DRIVE, _RESPONSE]
     ordinary = coherence(s_xx, s_yy, s_xy)
-    value = _value(products, settings)
-    spread = relative_sd(ordinary, averages.n_eff)
     power, reference_coherence = s_xx, None
     if settings.estimator is Estimator.DRIVE:
+        s_rx, s_ry = products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE]
+        # The reference is an instrumental variable: the noise of x and y averages out.
+        value = _ratio(s_ry, s_rx)
         spread = drive_referenced_relative_sd(products, value, averages.n_eff)
         s_rr = products[_REFERENCE, _REFERENCE].real
-        power = np.abs(products[_REFERENCE, _DRIVE]) ** 2 / np.maximum(s_rr, np.finfo(float).tiny)
-        reference_coherence = np.minimum(
-            coherence(s_rr, s_xx, products[_REFERENCE, _DRIVE]),
-            coherence(s_rr, s_yy, products[_REFERENCE, _RESPONSE]),
-        )
+        power = np.abs(s_rx) ** 2 / np.maximum(s_rr, np.finfo(float).tiny)
+        reference_coherence = np.minimum(coherence(s_rr, s_xx, s_rx), coherence(s_rr, s_yy, s_ry))
+    else:
+        value = least_squares(settings.estimator, s_xx, s_yy, s_xy, settings.noise_ratio)
+        spread = relative_sd(ordinary, averages.n_eff)
     line_hz = settings.sample_rate_hz / averages.segment_samples
     bandwidth_lines = averages.segment_samples * averages.window_energy / averages.window_sum**2
     return FrequencyResponse(
@@ -357,14 +330,6 @@ def frequency_response_of(
         drive_slope_per_hz=_slope(products, value, settings) / line_hz,
         reference_coherence=reference_coherence,
     )
-
-
-def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexes:
-    if settings.estimator is Estimator.DRIVE:
-        # The reference is an instrumental variable: noise on x and y averages out.
-        return _ratio(products[_REFERENCE, _RESPONSE], products[_REFERENCE, _DRIVE])
-    s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
-    return least_squares(settings.estimator, s_xx, s_yy, products[_DRIVE, _RESPONSE], settings.noise_ratio)
 
 
 def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:

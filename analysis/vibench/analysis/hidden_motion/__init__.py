@@ -4,7 +4,7 @@ Two methods run side by side: one without a contact model, and an extended Kalma
 gaps, m1, c1 and the contact law. Every result has an uncertainty, or the reason why the data do not
 determine it. Equations and figures: docs/hidden-motion.md.
 
-In this example a sine of 5 um makes the paper's specimen collide, and m0's velocity has a little noise:
+In this example, a sine of 5 um makes the paper's specimen collide, and m0's velocity has a little noise:
 
 >>> import numpy as np
 >>> from vibench.analysis.hidden_motion import Numbers, hidden_motion_in_samples

@@ -5,9 +5,6 @@ from ._contact_free import (
     FreeMotion as FreeMotion,
     measured_gaps as measured_gaps,
 )
-from ._forecast import (
-    Forecast as Forecast,
-)
 from ._found_parameters import (
     FoundParameter as FoundParameter,
     FoundSpecimen as FoundSpecimen,
@@ -31,6 +28,7 @@ from ._live_twin import (
     FALSE_ALARM_S as FALSE_ALARM_S,
     Baseline as Baseline,
     ChangeWatch as ChangeWatch,
+    Forecast as Forecast,
     KnownNumber as KnownNumber,
     Level as Level,
     LiveMotion as LiveMotion,
@@ -40,12 +38,6 @@ from ._live_twin import (
     keep_baseline as keep_baseline,
     kept_baseline as kept_baseline,
 )
-from ._parameters import (
-    Hidden as Hidden,
-    Numbers as Numbers,
-    value_of as value_of,
-    with_values as with_values,
-)
 from ._prepared_motion import (
     ChannelNoise as ChannelNoise,
 )
@@ -53,6 +45,10 @@ from ._tracking import (
     TrackGap as TrackGap,
 )
 from ._tracking_model import (
+    Hidden as Hidden,
+    Numbers as Numbers,
     TrackedSpecimen as TrackedSpecimen,
     tracked_specimen as tracked_specimen,
+    value_of as value_of,
+    with_values as with_values,
 )

@@ -12,23 +12,21 @@ from ..errors import NotEnoughData
 from ..signals.arrays import Flags, Reals, Samples, runs_of
 from ..tables import Tabular
 from ._filtering import MotionModel, motion_model, run_filter
-from ._latent_force import LatentMotion, latent_motion, latent_start
-from ._parameters import PRIOR_SD, SEARCHES, Hidden, value_of, with_values
 from ._prepared_motion import PreparedMotion
-from ._tracking import TrackedPiece
-from ._tracking_model import TrackedSpecimen
+from ._tracking import LatentMotion, TrackedPiece, latent_motion, latent_start
+from ._tracking_model import PRIOR_SD, SEARCHES, Hidden, TrackedSpecimen, value_of, with_values
 
 _BLOCK_S, _OVERLAP_S = 0.12, 0.02
 _MISFIT = 3.0
 """Largest mean squared normalised innovation of a valid block."""
 FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
 _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
-"""Values of `closed_share` in successive fits; the first values tolerate an m1 that is 5 % wrong."""
+"""Values of `closed_share` in successive fits; the first values tolerate an error of 5 % in m1."""
 _FIT_STRETCH_S = 0.12
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
 _LEAST_OF_MEDIAN = 0.07
-"""Smallest accepted impulse relative to the median; smaller ones may be residuals of neighbouring impacts."""
+"""Smallest accepted impulse relative to the median; smaller impulses may be residuals of other impacts."""
 _LEAST_P_OF_MEDIAN = 0.9
 """Smallest |p| of an impact relative to the median; at smaller |p|, a force cannot come from a stop."""
 _DEPTH_POWER = 0.8
@@ -45,7 +43,7 @@ _WORST_SCATTER_OF_GAP = 0.1
 
 @dataclass(frozen=True, eq=False)
 class FreeImpacts(Tabular):
-    """Impacts found in the estimated contact force; every array has one value per impact."""
+    """Impacts found in the estimated contact force; each array contains one value per impact."""
 
     OWN_UNITS: ClassVar = {
         "impulses": "N s",
@@ -102,12 +100,12 @@ def free_motion(
         on_sample(end)
     rows = np.concatenate(found) if found else np.empty((0, 7))
     impacts = FreeImpacts(*rows[_at_stops(rows)].T)
-    line = _gap_line(impacts)
+    _, residuals = _gap_line(impacts)
     for _, begin, stop in _blocks(motion):
         end = min(stop, begin + round(_BLOCK_S * motion.sample_rate_hz))
-        here = (impacts.samples >= begin) & (impacts.samples < end) & ~np.isnan(line.residuals)
+        here = (impacts.samples >= begin) & (impacts.samples < end) & ~np.isnan(residuals)
         # During an impact p lies at a stop, so the scatter of p there shows the error of the whole block.
-        scatter = float(np.sqrt(np.mean(line.residuals[here] ** 2))) if here.any() else 0.0
+        scatter = float(np.sqrt(np.mean(residuals[here] ** 2))) if here.any() else 0.0
         sd[begin:end] = np.hypot(sd[begin:end], scatter)
         if scatter > _WORST_SCATTER_OF_GAP * min(model.gaps_m):
             p[begin:end] = np.nan
@@ -141,7 +139,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     """Return one impact for every window with an impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
-    # The force is held over the step before a sample, so the centre of the force is half a sample earlier.
+    # The force is constant over the step before a sample, so the force's centre is half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in runs_of(latent.is_open).tolist():
         if begin < 2 or end > force.size - 2 or latent.is_dropout[begin:end].any():
@@ -193,29 +191,20 @@ class FreeGap:
     impacts: int
 
 
-@dataclass(frozen=True, eq=False)
-class _GapLine:
-    """Straight line fitted to |p| at the centre of contacts against impulse^0.8."""
-
-    gaps: tuple[FreeGap | None, FreeGap | None]
-    residuals: Reals
-    """Residual of every impact [m], NaN on a side with too few impacts."""
-
-
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
     """Return both gaps from |p| at the centre of contacts against the impulse; None if undetermined.
 
     Harder impacts indent a stop more: |p| against J^0.8 is a straight line that starts at the gap. The fit is
     robust and has one slope for both sides.
     """
-    return _gap_line(impacts).gaps
+    return _gap_line(impacts)[0]
 
 
 def free_loss(impacts: FreeImpacts) -> float | None:
     """Return the loss of the stops [s/m] from speeds before and after impacts; None for too few impacts.
 
     For a small loss of Hunt and Crossley's law, speed after / speed before = 1 - 2/3 loss * speed before. The
-    result is only a start value, since both extrapolated speeds are a few per cent low.
+    result is only a start value, since both extrapolated speeds are a few per cent too low.
     """
     before, after = impacts.rate_before, impacts.rate_after
     good = (before > np.median(before)) & (after > 0.0) if before.size else before > 0.0
@@ -225,26 +214,28 @@ def free_loss(impacts: FreeImpacts) -> float | None:
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
-    """Return the gap from each impact: |p| minus the depth for this impulse [m], shape (impacts,).
+    """Return the gap from each impact: |p| minus the depth for the impact's impulse [m], shape (impacts,).
 
     NaN on a side with too few impacts.
     """
-    line = _gap_line(impacts)
-    lower, upper = (np.nan if each is None else each.value_m for each in line.gaps)
-    return np.asarray(np.where(impacts.sides < 0, lower, upper) + line.residuals)
+    gaps, residuals = _gap_line(impacts)
+    lower, upper = (np.nan if each is None else each.value_m for each in gaps)
+    return np.asarray(np.where(impacts.sides < 0, lower, upper) + residuals)
 
 
-def _gap_line(impacts: FreeImpacts) -> _GapLine:
+def _gap_line(impacts: FreeImpacts) -> tuple[tuple[FreeGap | None, FreeGap | None], Reals]:
+    """Return both gaps, and the residual of every impact [m], NaN on a side with too few impacts."""
     sides = [impacts.sides < 0, impacts.sides > 0]
     usable_sides = [each for each in sides if each.sum() >= FEWEST_IMPACTS]
     residuals = np.full(impacts.samples.size, np.nan)
     if not usable_sides:
-        return _GapLine((None, None), residuals)
+        return (None, None), residuals
     used = np.logical_or.reduce(usable_sides)
     depth = impacts.impulses**_DEPTH_POWER
     if np.subtract(*np.quantile(depth[used], [0.95, 0.05])) < _LEAST_SPREAD * depth[used].mean():
-        residuals[used] = _apart_by_side(np.abs(impacts.p), usable_sides)[used]
-        return _GapLine((None, None), residuals)
+        for each in usable_sides:
+            residuals[each] = np.abs(impacts.p[each]) - np.median(np.abs(impacts.p[each]))
+        return (None, None), residuals
     matrix = np.column_stack([*(each.astype(float) for each in usable_sides), depth / depth.mean()])[used]
     target = np.abs(impacts.p[used])
     solution, covariance = _robust_line(matrix, target)
@@ -261,19 +252,11 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
         else None
         for each in sides
     ]
-    return _GapLine((gaps[0], gaps[1]), residuals)
-
-
-def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Return the deviation of each value from the median on the same side; NaN for values without a side."""
-    apart = np.full(values.size, np.nan)
-    for each in sides:
-        apart[each] = values[each] - np.median(values[each])
-    return apart
+    return (gaps[0], gaps[1]), residuals
 
 
 def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:
-    """Fit a linear model with Huber's weights; return the solution and its covariance."""
+    """Fit a linear model with Huber's weights; return the parameters and their covariance."""
     weight = np.ones(target.size)
     for _ in range(_HUBER_ROUNDS):
         solution, *_ = np.linalg.lstsq(matrix * weight[:, None], target * weight)
@@ -362,7 +345,7 @@ class Collisions(Tabular):
 
 
 def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiece) -> Collisions:
-    """Return the contacts that start in a piece, simulated from the smoothed flight before each contact."""
+    """Return the contacts that start in a piece; each is simulated from the smoothed flight before it."""
     smoothed, tables = piece.smoothed, model.tables
     samples = smoothed.states.shape[0]
     rows = np.empty((samples + 1, _COLUMNS))

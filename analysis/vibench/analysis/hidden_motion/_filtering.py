@@ -20,13 +20,13 @@ _DIFFUSION_OF_SPEED = 2e-5
 _DRIFT_M_PER_S2 = 1e-3
 """Random walk of the accelerometer's slow error [m/s2] per root second."""
 _ACCELERATION_EXCESS = 1.5
-"""Variance of an acceleration interpolated linearly between samples, relative to that of a sample."""
+"""Variance of an acceleration interpolated linearly between samples, relative to a sample's."""
 _IMPULSE_SHARE = 0.003
 """Relative model error of a collision's impulse."""
 _SMOOTHING_S = 8e-3
 """Averaging time of squared innovations to detect the loss of a track [s]."""
 LOSS_LIMIT = 8.0
-"""Mean squared normalised innovation above which a track counts as lost; a good track has about 1."""
+"""Mean squared normalised innovation above which a track counts as lost; about 1 for a good track."""
 _NOTHING = np.empty(0)
 _FLIGHT = 0.0
 """Value of `FilterPredictions.kinds` for a step without contact."""
@@ -177,7 +177,7 @@ def move_filter(
 ) -> int:
     """Advance ``at`` by up to ``count`` samples; return the number of samples until the track was lost.
 
-    In each table after the first, one parameter is changed by its deviation.
+    Each table after the first has one parameter changed by its deviation.
     """
     engine, first = native_engine(), tables[0]
     work = engine.new(

@@ -1,9 +1,10 @@
 """Parameters of a specimen from a colliding motion, with bounds.
 
-If the motion can be tracked with the described parameters, these are only refined. Otherwise start values are
+If the motion can be tracked with the described parameters, they are only refined. Otherwise start values are
 found without a contact model: flights give m1, springs and dampers; impacts give gaps. Tracking refines all.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import hypot, isfinite
@@ -13,13 +14,259 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..signals.arrays import Reals
-from ..tables import Tabular, plus_minus, unit_of
-from ._estimation import Estimate, estimate, search_start, searched_parameters
-from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
-from ._parameters import NEAR, PRIOR_SD, SEARCHES, Hidden, scale_of, value_of, with_values
+from ..tables import Tabular, unit_of, with_unit
+from ._contact_free import (
+    FEWEST_IMPACTS,
+    FITTED,
+    FreeGap,
+    FreeImpacts,
+    free_gaps,
+    free_loss,
+    free_motion,
+    free_numbers,
+)
+from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, move_filter, run_filter
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
-from ._tracking_model import TrackedSpecimen
+from ._tracking_model import (
+    NEAR,
+    PRIOR_SD,
+    SEARCHES,
+    STATES,
+    Hidden,
+    StepTables,
+    TrackedSpecimen,
+    indentation_m,
+    scale_of,
+    step_tables,
+    value_of,
+    with_values,
+)
+
+_WANDER = 0.02
+"""Random walk of parameters per block, relative to their prior sd; prevents overconfidence of the filter."""
+REBUILT_S = 0.05
+"""Interval at which the filter's tables are updated to the current parameters [s]."""
+_LOST = (
+    f"during the search for parameters, each track was lost within {REBUILT_S:g} s, so parameters that are "
+    "not searched for (m0, m2, k1, kind of contact) may be described wrongly"
+)
+_SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
+"""Pairs: a length of tracked motion [s], and the factor on the velocity variance up to this length."""
+_LEAST_OF_START = 0.05
+"""Lower limit of a parameter relative to its start value; only the loss may be negative."""
+_FURTHEST = 8.0
+"""Deviation of a parameter from its start value [prior standard deviations] at which the search stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters estimated from part of a motion."""
+
+    tracked: TrackedSpecimen
+    wanted: tuple[Hidden, ...]
+    start_values: Reals
+    """Start values of the parameter search, shape (parameters,), SI."""
+    prior_sd: Reals
+    """Prior standard deviations of the parameters, shape (parameters,)."""
+    moved: Reals
+    """Deviations from the start values in prior standard deviations, shape (parameters,)."""
+    covariance: Reals
+    """Covariance of the parameters in units of the prior, shape (parameters, parameters)."""
+    wandered: float
+    """Variance that the random walk added to each parameter, in units of the prior."""
+    followed_s: float
+    innovation_level: float
+    """Mean squared normalised innovation at the end of the motion, with the true noise; 1 for a good fit."""
+
+
+class _Search:
+    """Search for parameters.
+
+    ``relative_sd`` has the prior standard deviation of each wanted parameter relative to ``start``.
+    """
+
+    def __init__(
+        self, start: TrackedSpecimen, motion: PreparedMotion, relative_sd: Mapping[Hidden, float]
+    ) -> None:
+        self._described, self._motion, self._wanted = start, motion, tuple(relative_sd)
+        wanted = self._wanted
+        self._nominal = np.array([value_of(start, each) for each in wanted])
+        scale = np.array([scale_of(start, each) for each in wanted])
+        self._prior_sd = np.array(list(relative_sd.values())) * scale
+        self._deviation = np.array([SEARCHES[each].step for each in wanted]) * scale
+        self._least = np.where(np.array(wanted) == Hidden.LOSS, -np.inf, _LEAST_OF_START * self._nominal)
+        # Forces and gaps differ by six powers of ten, so the covariance is in units of the prior.
+        self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
+        self._followed, self._level = 0, math.nan
+
+    def track(self, first: int, stop: int) -> Estimate | str:
+        """Estimate parameters from the motion between two samples; restart after every loss of the track.
+
+        On failure, return the reason as a sentence.
+        """
+        rate = self._motion.sample_rate_hz
+        block = round(REBUILT_S * rate)
+        at: FilterState | None = None
+        looked, why = first, ""
+        while looked + block < stop:
+            model = motion_model(self._current(), self._motion)
+            if at is None:
+                inflated = replace(model, velocity_variance=self._inflation() * model.velocity_variance)
+                begun = acquire(inflated, self._motion, looked)
+                match begun:
+                    case str():
+                        # Report the first failure: the last failure only means that the record ended.
+                        why, looked = why or begun, looked + block
+                        continue
+                    case FilterState():
+                        at = self._with_parameters(begun)
+            before = at.sample
+            is_kept = self._block(model, at, min(block, stop - 1 - at.sample))
+            if is_kept:
+                self._values = np.maximum(self._values + at.state[STATES:] * self._prior_sd, self._least)
+                self._covariance = at.covariance[STATES:, STATES:].copy()
+                self._followed += at.sample - before
+                at.state[STATES:] = 0.0
+                looked = at.sample
+                if np.any(np.abs(self._values - self._nominal) > _FURTHEST * self._prior_sd):
+                    return self._ran_away()
+            else:
+                self._covariance = np.diag(np.minimum(4.0 * np.diag(self._covariance), 1.0))
+                looked, at = at.sample, None
+                why = why or _LOST
+        if not self._followed:
+            return why or "the motion was too short to begin a track"
+        return Estimate(
+            self._current(),
+            self._wanted,
+            self._nominal,
+            self._prior_sd,
+            (self._values - self._nominal) / self._prior_sd,
+            self._covariance,
+            _WANDER**2 * self._followed / block,
+            self._followed / rate,
+            self._level,
+        )
+
+    def _current(self) -> TrackedSpecimen:
+        return with_values(self._described, dict(zip(self._wanted, map(float, self._values), strict=True)))
+
+    def _inflation(self) -> float:
+        followed_s = self._followed / self._motion.sample_rate_hz
+        return next(factor for until_s, factor in _SCHEDULE if followed_s < until_s)
+
+    def _with_parameters(self, begun: FilterState) -> FilterState:
+        size = STATES + len(self._wanted)
+        covariance = np.zeros((size, size))
+        covariance[:STATES, :STATES] = begun.covariance
+        covariance[STATES:, STATES:] = self._covariance
+        return FilterState(
+            begun.sample, np.concatenate([begun.state, np.zeros(len(self._wanted))]), covariance
+        )
+
+    def _variants(self) -> list[StepTables]:
+        current = self._current()
+        raised = [
+            with_values(current, {each: float(self._values[n] + self._deviation[n])})
+            for n, each in enumerate(self._wanted)
+        ]
+        rate, coupling = self._motion.sample_rate_hz, self._motion.coupling_rad_per_s
+        return [step_tables(each, rate, coupling) for each in (current, *raised)]
+
+    def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
+        """Filter the next ``count`` samples; return False if the track was lost."""
+        size = STATES + len(self._wanted)
+        noise = np.zeros((size, size))
+        noise[:STATES, :STATES] = model.step_noise
+        at.covariance[STATES:, STATES:] += _WANDER**2 * np.eye(len(self._wanted))
+        inflation = self._inflation()
+        at.innovation_level = 1.0
+        done = move_filter(
+            self._variants(),
+            self._motion,
+            at,
+            count,
+            noise=noise,
+            velocity_variance=inflation * model.velocity_variance,
+            loss_limit=LOSS_LIMIT,
+            deviations=self._deviation / self._prior_sd,
+        )
+        self._level = at.innovation_level if inflation == 1.0 else self._level
+        return bool(done == count)
+
+    def _ran_away(self) -> str:
+        worst = int(np.argmax(np.abs(self._values - self._nominal) / self._prior_sd))
+        what = self._wanted[worst].value
+        return (
+            f"the search for {what} ended at {self._values[worst]:.3g}, far from the described "
+            f"{self._nominal[worst]:.3g}, so other parameters of the specimen do not fit this recording"
+        )
+
+
+# Start values without a contact model, if the motion cannot be tracked with the description. Flights give m1,
+# springs and dampers; positions at impacts give the gaps; speeds at impacts give the loss.
+
+_TELLING_LOSS = 0.15
+"""Smallest loss [s/m] that speeds at impacts determine more accurately than the description does."""
+_LAW_UNKNOWN = 0.3
+"""Relative error of a penetration depth computed with the described contact law."""
+_FREE_S = 3.0
+
+
+def search_start(
+    described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
+) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
+    """Return start values found without a contact model, and their prior, or else the reason."""
+    rate = motion.sample_rate_hz
+    fitted, sds = free_numbers(described, motion, firsts)
+    count = min(round(_FREE_S * rate), motion.samples)
+    first = (motion.samples - count) // 2
+    free = free_motion(motion_model(fitted, motion), motion.part(first, first + count))
+    gaps = free_gaps(free.impacts)
+    if not any(gaps):
+        gaps = _gaps_by_law(fitted, free.impacts)
+    if not any(gaps):
+        count = free.impacts.samples.size
+        seen = f"the {count} impacts found do not determine a gap" if count else "no impacts were found"
+        return fitted, (
+            f"{seen} without a contact model, so m1 hardly reached its stops, or stayed at one stop, or "
+            "the linear parameters of the specimen are wrong; fit these parameters to weak noise first"
+        )
+    sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
+    known: dict[Hidden, FreeGap] = {
+        side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
+    }
+    start = with_values(fitted, {side: gap.value_m for side, gap in known.items()})
+    loss = free_loss(free.impacts)
+    if loss is not None and loss > _TELLING_LOSS:
+        start = with_values(start, {Hidden.LOSS: loss})
+    near = {**NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
+    near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
+    near |= {
+        each: max(SEARCHES[each].least_sd, 3.0 * float(sd)) for each, sd in zip(FITTED, sds, strict=True)
+    }
+    return start, searched_parameters(described, near)
+
+
+def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
+    """Return ``near`` without the gap on a side for which no stop is described."""
+    return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
+
+
+def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
+    """Return the gaps from impacts of similar strength: |p| minus the depth that the described law gives."""
+
+    def gap(side: float) -> FreeGap | None:
+        here = impacts.sides == side
+        if int(here.sum()) < FEWEST_IMPACTS:
+            return None
+        depth_m = indentation_m(described, float(np.median(impacts.rate_before[here])))
+        value_m = float(np.median(np.abs(impacts.p[here]))) - depth_m
+        return FreeGap(value_m, _LAW_UNKNOWN * depth_m, int(here.sum()))
+
+    return gap(-1.0), gap(1.0)
+
 
 _STRETCH_S = 1.2
 """Length of the part of the motion in which each restart searches for parameters [s]."""
@@ -28,15 +275,15 @@ _FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
-"""The described parameters are only refined if a track's mean squared innovation is at most this."""
+"""If a track's mean squared innovation is at most this, the described parameters are only refined."""
 _GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
 """Shifts [standard deviations] of gaps found without a contact model, tried if tracking fails."""
 _LARGEST_SD = 0.5
-"""Largest standard deviation of a determined parameter, relative to that of the described value."""
+"""Largest standard deviation of a determined parameter, in standard deviations of the described value."""
 _WIDE = 3.0
-"""Standard deviation of the wide prior relative to that of the described value."""
+"""Standard deviation of the wide prior, in standard deviations of the described value."""
 _FAR = 3.0
-"""Largest standard deviation of a determined parameter, relative to that of the narrow prior."""
+"""Largest standard deviation of a determined parameter, in standard deviations of the narrow prior."""
 _SETTLED = 1.0
 """Largest change of a value if the narrow prior is removed, in standard deviations of this prior."""
 _ROUNDS = 3
@@ -58,7 +305,7 @@ _ONE_SIDED_SD = {
 """Systematic error [SI] if m1 strikes one stop only. On 15 random dwells, all gaps were 0.4 to 7 nm too
 small, for an unknown reason."""
 _STARTS_APART = 0.3
-"""Shift of start values in prior standard deviations, so that their influence shows as scatter."""
+"""Shift of start values in prior standard deviations; the influence of start values shows as scatter."""
 
 
 _SHOWN = {
@@ -75,12 +322,6 @@ _SHOWN = {
     Hidden.EXPONENT: ("contact exponent", 1.0, ""),
     Hidden.LOSS: ("contact loss", 1.0, "s/m"),
 }
-
-
-def with_unit(value: float, half: float, unit: str) -> str:
-    """Return a value with the half width of its bounds as text."""
-    shown = plus_minus(value, half)
-    return f"({shown}) {unit}".strip() if unit and "±" in shown else f"{shown} {unit}".strip()
 
 
 @dataclass(frozen=True)
@@ -145,15 +386,15 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     start, near = search_start(described, motion, [first for first, _ in stretches])
     if isinstance(near, str):
         return _undetermined(described, near, searched=True)
-    first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
+    first_look = _Search(start, motion, near).track(*stretches[len(stretches) // 2])
     if isinstance(first_look, Estimate):
         start = first_look.tracked
     found = _refine(described, motion, start, near)
     for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
-        # Shift both gaps by the same number of standard deviations, because their errors are common.
+        # Shift both gaps by the same number of standard deviations, because both have the same error.
         gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
         moved = with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
-        looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
+        looks = (_Search(moved, motion, near).track(*each) for each in stretches[:2])
         held = next((each for each in looks if _is_held(each, motion)), None)
         again = found if held is None else _refine(described, motion, held.tracked, near)
         if isinstance(again, FoundSpecimen):
@@ -214,9 +455,9 @@ def _restarts(
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # If the shifted start values fail, try the unshifted values, then the result of the latest restart.
+        # If the shifted values fail, start from the unshifted values, then from the latest result.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
-            answer = estimate(begin, motion, near, first, stop)
+            answer = _Search(begin, motion, near).track(first, stop)
             if _is_held(answer, motion):
                 good.append(answer)
                 break
@@ -247,10 +488,10 @@ class _CombinedEstimate:
 
 
 def combine(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _CombinedEstimate:
-    """Return the mean of restarts and its half width; the larger of scatter and claimed uncertainty counts.
+    """Return the mean of restarts and its bounds, from the larger of scatter and claimed uncertainty.
 
     Restarts over the same samples are not independent: their scatter shows the influence of start values.
-    A scatter above the claimed uncertainty shows a wrong model, and is itself uncertain for few restarts.
+    A scatter above the claimed uncertainty shows a wrong model; for few restarts, it is itself uncertain.
     """
     wanted = found[0].wanted
     centre = np.array([value_of(described, each) for each in wanted])
@@ -286,8 +527,8 @@ def _without_prior(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, 
     pull = weak @ ((centre - found.start_values) / found.prior_sd)
     moved = freed @ (inverse @ found.moved + pull)
     variance = np.diag(freed)
-    # For a well determined parameter, the random walk overstates the variance; for a weakly determined
-    # parameter, the variance is right.
+    # Because of the random walk, the variance of a well determined parameter is too large; the variance of a
+    # weakly determined parameter is right.
     wandering = found.wandered / (found.wandered + np.diag(found.covariance))
     part = np.array([SEARCHES[each].claimed for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
@@ -342,5 +583,6 @@ def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
         if isinstance(begun, FilterState):
             left = min(count, motion.samples - 1 - begun.sample)
             run = run_filter(model, motion, begun, left, loss_limit=LOSS_LIMIT)
-            good += run.states.shape[0] == left and float(np.nanmean(run.nis)) < _FITTING_LEVEL
+            known = run.nis[~np.isnan(run.nis)]
+            good += run.states.shape[0] == left and float(np.sum(known)) < _FITTING_LEVEL * known.size
     return 2 * good > len(firsts)

@@ -1,6 +1,6 @@
 """Motion of m1 against m2 (hidden motion) in one recording, by tracking and without a contact model."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import ClassVar
 
@@ -13,14 +13,14 @@ from vibench.sim import Specimen
 from vibench.sim.background import Observer, ignore_progress, stage
 
 from ..errors import InvalidRequest, UnusableData
-from ..recordings.channels import BASE, RESPONSE
-from ..recordings.facts import require_checked, specimen_of
-from ..recordings.response import ResponseChannel, response_roles
+from ..recordings.channels import BASE, RESPONSE, ResponseChannel, response_roles
+from ..recordings.facts import require_checked, require_usable, specimen_of
 from ..signals.arrays import Reals, Samples
-from ..tables import Tabular, plain
+from ..tables import Tabular, columns, plain, with_unit
 from ._contact_free import (
     Collisions,
     FreeGap,
+    FreeImpacts,
     FreeMotion,
     collisions_of,
     free_gaps,
@@ -28,12 +28,18 @@ from ._contact_free import (
     join_collisions,
 )
 from ._filtering import MotionModel, motion_model
-from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit, without_values
-from ._parameters import Hidden, Numbers
-from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion, white_noise
-from ._sensor_correction import HALF_LENGTH, sensor_correction
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, without_values
+from ._prepared_motion import (
+    HALF_LENGTH,
+    ChannelNoise,
+    PreparedMotion,
+    motion_in_samples,
+    prepared_motion,
+    sensor_correction,
+    white_noise,
+)
 from ._tracking import TrackedPiece, TrackGap, follow
-from ._tracking_model import VY, VZ, TrackedSpecimen, W, tracked_specimen
+from ._tracking_model import VY, VZ, Hidden, Numbers, TrackedSpecimen, W, tracked_specimen
 
 _RATES = {"m1": VY, "m2": VZ}
 _MOST_EXCESS = 1.25
@@ -41,7 +47,7 @@ _MOST_EXCESS = 1.25
 _ALLOWED = 0.02
 """Allowed relative deviation of a sensor from the track due to mounting, alignment and local modes."""
 _MOST_EXPECTED = 0.2
-"""Largest expected deviation with a verdict; impacts act as noise in an accelerometer on a colliding mass."""
+"""Largest expected deviation for a verdict; impacts act as noise in an accelerometer on a colliding mass."""
 _MOST_SCALE = 0.05
 """Largest deviation of measured / tracked velocity from 1; calibrations may err by a few per cent."""
 
@@ -72,7 +78,7 @@ class MassCheck:
         return (
             f"The measured {self.channel} {verdict} the track: "
             f"{100 * self.unexplained:.2g} % of its rms is not explained ({100 * self.expected:.2g} % is "
-            f"expected), and its amplitude is {self.scale:.3f} times that of the track."
+            f"expected), and its amplitude is {self.scale:.3f} times the amplitude of the track."
         )
 
 
@@ -94,7 +100,7 @@ class MeasuredMass:
         used = np.isfinite(measured) & (touched == 0)
         places = [_RATES[self.channel[:2]], W]
         tracked = piece.smoothed.states[used][:, places].sum(axis=1)
-        # Use the variance of the filter's predictions; the smoother's variance is smaller.
+        # Use the variance of the filter's predictions, not the smaller variance of the smoother.
         variance = piece.run.covariances[used][:, places][:, :, places].sum(axis=(1, 2))
         measured = measured[used]
         self._sums += (
@@ -106,7 +112,7 @@ class MeasuredMass:
         )
 
     def check(self, level: float) -> MassCheck | None:
-        """Return the comparison; None without samples. A ``level`` above 1 widens the track's variance."""
+        """Return the comparison, or None without samples. A ``level`` above 1 widens the track's variance."""
         count, measured, both, tracked, variance = self._sums.tolist()
         if not count or not measured or not tracked:
             return None
@@ -128,7 +134,7 @@ def measured_masses(recording: Recording, motion: PreparedMotion) -> Iterator[Me
             continue
         try:
             channel = ResponseChannel(recording, role)
-        except UnusableData:  # too short to integrate the acceleration
+        except UnusableData:  # the acceleration is too short to be integrated
             continue
         weights = sensor_correction(
             recording.bench, recording.channel(BASE), recording.channel(role), rate_hz
@@ -219,10 +225,10 @@ class HiddenMotion(Tabular):
     def to_dict(self) -> dict[str, object]:
         """Return the results as JSON, without the motion itself."""
         document = {
-            "share_followed": self.tracked.tracked_share,
-            "impacts": self.tracked.collisions.count,
-            "innovation_level": self.tracked.innovation_level,
-            "p_sd_m": self.tracked.median_sd_m,
+            **columns(
+                self.tracked,
+                "share_followed=tracked_share impacts=collisions.count innovation_level p_sd_m=median_sd_m",
+            ),
             "measured_masses": [{**asdict(each), "confirms": each.confirms} for each in self.mass_checks],
             "not_followed": [
                 {
@@ -234,9 +240,7 @@ class HiddenMotion(Tabular):
             ],
             "parameters": {
                 each.what.value: {
-                    "value": each.value if each.is_determined else None,
-                    "low": each.low if each.is_determined else None,
-                    "high": each.high if each.is_determined else None,
+                    **columns(each if each.is_determined else None, "value low high"),
                     "described": each.described,
                     "not_determined": each.not_determined or None,
                 }
@@ -295,6 +299,7 @@ def hidden_motion(
         When the stretch is too short.
     """
     require_checked(recording)
+    require_usable(recording, RESPONSE, BASE)
     described = tracked_specimen(specimen_of(recording.bench) if specimen is None else specimen)
     motion = prepared_motion(recording, *_stretch(recording, start_s, stop_s))
     name = recording.path.name.removesuffix(".part").removesuffix(".h5")
@@ -393,7 +398,7 @@ def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tupl
     last_s = end_s if stop_s is None else stop_s
     if not 0.0 <= start_s < last_s:
         raise InvalidRequest(
-            f"from {start_s:g} s to {last_s:g} s of {end_s:.3g} s was requested; give a start and a later end"
+            f"the part {start_s:g} to {last_s:g} s of {end_s:.3g} s is invalid; give a start and a later end"
         )
     return round(start_s * rate), min(round(last_s * rate), recording.samples)
 
@@ -434,14 +439,14 @@ def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> st
     """Return the reason why the parameters do not fit the specimen; empty if they fit."""
     for each in checks:
         if each.confirms is False:
-            return f"{each.channel} contradicts tracking with the found parameters"
+            return f"{each.channel} contradicts tracking with the identified parameters"
     is_tracked = ~np.isnan(tracked.p)
     held = float(np.mean(is_tracked[int(np.argmax(is_tracked)) :]))
     if held < _LEAST_HELD:
-        return f"tracking with the found parameters worked in only {100 * held:.3g} % of the motion"
+        return f"tracking with the identified parameters worked in only {100 * held:.3g} % of the motion"
     if not tracked.innovation_level <= _HIGHEST_LEVEL:
         return (
-            f"tracking with the found parameters leaves a residual of {tracked.innovation_level:.3g} "
+            f"tracking with the identified parameters leaves a residual of {tracked.innovation_level:.3g} "
             "times the noise"
         )
     return ""
@@ -495,7 +500,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     for parameter in motion.parameters:
         label, value, described = parameter.row
         if parameter.is_determined:
-            # Symbols such as m1 stay in lower case.
+            # Write the first letter in upper case, except in symbols such as m1.
             begun = label if label[-1].isdigit() else f"{label[0].upper()}{label[1:]}"
             yield f"{begun}: {value} (described as {described})."
         else:
@@ -504,7 +509,15 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
 
 
 RESULT = "hidden_motion"
-_TIME, _IMPACT, _FREE = "time", "impact_time", "free_impact_time"
+_SIDE_AND_IMPULSE = {"side": ("sides", "1"), "impulse": ("impulses", "N s")}
+_FREE = {**_SIDE_AND_IMPULSE, "p": ("p", "m")}
+_TRACKED = {
+    **_SIDE_AND_IMPULSE,
+    "penetration": ("penetrations_m", "m"),
+    "duration": ("durations_s", "s"),
+    "speed_before": ("speeds_before", "m s-1"),
+    "speed_after": ("speeds_after", "m s-1"),
+}
 
 
 def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
@@ -514,43 +527,39 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
 
     Raises RecordingError when the recording is unfinished or cannot be written.
     """
-    arrays = {**_channels(motion), **_tracked_impacts(motion), **_free_impacts(motion)}
+    tracked, free = motion.tracked, motion.free
+    single = {
+        "p": (tracked.p, "m"),
+        "p_sd": (tracked.p_sd, "m"),
+        "p_rate": (tracked.rate, "m s-1"),
+        "p_without_contact_model": (free.p, "m"),
+        "p_without_contact_model_sd": (free.p_sd, "m"),
+    }
+    arrays = {
+        "time": ResultArray(motion.time_s, "s"),
+        **{
+            name: ResultArray(values.astype(np.float32, copy=False), unit, ("time",))
+            for name, (values, unit) in single.items()
+        },
+        **_impacts(motion, "impact", tracked.collisions, _TRACKED),
+        **_impacts(motion, "free_impact", free.impacts, _FREE),
+    }
     settings = {"told": motion.to_dict(), "sentences": list(motion.sentences)}
     return recording.save_results(RESULT, arrays, settings, (BASE, RESPONSE))
 
 
-def _channels(motion: HiddenMotion) -> dict[str, ResultArray]:
-    def over_time(values: Samples, unit: str) -> ResultArray:
-        return ResultArray(values.astype(np.float32, copy=False), unit, (_TIME,))
-
+def _impacts(
+    motion: HiddenMotion,
+    name: str,
+    found: Collisions | FreeImpacts,
+    quantities: Mapping[str, tuple[str, str]],
+) -> dict[str, ResultArray]:
+    """Return the times of impacts, and their quantities, each with its attribute and its unit."""
+    axis = f"{name}_time"
     return {
-        _TIME: ResultArray(motion.time_s, "s"),
-        "p": over_time(motion.tracked.p, "m"),
-        "p_sd": over_time(motion.tracked.p_sd, "m"),
-        "p_rate": over_time(motion.tracked.rate, "m s-1"),
-        "p_without_contact_model": over_time(motion.free.p, "m"),
-        "p_without_contact_model_sd": over_time(motion.free.p_sd, "m"),
-    }
-
-
-def _tracked_impacts(motion: HiddenMotion) -> dict[str, ResultArray]:
-    found = motion.tracked.collisions
-    return {
-        _IMPACT: ResultArray((motion.first_sample + found.samples) / motion.sample_rate_hz, "s"),
-        "impact_side": ResultArray(found.sides, "1", (_IMPACT,)),
-        "impact_impulse": ResultArray(found.impulses, "N s", (_IMPACT,)),
-        "impact_penetration": ResultArray(found.penetrations_m, "m", (_IMPACT,)),
-        "impact_duration": ResultArray(found.durations_s, "s", (_IMPACT,)),
-        "impact_speed_before": ResultArray(found.speeds_before, "m s-1", (_IMPACT,)),
-        "impact_speed_after": ResultArray(found.speeds_after, "m s-1", (_IMPACT,)),
-    }
-
-
-def _free_impacts(motion: HiddenMotion) -> dict[str, ResultArray]:
-    found = motion.free.impacts
-    return {
-        _FREE: ResultArray((motion.first_sample + found.samples) / motion.sample_rate_hz, "s"),
-        "free_impact_side": ResultArray(found.sides, "1", (_FREE,)),
-        "free_impact_impulse": ResultArray(found.impulses, "N s", (_FREE,)),
-        "free_impact_p": ResultArray(found.p, "m", (_FREE,)),
+        axis: ResultArray((motion.first_sample + found.samples) / motion.sample_rate_hz, "s"),
+        **{
+            f"{name}_{ending}": ResultArray(getattr(found, attribute), unit, (axis,))
+            for ending, (attribute, unit) in quantities.items()
+        },
     }

@@ -12,7 +12,7 @@ from vibench.sim import UnknownSpecimenError, load_specimen
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals, Samples
 from ..tables import Tabular
-from ._parameters import Numbers
+from ._tracking_model import Numbers
 
 LONGEST_VIEW_S = 2.0
 """Longest part of a recording that is shown [s]; its motion is computed in about one second."""
@@ -47,7 +47,7 @@ class HiddenView(Tabular):
     free_p: Samples
     """Relative displacement without a contact model [m]."""
     stops_m: tuple[float, float]
-    """Positions of the lower and the upper stop."""
+    """Positions of the lower and the upper stop on the axis of p."""
     sentence: str
 
 
@@ -56,7 +56,7 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
 
     Raises AnalysisError as `hidden_motion` does.
     """
-    # Imported late: the window needs this module at its start, and this import loads scipy.stats.
+    # Import late: the window needs this module when it starts, and this import loads scipy.stats.
     from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415
 
     try:

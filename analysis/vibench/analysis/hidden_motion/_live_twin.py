@@ -7,6 +7,7 @@ functions return without waiting.
 
 import hashlib
 import math
+from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
@@ -27,21 +28,142 @@ from ..recordings.channels import BASE, RESPONSE
 from ..signals.arrays import Reals
 from ..tables import Tabular
 from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, run_filter
-from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
-from ._parameters import Hidden, with_values
-from ._prepared_motion import ChannelNoise, PreparedMotion, dropout_samples, require_channels, white_noise
-from ._sensor_correction import HALF_LENGTH, sensor_correction
+from ._prepared_motion import (
+    HALF_LENGTH,
+    ChannelNoise,
+    PreparedMotion,
+    dropout_samples,
+    require_channels,
+    sensor_correction,
+    white_noise,
+)
 from ._tracking import ACQUISITION_S, acquire, reliable_samples
-from ._tracking_model import STATES, tracked_specimen
+from ._tracking_model import (
+    STATES,
+    VX,
+    Hidden,
+    W,
+    X,
+    Y,
+    Z,
+    equations,
+    exact_flow,
+    tracked_specimen,
+    with_values,
+)
 
-# Detection of changes of the specimen: innovations of a track compared with a baseline, block by block.
+AHEAD_S = 0.04
+LEARNT_S = 0.15
+"""Length of motion to which the model of the base is fitted [s]."""
+_HARMONICS = 3
+_YIELDING = (X, VX, W)
+"""States that act on the base: the specimen pushes the table through k0 and c0."""
+_BIN_S = 1e-3
+_WITHIN = 0.68
+_FEWEST, _MOST = 5, 40
+"""Smallest and largest number of recent forecasts from which the forecast error is estimated."""
+_NOT_MEASURED = 1e30
+"""Variance assigned to a missing sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast(Tabular):
+    """Forecast of p, one value per sample."""
+
+    OWN_UNITS: ClassVar = {"p": "m", "error": "m"}
+
+    first: int
+    """Index of the first forecast sample, counted from the start of the recording."""
+    p: Reals
+    """Relative displacement p = y - z [m]."""
+    error: Reals
+    """Error that 68 % of recent forecasts did not exceed at this horizon [m]; NaN with too few forecasts."""
+
+
+class Forecaster:
+    """Forecasts of p, and their observed errors."""
+
+    def __init__(self, sample_rate_hz: float) -> None:
+        self._bin = max(1, round(_BIN_S * sample_rate_hz))
+        self._count = self._bin * round(AHEAD_S / _BIN_S)
+        self._errors: deque[Reals] = deque(maxlen=_MOST)
+        self._pending: deque[tuple[int, Reals]] = deque(maxlen=8)
+
+    def forecast(
+        self,
+        model: MotionModel,
+        motion: PreparedMotion,
+        at: FilterState,
+        states: Reals,
+        frequency_hz: float,
+    ) -> Forecast | None:
+        """Return the forecast of p after ``at``; ``states`` contains the states at the newest samples.
+
+        None if the filter cannot follow the forecast base motion to the end.
+        """
+        rate = motion.sample_rate_hz
+        numbers = motion.first_sample + at.sample - np.arange(states.shape[0] - 1, -1, -1)
+        turned = 2 * np.pi * frequency_hz / rate
+        matrix = np.column_stack([*_tones(turned * numbers), states[:, _YIELDING]])
+        scale = np.sqrt(np.mean(matrix**2, axis=0)) + np.finfo(float).tiny
+        stop = at.sample + 1
+        accelerations = motion.accelerations(stop - len(matrix), stop)
+        weights = np.linalg.lstsq(matrix / scale, accelerations, rcond=1e-9)[0] / scale
+        ahead = numbers[-1] + np.arange(self._count + 1)
+        tone = _tones(turned * ahead).T @ weights[: 2 * _HARMONICS]
+        yielding = _on_a_table(model, motion, weights[2 * _HARMONICS :])
+        coming = replace(motion, acceleration=tone, velocity=np.zeros(tone.size))
+        start = FilterState(0, at.state[:STATES].copy(), at.covariance[:STATES, :STATES].copy())
+        run = run_filter(yielding, coming, start, self._count)
+        if run.states.shape[0] < self._count:
+            return None
+        p = run.states[:, Y] - run.states[:, Z]
+        self._pending.append((int(numbers[-1]) + 1, p))
+        return Forecast(int(numbers[-1]) + 1, p, self._usual_error())
+
+    def _usual_error(self) -> Reals:
+        if len(self._errors) < _FEWEST:
+            return np.full(self._count, np.nan)
+        usual = np.quantile(np.array(self._errors), _WITHIN, axis=0)
+        return np.asarray(np.repeat(np.maximum.accumulate(usual), self._bin))
+
+    def compare(self, first: int, p: Reals) -> None:
+        """Compare forecasts with the tracked ``p`` from sample ``first`` on; ``p`` is NaN without a track."""
+        while self._pending and self._pending[0][0] + self._count <= first + p.size:
+            begin, forecast = self._pending.popleft()
+            if begin < first:
+                continue
+            error = (forecast - p[begin - first : begin - first + self._count]) ** 2
+            if not np.isnan(error).any():
+                self._errors.append(np.sqrt(error.reshape(-1, self._bin).mean(axis=1)))
+
+
+def _tones(turns: Reals) -> Reals:
+    """Return sine and cosine of the drive and its harmonics, shape (2 harmonics, samples)."""
+    return np.concatenate([(np.sin(n * turns), np.cos(n * turns)) for n in range(1, _HARMONICS + 1)])
+
+
+def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> MotionModel:
+    """Return the model with the fitted reaction of the specimen on the base."""
+    a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
+    a[:, _YIELDING] += np.outer(base, weights)
+    tables = model.tables
+    flow, small_flow = (exact_flow(a, base, tables.step_s / parts) for parts in (1, tables.small_steps))
+    return replace(
+        model,
+        tables=replace(tables, flow=flow, small_flow=small_flow),
+        velocity_variance=_NOT_MEASURED,
+    )
+
+
+# Changes of the specimen are detected by comparing the innovations of a track with a baseline.
 #
-# Each block of 0.1 s is within the usual level or outside it. Page's test (CUSUM, Biometrika 41, 100, 1954)
-# sums the log likelihood ratio of two hypotheses: half of the blocks are outside, or one in a hundred. If at
-# most one in a hundred is outside without a change, the mean time between false alarms is at least
-# exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). This time is set to `FALSE_ALARM_S`.
-# Five consecutive blocks outside raise an alarm.
+# Each block of 0.1 s is within the usual level or outside. Page's test (CUSUM, Biometrika 41, 100, 1954) sums
+# the log likelihood ratio of two hypotheses: half of all blocks are outside, or one block in a hundred is. If
+# at most one block in a hundred is outside without a change, the mean time between false alarms is at least
+# exp(threshold) blocks (Lorden, Ann. Math. Stat. 42, 1897, 1971). This time is set to `FALSE_ALARM_S`. Five
+# consecutive blocks outside also raise an alarm.
 
 BLOCK_S = 0.1
 FALSE_ALARM_S = 1000 * 3600.0
@@ -124,7 +246,7 @@ class ChangeWatch:
         self.has_changed = False
 
     def take(self, level: float) -> bool:
-        """Add a block's innovation level, infinite if not tracked; return whether to raise the alarm."""
+        """Add a block's innovation level, infinite for a lost track; return whether to raise the alarm."""
         if self.usual is None:
             if math.isfinite(level):
                 self._learnt.append(level)
@@ -142,7 +264,7 @@ class LiveState(StrEnum):
     """State of the live hidden motion."""
 
     WAITING = "waiting"
-    """There are too few samples or too little motion to start a track."""
+    """There are too few samples, or the motion is too small, to start a track."""
     TRACKED = "tracked"
     LOST = "lost"
     """The measured motion does not fit the parameters; no hidden motion is shown."""
@@ -205,8 +327,8 @@ class LiveTwin:
     ) -> None:
         """Start without samples.
 
-        Raises InvalidRequest when the specimen's stops cannot be tracked; UnusableData when the bench lacks
-        one of the two channels.
+        Raises InvalidRequest when the specimen's stops cannot be tracked; UnusableData when one of the two
+        channels is missing.
 
         Parameters
         ----------
@@ -234,7 +356,7 @@ class LiveTwin:
         self._executor = executor
         self._finding: Future[FoundSpecimen] | None = None
         self.found: tuple[FoundParameter, ...] = ()
-        """Latest parameters found in this run; empty if none were found yet."""
+        """Latest parameters found in this run; empty if no parameters were found yet."""
         self.watch = ChangeWatch()
         self._begin_anew(0)
 
@@ -285,7 +407,7 @@ class LiveTwin:
 
     @property
     def newest(self) -> LiveMotion:
-        """Return p of the kept motion and its forecast."""
+        """Return p of the stored motion, and the forecast of p."""
         limit = np.nan if self.watch.usual is None else self.watch.usual.limit
         return LiveMotion(
             self._state,
@@ -326,7 +448,7 @@ class LiveTwin:
         return tuple(sentences)
 
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
-        """Correct and store new samples; drop the oldest."""
+        """Correct and store new samples; drop the oldest samples."""
         self._raw = np.concatenate([self._raw, (acceleration, velocity)], axis=1)
         first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUT_DELAY_S * self._rate)
         if stop <= first:
@@ -373,7 +495,7 @@ class LiveTwin:
         first = motion.samples - 2 - window
         if first < self._looked:
             return
-        # The next attempt is a third of a window later, so the middle third, where a track starts, is new.
+        # A track starts in the window's middle third. Try again a third later, so that this third is new.
         self._looked = first + max(window // 3, self._pause)
         part = slice(max(0, motion.samples - round(_NOISE_S * self._rate)), None)
         if motion.samples < 2 * window:
@@ -422,15 +544,15 @@ class LiveTwin:
         if not is_out and squares.size < self._block // 4:
             return
         self._level = np.inf if is_out else float(squares.mean())
-        # Before any parameter is known, the misfit may come from a wrong description, not from a change.
+        # Before any parameter is known, a misfit may come from a wrong description instead of a change.
         if (self._known or self.found) and self.watch.take(self._level):
             time_s = self._block_end / self._rate
             sentences.append(
-                f"The specimen changed at {time_s:.1f} s: the measured motion no longer fits its "
+                f"The specimen changed at {time_s:.1f} s: the measured motion no longer fits the specimen's "
                 f"parameters (innovation {'lost' if is_out else f'{self._level:.3g}'}, usually "
                 f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
             )
-            # Drop a running search, because it uses samples from before the specimen changed.
+            # End a running search, because it uses samples from before the change.
             self._finding = None
             self._wait = round(_FIND_S * self._rate)
             self._find_at = self.next_sample + self._wait
@@ -455,7 +577,7 @@ class LiveTwin:
             return
         if Hidden.LOWER_GAP in parameters or Hidden.UPPER_GAP in parameters:
             self._find_at = np.iinfo(np.int64).max
-        # Dampers and contact law depend on the drive level, even if the specimen does not change.
+        # Even if the specimen does not change, its dampers and contact law depend on the drive level.
         compared = (
             parameters.values()
             if self.watch.has_changed
@@ -486,7 +608,7 @@ class LiveTwin:
 
     @property
     def numbers(self) -> dict[Hidden, KnownNumber]:
-        """Parameters used for tracking that were found from collisions."""
+        """Parameters that were found from collisions and are used for tracking."""
         return dict(self._known)
 
     def _make_forecast(self, frequency_hz: float | None) -> None:

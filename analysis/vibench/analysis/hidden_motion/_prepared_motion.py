@@ -1,17 +1,74 @@
-"""Motion of base and m0 corrected for their sensors, and the noise of both channels."""
+"""Motion of base and m0, corrected for their sensors by short filters, and the noise of both channels."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 
-from vibench.acquisition.recording import BridgedChannel, Dropout, Recording
+from vibench.acquisition.recording import BridgedChannel, Dropout, Recording, coupling_cut_hz
 
 from ..errors import NotEnoughData, UnusableData
-from ..recordings.channels import BASE, RESPONSE
-from ..signals.arrays import Flags, Reals, Samples
-from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
+from ..recordings.channels import BASE, RESPONSE, SensedChannel, sensor_gain
+from ..signals.arrays import Complexes, Flags, Reals, Samples
+
+HALF_LENGTH = 16
+"""Samples on each side that a corrected sample needs: a third of a millisecond at 51.2 kS/s."""
+_EXACT_BAND = 0.42
+"""Fraction of the sample rate up to which the correction is fitted; converters pass up to 0.45."""
+_FIT_POINTS = 400
+_REST_WEIGHT = 1e-3
+"""Weight of the fit above the correction's band; this weight only limits the gain above the band."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorCorrection:
+    """Filters for both channels, and the AC coupling for the tracker."""
+
+    acceleration: Reals
+    """Filter weights, shape (2 HALF_LENGTH + 1,); they also correct for linear interpolation."""
+    velocity: Reals
+    coupling_rad_per_s: float
+    """Corner of the accelerometer's AC coupling, which the tracker corrects; 0 for DC."""
+
+    def correct(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
+        """Return the motion of base and m0; values within HALF_LENGTH samples of an end are wrong."""
+        return (
+            np.convolve(acceleration, self.acceleration, "same"),
+            np.convolve(velocity, self.velocity, "same"),
+        )
+
+
+def sensor_correction(
+    bench: Mapping[str, Any], base: SensedChannel, response: SensedChannel, sample_rate_hz: float
+) -> SensorCorrection:
+    """Design the filters from a recording's sensors; undescribed sensors are assumed ideal."""
+
+    def base_gain(frequency_hz: Reals) -> Complexes:
+        interpolation = np.sinc(frequency_hz / sample_rate_hz) ** 2
+        return np.asarray(sensor_gain(bench, base, frequency_hz) * interpolation)
+
+    return SensorCorrection(
+        acceleration=_inverse(base_gain, sample_rate_hz),
+        velocity=_inverse(partial(sensor_gain, bench, response), sample_rate_hz),
+        coupling_rad_per_s=2.0 * np.pi * coupling_cut_hz(base.coupling),
+    )
+
+
+def _inverse(sensor: Callable[[Reals], Complexes | Reals], sample_rate_hz: float) -> Reals:
+    """Return weights whose response is the inverse of a sensor's, by least squares over the band."""
+    cycles = np.linspace(0.0, 0.5, _FIT_POINTS)
+    inside = cycles <= _EXACT_BAND
+    target = np.where(inside, 1.0 / sensor(cycles * sample_rate_hz), 0.0)
+    lags = np.arange(-HALF_LENGTH, HALF_LENGTH + 1)
+    matrix = np.exp(-2j * np.pi * cycles[:, np.newaxis] * lags)
+    weight = np.where(inside, 1.0, _REST_WEIGHT)[:, np.newaxis]
+    rows = np.concatenate([(matrix * weight).real, (matrix * weight).imag])
+    aims = target * weight[:, 0]
+    weights, *_ = np.linalg.lstsq(rows, np.concatenate([aims.real, aims.imag]))
+    return np.asarray(weights / weights.sum())
+
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
 """Bands, relative to the sample rate, that lie in the converter's pass band but above any motion."""
@@ -50,7 +107,7 @@ class PreparedMotion:
     """
 
     acceleration: Samples
-    """Acceleration of the base, shape (samples,) [m/s2]; the tracker corrects its AC coupling."""
+    """Acceleration of the base, shape (samples,) [m/s2]; the tracker corrects the sensor's AC coupling."""
     velocity: Samples
     """Velocity of m0, shape (samples,) [m/s]; bridged in drop-outs."""
     is_dropout: Flags
@@ -94,7 +151,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
     rate = recording.sample_rate_hz
     require_channels(recording.path.name, recording.roles)
     _require_rate(rate)
-    # The correction needs neighbours, so the first and last few samples of a recording are left out.
+    # The correction needs neighbouring samples, so leave out the first and last samples of the recording.
     start, stop = max(start, HALF_LENGTH), min(stop, recording.samples - HALF_LENGTH)
     _require_length(stop - start, rate)
     correction = sensor_correction(
@@ -116,7 +173,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
 
 
 def dropout_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
-    """Return flags of the corrected samples from ``start`` to before ``stop`` that drop-outs affect."""
+    """Return, for the samples from ``start`` to before ``stop``, flags of those that drop-outs affect."""
     is_dropout = np.zeros(stop - start, dtype=np.bool_)
     for each in dropouts:
         first, behind = each.first - _DARK_MARGIN - start, each.stop + _DARK_MARGIN - start
@@ -144,11 +201,15 @@ def _motion(
 
 
 def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: float) -> PreparedMotion:
-    """Return the motion of samples already corrected for their sensors; raises like `prepared_motion`."""
+    """Return the motion of samples already corrected for their sensors; raises as `prepared_motion` does."""
     _require_rate(sample_rate_hz)
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
     _require_finite(_lost_samples(acceleration, velocity))
-    correction = ideal_sensors(sample_rate_hz)
+    # Correct only for the linear interpolation between samples.
+    only = np.zeros(2 * HALF_LENGTH + 1)
+    only[HALF_LENGTH] = 1.0
+    interpolation = _inverse(lambda hz: np.sinc(hz / sample_rate_hz) ** 2, sample_rate_hz)
+    correction = SensorCorrection(interpolation, only, 0.0)
     corrected = np.array(correction.correct(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
     light = np.zeros(corrected.shape[1], dtype=np.bool_)
     return _motion(corrected, light, sample_rate_hz, correction, HALF_LENGTH)
@@ -157,8 +218,8 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
 def _require_rate(sample_rate_hz: float) -> None:
     if not sample_rate_hz >= LOWEST_RATE_HZ:
         raise UnusableData(
-            f"the motion was sampled at {sample_rate_hz:g} Hz, but impacts are visible only from "
-            f"{LOWEST_RATE_HZ:g} Hz on; measure at a higher rate to track the hidden motion"
+            f"the motion was sampled at {sample_rate_hz:g} Hz, but impacts are visible only at "
+            f"{LOWEST_RATE_HZ:g} Hz or more; measure at a higher rate to track the hidden motion"
         )
 
 
@@ -183,12 +244,12 @@ def _require_finite(lost: int) -> None:
 
 
 def require_channels(name: str, roles: Collection[str]) -> None:
-    """Raise UnusableData if a recording, or a bench, lacks a channel that hidden motion needs."""
+    """Raise UnusableData if a recording or bench does not have every channel that hidden motion needs."""
     missing = [role for role in (BASE, RESPONSE) if role not in roles]
     if missing:
         raise UnusableData(
             f"{name} has no channel {' and no channel '.join(missing)}; hidden motion needs {BASE} and "
-            f"{RESPONSE} with white noise: measure m0 with a vibrometer"
+            f"{RESPONSE} whose noise is white: measure m0 with a vibrometer"
         )
 
 

@@ -1,8 +1,3 @@
-from ._levels import (
-    OVER_SHARE as OVER_SHARE,
-    Level as Level,
-    LevelVerdict as LevelVerdict,
-)
 from ._outline import (
     THUMBNAIL_COLUMNS as THUMBNAIL_COLUMNS,
     OverviewLevel as OverviewLevel,
@@ -17,7 +12,12 @@ from ._outline import (
     thumbnail as thumbnail,
     zigzag as zigzag,
 )
-from ._portrait import (
+from ._ring import (
+    OVER_SHARE as OVER_SHARE,
+    Level as Level,
+    LevelVerdict as LevelVerdict,
+)
+from ._sine_response import (
     Portrait as Portrait,
 )
 from ._spectra import (

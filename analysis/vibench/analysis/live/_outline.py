@@ -59,7 +59,7 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     if count <= columns:
         return samples, samples
     starts = column_starts(count, columns)
-    # fmin and fmax ignore NaN and cost the same as minimum and maximum.
+    # fmin and fmax ignore NaN, and are as fast as minimum and maximum.
     return (
         np.asarray(np.fmin.reduceat(samples, starts, axis=-1)),
         np.asarray(np.fmax.reduceat(samples, starts, axis=-1)),
@@ -102,7 +102,7 @@ _MARGIN = 1.25
 _CLEAR = 0.25
 """Hysteresis for counting zero crossings, relative to the typical peak-to-peak value."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
-"""Number of parts of the signal in which periods are counted, and minimum columns of each part."""
+"""Number of parts of the signal in which periods are counted, and minimum number of columns per part."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
@@ -131,7 +131,7 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
-    """Return the number of columns over which each column takes its extremes; 1 for the column alone."""
+    """Return the number of columns over which each column takes its extremes; 1 means the column alone."""
     low, high = edges
     count = low.size
     blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))
@@ -197,7 +197,7 @@ _COARSER = 16
 _LEAST_BINS = 20_000
 """Number of bins up to which no coarser level is needed; reducing these bins to columns takes 0.1 ms."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Parts of a long recording in which periods are counted: number, and columns and maximum samples of each."""
+"""For counting periods in a long recording: parts, columns per part, and maximum samples per part."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
@@ -205,7 +205,7 @@ Counts = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Part of a recording for drawing: lower and upper edges of some channels."""
+    """Part of a recording or run for drawing: lower and upper edges of some channels."""
 
     time_s: Reals
     """Left edge of each column [s since the first sample], shape (columns,)."""
@@ -297,7 +297,7 @@ def has_overview(recording: Recording) -> bool:
 def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingOverview:
     """Return the overview from the file; compute it from all samples if the file contains none.
 
-    Growing, interrupted and older recordings contain none. Half a gigabyte of samples takes one to two
+    Growing, interrupted and older recordings contain no overview. Half a gigabyte of samples takes one to two
     seconds.
     """
     return RecordingOverview(recording, overview_levels(recording, on_read))

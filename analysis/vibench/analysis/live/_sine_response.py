@@ -1,4 +1,4 @@
-"""Live Responses I and II during a sine or a slow sweep."""
+"""Live Responses I and II, phase portrait and Poincaré points during a sine or a slow sweep."""
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -8,8 +8,10 @@ from scipy import fft
 
 from ..errors import NotEnoughData
 from ..signals.arrays import Complexes, Reals
+from ..signals.averaging import Window, taper
 from ..signals.quantity import Quantity, converted_signal
-from ..signals.window import Window, taper
+from ..tables import Tabular
+from ..tones import between_lines
 from ._outline import Samples
 from ._ring import RingWindow
 
@@ -18,7 +20,7 @@ _LEAST_SHARE = 0.5
 _NEIGHBOURS = 3
 """Number of neighbouring lines on each side; enough for a sine under a Hann window, even in a slow sweep."""
 _LEAST_LINE = 4
-"""Minimum number of periods to analyse; with fewer, the lines of the sine and of the offset merge."""
+"""Minimum number of periods to analyse; with fewer, the lines of sine and offset merge."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,7 @@ def _hann(samples: int) -> Reals:
 
 
 def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
-    """Return the sine in a short part of the drive, shape (samples,); None if it is not a sine.
-
-    The ratio of the two largest lines of a Hann spectrum gives the exact frequency between them
-    (Grandke 1983, IEEE Trans. Instrum. Meas. 32, 350-355).
-    """
+    """Return the sine in a short part of the drive, shape (samples,); None if the drive is not a sine."""
     if drive.size < 2 * _LEAST_LINE:
         return None
     values = _hann(drive.size)
@@ -52,14 +50,8 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
     around = size[max(0, line - _NEIGHBOURS) : line + _NEIGHBOURS + 1]
     if line < _LEAST_LINE or not float(np.sum(around**2)) > _LEAST_SHARE * power:
         return None
-    side = 1 if size[line + 1] >= size[line - 1] else -1
-    ratio = float(size[line + side] / size[line])
-    offset = (2 * ratio - 1) / (ratio + 1)
-    height = float(size[line]) / float(np.sinc(offset)) * (1 - offset**2)
-    return DriveTone(
-        frequency_hz=(line + side * offset) * sample_rate_hz / drive.size,
-        amplitude=2 * height / float(np.sum(values)),
-    )
+    place, height = between_lines(size, line)
+    return DriveTone(place * sample_rate_hz / drive.size, 2 * height / float(np.sum(values)))
 
 
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
@@ -144,7 +136,7 @@ def sine_point(
     Parameters
     ----------
     window
-        Samples in physical units; only as many of the newest as needed are used.
+        Samples in physical units; only as many of the newest samples as needed are used.
     rows
         Row numbers of drive, base acceleration and response.
     quantity
@@ -180,7 +172,7 @@ def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
 def _point(
     time_s: float, stretch: Reals, sample_rate_hz: float, near_hz: float, quantity: Quantity
 ) -> SinePoint | None:
-    """Return a point; all quantities are from the same samples, because they change together in a sweep."""
+    """Return a point; all quantities are from the same samples, because all change during a sweep."""
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz
@@ -221,3 +213,102 @@ def motion_of(
         return displacement, converted(wanted=Quantity.VELOCITY).settled
     edge = (response.size - displacement.size) // 2
     return displacement, response[edge : edge + displacement.size]
+
+
+SHOWN_PERIODS = 20
+_ORBIT_EDGE_PERIODS = 25
+"""Additional drive periods at each end of the orbit, needed for integration and drive phase."""
+POINTS_A_PERIOD = 120
+"""Points per period of the orbit; 2400 points in 20 periods are painted in about 1 ms."""
+MOST_POINTS = 3000
+"""Maximum number of Poincaré points; older points are dropped."""
+
+
+@dataclass(frozen=True, eq=False)
+class Portrait(Tabular):
+    """Orbit of the newest periods, with one Poincaré point per drive period."""
+
+    drive_hz: float
+    orbit_displacement_m: Reals
+    orbit_velocity_m_per_s: Reals
+    """Displacement and velocity of the orbit, shape (samples,)."""
+    strobe_displacement_m: Reals
+    strobe_velocity_m_per_s: Reals
+    """Poincaré points at the maxima of the drive, a cosine; shape (periods,)."""
+    strobe_sample: Reals
+    """Times of the Poincaré points, in samples since the start of the run."""
+
+
+def portrait(
+    window: RingWindow,
+    drive_row: int,
+    response_row: int,
+    sample_rate_hz: float,
+    quantity: Quantity = Quantity.VELOCITY,
+    *,
+    delay_s: float = 0.0,
+) -> Portrait | None:
+    """Return the phase portrait of the newest periods; None without a sine drive or with too few samples.
+
+    Parameters
+    ----------
+    window
+        Newest samples in physical units; `portrait_samples` of them are needed.
+    delay_s
+        Lag of the response channel behind the drive channel [s].
+    quantity
+        Quantity of the response channel.
+    """
+    look = look_samples(sample_rate_hz)
+    drive = np.asarray(window.values[drive_row], dtype=np.float64)
+    tone = drive_tone(drive[-look:], sample_rate_hz) if drive.size >= look else None
+    if tone is None or not np.isfinite(window.values[[drive_row, response_row]]).all():
+        return None
+    count = portrait_samples(tone.frequency_hz, sample_rate_hz)
+    if drive.size < count:
+        return None
+    response = np.asarray(window.values[response_row, -count:], dtype=np.float64)
+    displacement, velocity = motion_of(response, sample_rate_hz, tone.frequency_hz, quantity)
+    edge = (count - displacement.size) // 2
+    turns = drive_turns(drive[-count:], sample_rate_hz, tone.frequency_hz) + delay_s * sample_rate_hz
+    turns = turns[(turns >= edge) & (turns <= edge + displacement.size - 1)]
+    stride = max(1, int(sample_rate_hz / tone.frequency_hz / POINTS_A_PERIOD))
+    place = np.arange(displacement.size)
+    return Portrait(
+        drive_hz=tone.frequency_hz,
+        orbit_displacement_m=displacement[::stride],
+        orbit_velocity_m_per_s=velocity[::stride],
+        strobe_displacement_m=np.interp(turns - edge, place, displacement),
+        strobe_velocity_m_per_s=np.interp(turns - edge, place, velocity),
+        strobe_sample=turns + (window.stop_sample - count),
+    )
+
+
+def portrait_samples(frequency_hz: float, sample_rate_hz: float) -> int:
+    """Return the number of samples needed for a portrait."""
+    wanted = (SHOWN_PERIODS + 2 * _ORBIT_EDGE_PERIODS) * sample_rate_hz / frequency_hz
+    return fft.next_fast_len(int(np.ceil(wanted)), real=True)
+
+
+class PoincareSection:
+    """Poincaré points collected from overlapping portraits; each point is collected once."""
+
+    def __init__(self, most: int = MOST_POINTS) -> None:
+        self._most = most
+        self.displacement_m: Reals = np.empty(0)
+        """Displacement of the Poincaré points, shape (points,)."""
+        self.velocity_m_per_s: Reals = np.empty(0)
+        """Velocity of the Poincaré points, shape (points,)."""
+        self._newest = -np.inf
+
+    def add(self, found: Portrait) -> None:
+        """Add points that are at least half a period later than the newest collected point."""
+        if found.strobe_sample.size == 0:
+            return
+        spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0
+        fresh = found.strobe_sample > self._newest + 0.5 * spacing
+        displacement_m = np.append(self.displacement_m, found.strobe_displacement_m[fresh])
+        velocity_m_per_s = np.append(self.velocity_m_per_s, found.strobe_velocity_m_per_s[fresh])
+        self.displacement_m = displacement_m[-self._most :]
+        self.velocity_m_per_s = velocity_m_per_s[-self._most :]
+        self._newest = max(self._newest, float(found.strobe_sample[-1]))

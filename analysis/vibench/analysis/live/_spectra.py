@@ -19,10 +19,9 @@ from ..frequency_response.results import (
 )
 from ..frequency_response.transmissibility import frequency_response_of
 from ..signals.arrays import Flags, Reals
-from ..signals.confidence import DEFAULT_CONFIDENCE
+from ..signals.averaging import DEFAULT_CONFIDENCE, Window, effective_averages, hop_samples, taper
 from ..signals.quantity import Quantity
-from ..signals.window import Window, effective_averages, hop_samples, taper
-from ..spectra.spectra import SpectralAverages, Spectrogram, SpectrogramSums
+from ..spectra import SpectralAverages, Spectrogram, SpectrogramSums
 from ..tables import Tabular
 from ._ring import Values
 
@@ -43,7 +42,7 @@ class LiveSpectrum(Tabular):
 
 
 class LiveSpectra:
-    """Welch average of the newest segments; each segment is transformed once.
+    """Welch average of the newest segments; each segment is Fourier-transformed once.
 
     Segments with lost samples are skipped. By default, spectral lines are 6.25 Hz apart at 51.2 kS/s.
     """
@@ -58,7 +57,6 @@ class LiveSpectra:
         self._short_taper = self._taper.astype(np.float32)
         shape = averages, channels, segment_samples // 2 + 1
         self._spectra: NDArray[np.complex64] = np.zeros(shape, dtype=np.complex64)
-        self._power: NDArray[np.float32] = np.zeros(shape, dtype=np.float32)
         self._is_used: Flags = np.zeros(averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
         self.segments = 0
@@ -68,7 +66,7 @@ class LiveSpectra:
         """Add the next samples, shape (channels, samples)."""
         data = np.concatenate((self._carry, values), axis=1)
         whole = max(0, (data.shape[1] - self._size) // self._hop + 1)
-        # After a long pause between calls, only the newest segments are transformed.
+        # If many segments have arrived since the last call, transform only the newest segments.
         for number in range(max(0, whole - self._is_used.size), whole):
             self._take(data[:, number * self._hop : number * self._hop + self._size])
         self._carry = data[:, whole * self._hop :].copy()
@@ -83,24 +81,17 @@ class LiveSpectra:
         self.segments += 1
         self._is_used[place] = bool(np.isfinite(segment).all())
         if self._is_used[place]:
-            found = fft.rfft(segment * self._short_taper, axis=-1)
-            self._spectra[place], self._power[place] = found, found.real**2 + found.imag**2
+            self._spectra[place] = fft.rfft(segment * self._short_taper, axis=-1)
 
     def spectrum(self) -> LiveSpectrum | None:
         """Return the spectral density of every channel; None before the first complete segment."""
         used = self._valid_entries()
         if not used.any():
             return None
-        power = np.mean(self._power[used], axis=0).astype(np.float64)
-        scale = np.full(power.shape[-1], 2 / (self._rate_hz * float(self._taper @ self._taper)))
-        scale[0] /= 2
-        if self._size % 2 == 0:
-            scale[-1] /= 2
-        return LiveSpectrum(
-            frequency_hz=fft.rfftfreq(self._size, 1 / self._rate_hz),
-            amplitude_density=np.sqrt(power * scale),
-            n_eff=effective_averages(self._taper, self._hop, used),
-        )
+        _, channels, lines = self._spectra.shape
+        averages = self._averages(used, range(channels), lines)
+        density = [averages.density(each, each, self._rate_hz).real for each in range(channels)]
+        return LiveSpectrum(averages.frequency_hz(self._rate_hz), np.sqrt(density), averages.n_eff)
 
     def frequency_response(
         self,
@@ -161,7 +152,7 @@ class LiveSpectra:
         )
 
     def _valid_entries(self) -> Flags:
-        """Return flags of the stored segments that are valid."""
+        """Return, for each stored segment, whether the segment is valid."""
         known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
 
@@ -253,7 +244,7 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
 
 
 def _rows(found: Spectrogram, spacing: RowSpacing) -> tuple[tuple[float, float], Reals]:
-    """Return the edges of the frequency axis, and the rows; each row shows its strongest spectral line."""
+    """Return the ends of the frequency axis, and the rows; each row has the density of its strongest line."""
     lines_hz, density = found.frequency_hz, found.density
     step_hz = float(lines_hz[1])
     if spacing is RowSpacing.LINEAR:

@@ -8,39 +8,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frequency_response.results import FrequencyResponse
-from ..recordings.channels import BASE, DRIVE, RESPONSE
-from ..recordings.response import RESPONSE_ROLES
+from ..recordings.channels import BASE, DRIVE, RESPONSE, RESPONSE_ROLES
 from ..signals.arrays import Reals
 from ..signals.quantity import Quantity
-from ._levels import Level, LevelMeters
-from ._outline import Samples, column_starts, outline
-from ._portrait import PoincareSection, Portrait, portrait, portrait_samples
-from ._ring import Ring, Values
-from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
+from ._outline import Picture, column_starts, outline
+from ._ring import Level, LevelMeters, Ring, Values
+from ._sine_response import (
+    PoincareSection,
+    Portrait,
+    SinePoint,
+    look_samples,
+    portrait,
+    portrait_samples,
+    sine_point,
+    stretch_samples,
+)
 from ._spectra import LiveSpectra, LiveSpectrum
 
 # Impacts are counted as kinks in the motion of m0. When m1 and m2 collide, springs and dampers transmit the
-# jump of their velocities to m0: its acceleration steps and changes its slope. This kink always has the same
-# shape, and the motion between impacts is far slower. A sixth difference removes the smooth motion, and a
-# matched filter finds the kinks. The strongest kink is subtracted first, until only noise is left. Impacts
-# 0.1 ms apart are resolved. In simulated motions with the noise of the virtual rig
-# (benchmarks/impact_counter.py), 88 to 99 % of 330 to 1800 impacts a second are counted, and none without
-# impacts. Only contacts that change m0's motion by less than the noise are missed.
+# velocity jump to m0: the acceleration of m0 jumps, and its slope changes. Such a kink always has one shape,
+# and the motion between impacts is far slower. A sixth difference removes the smooth motion, and a matched
+# filter finds the kinks. The strongest kink is subtracted first, until only noise is left. Impacts 0.1 ms
+# apart are resolved. In simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py),
+# 88 to 99 % of 330 to 1800 impacts a second are counted; without impacts, none are. Only contacts that
+# change m0's motion by less than the noise are missed.
 
 _SPAN_S = 78e-6
 """Step of the sixth difference [s]; a longer step passes more of the motion, a shorter step more noise."""
 _DAMPING_TIME_S = 2e-5
-"""Damping time of m0's springs [s]: at an impact, the acceleration's step over the change of its slope."""
+"""Damping time of m0's springs [s]: at an impact, step of the acceleration / change of its slope."""
 _CONTACT_S = 30e-6
 """Assumed duration of a contact; contacts last 20 to 40 us."""
 _APART_S = 100e-6
-"""Time [s] between two kinks below which they are counted as one."""
+"""Two kinks that are less than this time apart are counted as one kink [s]."""
 _LEAST_FRESH_S = 20e-3
 """Shortest piece of signal from which noise is estimated [s]."""
 _MOST_FRESH_S = 0.1
 """Longest piece that is processed at once [s]."""
 _NOISE_FACTOR = 5.2
-"""Threshold of a kink in standard deviations of the noise; noise exceeds it once in two minutes."""
+"""Threshold of a kink in standard deviations of the noise; noise alone exceeds it once in two minutes."""
 _SMOOTH_FACTOR = 3.0
 """Threshold of a kink relative to the filter output for a sine at the mean frequency of the motion."""
 _REST_SHARE = 0.2
@@ -49,7 +55,7 @@ _SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
 _NOISE_GAIN = np.sqrt(924.0)
 """Gain of the sixth difference for the rms of white noise."""
 _QUIET_SHARE, _QUARTER_OF_NORMAL = 0.25, 0.3186
-"""Quantile of |noise| that measures the noise (impacts affect higher quantiles); value for unit noise."""
+"""Quantile of |x| that measures the noise (impacts affect higher quantiles), and its value for unit noise."""
 
 
 class ImpactCounter:
@@ -61,7 +67,7 @@ class ImpactCounter:
         self._difference[::span] = _SIXTH_DIFFERENCE
         kink = _kink(self._difference, sample_rate_hz, 3 - quantity.derivatives)
         power = float(kink @ kink)
-        # Difference and matched filter in one: its input is samples, its output the strength of kinks.
+        # This filter combines difference and matched filter: it turns samples into strengths of kinks.
         self._finder = np.convolve(self._difference, kink[::-1]) / power
         self._gain = float(np.sqrt(np.sum(self._finder**2)))
         self._beam = np.correlate(kink, kink, mode="full") / power
@@ -80,7 +86,7 @@ class ImpactCounter:
 
     def _add_piece(self, motion: Values | Reals) -> int:
         data = np.concatenate((self._carry, np.asarray(motion, dtype=np.float64)))
-        # Samples on both sides of a kink are needed to separate it from its neighbours.
+        # To separate a kink from neighbouring kinks, samples on both sides of the kink are needed.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
         if fresh < self._least_fresh:
             self._carry = data
@@ -113,7 +119,7 @@ class ImpactCounter:
         return inorder[np.diff(inorder, prepend=-self._apart - 1) > self._apart]
 
     def _smooth(self, data: Reals) -> float:
-        """Return the filter output for a sine with the mean square and mean square slope of the data."""
+        """Return the filter output for a sine with the same mean square and mean square slope as the data."""
         known = data[np.isfinite(data)]
         spread = float(np.std(known)) if known.size > 1 else 0.0
         if spread == 0.0:
@@ -135,7 +141,7 @@ def _noise(data: Reals) -> float:
 
 
 def _kink(difference: Reals, sample_rate_hz: float, power: int) -> Reals:
-    """Return the filtered motion after one impact, which adds a motion that grows as t^power / power!."""
+    """Return the filter output for one impact, at which a term t^power / power! is added to the motion."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)
@@ -180,17 +186,6 @@ class LiveChannel:
     full_scale_v: float
 
 
-@dataclass(frozen=True, eq=False)
-class TimeHistories:
-    """Outline of the newest seconds of every channel, for drawing."""
-
-    time_s: Reals
-    """Left edge of each column [s since the start of the run], shape (columns,)."""
-    low: Samples
-    """Lower edges, shape (channels, columns), in the unit of each channel; lost samples are NaN."""
-    high: Samples
-
-
 class LiveView:
     """Data for the pictures of one run.
 
@@ -219,6 +214,7 @@ class LiveView:
         """Channels in the order of the time histories."""
         self._rate_hz = sample_rate_hz
         self._band_hz = band_hz
+        self._lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * band_hz[0])
         self._delay_s = delay_s
         self._lead_in = round(lead_in_s * sample_rate_hz)
         self._units_per_volt = np.array([[each.units_per_volt] for each in channels], dtype=np.float32)
@@ -259,12 +255,13 @@ class LiveView:
         if self._has_roles(DRIVE, BASE, self._response) and is_point_due:
             self._add_point()
 
-    def time_histories(self, span_s: float, columns: int) -> TimeHistories:
+    def time_histories(self, span_s: float, columns: int) -> Picture:
         """Return the outline of the newest ``span_s`` seconds in ``columns`` columns."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
-        return TimeHistories((window.first_sample + starts) / self._rate_hz, low, high)
+        time_s = (window.first_sample + starts) / self._rate_hz
+        return Picture(time_s, low, high, window.values.shape[1] / max(starts.size, 1))
 
     def spectrum(self) -> LiveSpectrum | None:
         """Return the spectral density of every channel; None before the first segment."""
@@ -297,8 +294,7 @@ class LiveView:
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
             return self._portrait[1]
-        lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * self._band_hz[0])
-        wanted = max(portrait_samples(lowest_hz, self._rate_hz), look_samples(self._rate_hz))
+        wanted = max(portrait_samples(self._lowest_hz, self._rate_hz), look_samples(self._rate_hz))
         found = portrait(
             self._ring.newest(wanted),
             self._rows[DRIVE],
@@ -326,8 +322,7 @@ class LiveView:
 
     def _add_point(self) -> None:
         self._pointed = self._ring.next_sample
-        lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * self._band_hz[0])
-        wanted = max(stretch_samples(lowest_hz, self._rate_hz), look_samples(self._rate_hz))
+        wanted = max(stretch_samples(self._lowest_hz, self._rate_hz), look_samples(self._rate_hz))
         rows = (self._rows[DRIVE], self._rows[BASE], self._rows[self._response])
         newest = self._ring.newest(min(wanted, max(0, self._ring.next_sample - self._lead_in)))
         point = sine_point(newest, rows, self._rate_hz, self._quantity)

@@ -20,24 +20,30 @@ from vibench.sim.shaker.loaded_shaker import MotionFailed
 from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, RecordedChannels, alignment_error_s
-from ..recordings.response import VELOCITY, noise_as_read
+from ..recordings.channels import BASE, VELOCITY, RecordedChannels, alignment_error_s, noise_as_read
 from ..signals.arrays import Complexes, Reals, Samples
 from ..sine.dwell import silence_before
-from .driven_rig import Driven, DrivenRig, acceleration_per_volt, carried_mass, driven_rig, recorded_voltage
-from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
-from .shaker_fit import FittedShaker
+from .driven_rig import (
+    Driven,
+    DrivenRig,
+    FittedShaker,
+    acceleration_per_volt,
+    carried_mass,
+    driven_rig,
+    recorded_voltage,
+)
+from .ensemble import FEWEST_DRAWS, Ending, EnsembleCurve, Quantity, ensemble_curves
 from .simulated_channels import SimulatedChannels, advance, base_band_hz, under_base_motion
 
 _FEWEST_LINES = 50
-"""Minimum number of spectral lines in silence; this number determines the noise level to 25 %."""
+"""Minimum number of spectral lines in silence; this number determines the noise level within 25 %."""
 _BLOCK_S = 0.05
 _BLOCKS = 200
 """Number of blocks in which noise is estimated, in addition to the first 1 s and the last 1 s."""
 _BAND = (0.2, 0.4)
 """Frequency band, relative to the sample rate, that contains channel noise but no modes."""
 _ALIKE = 6.0
-"""Blocks whose power is within this many standard deviations of the lowest count as equally quiet."""
+"""A block is quiet if its power exceeds the lowest power by at most this many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +84,11 @@ def _white(samples: Reals) -> float:
     """Return the rms of the white noise, from the band above all modes; infinite if samples were lost."""
     if np.isnan(samples).any():
         return np.inf
-    power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
+    taper = np.hanning(samples.size)
+    power = np.abs(np.fft.rfft(samples * taper)) ** 2
     low, high = (round(part * samples.size) for part in _BAND)
     # The mean power of a bin is the variance times the sum of the squared taper.
-    return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
+    return float(np.sqrt(np.mean(power[low:high]) / np.sum(taper**2)))
 
 
 _COMPARED_HZ = (100.0, 2000.0)
@@ -98,7 +105,7 @@ UNKNOWN_NOISE = (
 
 @dataclass(frozen=True)
 class UnseenNoise:
-    """White noise that moves the table but is absent from the recorded voltage; referred to that voltage."""
+    """White noise that moves the table but is absent from the recorded voltage; expressed as a voltage."""
 
     power: float = 0.0
     """Variance of one sample of the noise [V²]."""
@@ -143,7 +150,7 @@ def unseen_noise(
         return max(floor, noise.rms[BASE] ** 2 - passed_high * (recorded_v2 + unseen_v2))
 
     def excess(unseen_v2: float) -> float:
-        """Return the median of power / level minus log 2; it is 0 if the level is correct."""
+        """Return the median of (power / level), minus ln 2; the difference is 0 if the level is correct."""
         level = passed * (unseen_v2 + own_v2) + sensor(unseen_v2)
         return float(np.median(power / level) - np.log(2.0))
 
@@ -176,16 +183,16 @@ _SURELY = 20.0
 class PlayedVoltage:
     """A recorded voltage, from which converter noise is removed as far as possible.
 
-    Converter noise did not drive the shaker; simulating it would raise weak motions too much. In each line of
-    each frame, a Wiener filter estimates the part that drove the shaker; the uncertain rest is random in each
-    draw. Draws scatter by the uncertainty of this estimate, not by all of the converter noise.
+    Converter noise did not drive the shaker; simulating this noise would raise weak motions too much. In each
+    line of each frame, a Wiener filter estimates the part that drove the shaker; the uncertain rest is random
+    in each draw. Draws scatter by the uncertainty of this estimate, not by all of the converter noise.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._samples, self._own_v = volts.size, converter_rms_v
         self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
         self._frames = 1 - (-volts.size // self._hop)
-        """Number of frames, which overlap by half; the first and last extend half a frame beyond the ends."""
+        """Number of frames, which overlap by half; the first and last extend by half beyond the signal."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
         self._likely: Samples = volts
         self._roots: list[Samples] = []
@@ -193,10 +200,10 @@ class PlayedVoltage:
             self._likely, self._roots = self._parts(volts)
 
     def _parts(self, volts: Reals) -> tuple[Samples, list[Samples]]:
-        """Return the filtered voltage, and per batch the square root of the kept fraction of each line."""
+        """Return the filtered voltage and, for each batch, the square root of each line's kept fraction."""
         own = self._own_v**2 * float(np.sum(self._window**2))
         halves = self._window.reshape(2, self._hop)
-        # Synthesis window, with which half-overlapping frames add up to the signal.
+        # With this synthesis window, half-overlapping frames add up to the signal.
         back = (halves / np.sum(halves**2, axis=0)).ravel()
         recorded = np.zeros((self._frames + 1, self._hop), np.float32)
         recorded.ravel()[self._hop : self._hop + volts.size] = volts
@@ -227,7 +234,7 @@ class PlayedVoltage:
         """Return a random voltage compatible with the recording, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._likely
-        # The random parts of frames are independent, so the root of the window preserves their power.
+        # The random parts of frames are independent: weights equal to the window's root preserve the power.
         fade = np.sqrt(self._window, dtype=np.float32)
         size = np.float32(self._own_v * np.sqrt(self._hop))
         roots = iter(self._roots)
@@ -259,7 +266,7 @@ DRAWS, MOST_DRAWS = 16, 1000
 FIRST_DRAWS = 8
 """Number of draws (simulated runs) computed first; enough if the agreement is clear or nothing collides."""
 _FURTHER_DRAWS = 4
-"""Number of draws computed between two checks of whether their number suffices."""
+"""Number of draws between two checks of whether there are enough draws."""
 START_M = 5e-9
 """Standard deviation of each mass's initial position [m]."""
 CLOCK_TOLERANCE = 50e-6
@@ -270,7 +277,7 @@ _NOISE = 0.15
 """Uncertainty of ln(noise of a channel); the noise is estimated in the channel's quietest part."""
 _MORE = 3
 _HOPELESS = 0.2
-"""No more draws are made if enough draws for a comparison are less probable than this."""
+"""Stop if the probability of reaching enough draws for a comparison is smaller than this."""
 _SEED = 17
 _BLOCK = 1 << 17
 """Number of samples per block of added noise."""
@@ -330,11 +337,11 @@ class Draw(Generic[R]):
 
 @dataclass(frozen=True, eq=False)
 class DrawSet(Generic[R]):
-    """All draws: the full estimate of the first draw, and the compared quantities of each draw."""
+    """All draws: the full estimate of the first draw, and every compared quantity, measured and drawn."""
 
     run: SimulatedRun
     response: R
-    quantities: tuple[tuple[Quantity, ...], ...]
+    ensemble: tuple[EnsembleCurve, ...]
     endings: tuple[tuple[Ending, ...], ...]
 
 
@@ -364,7 +371,7 @@ def voltage_source(
     recording
         Recording; its bench configuration describes the rig.
     fitted
-        A shaker to use instead of the described one; each draw varies it within its uncertainty.
+        A shaker to use instead of the described one; each draw varies this shaker within its uncertainty.
     draws
         Maximum number of draws.
     """
@@ -396,9 +403,9 @@ def all_draws(
 ) -> DrawSet[R]:
     """Return all draws of a source, each analysed like the recording.
 
-    Fewer draws are made if the first draws agree clearly. Up to three times as many draws are made if few of
-    them show the ``measured`` kind of motion, unless enough such draws are improbable. Raises UnusableData
-    when a simulation did not finish.
+    Fewer draws are made if the first draws clearly agree with the recording. Up to three times as many draws
+    are made if few of them show the ``measured`` kind of motion, unless enough such draws are improbable.
+    Raises UnusableData when a simulation did not finish.
     """
     responses: list[R] = []
 
@@ -406,7 +413,7 @@ def all_draws(
 
     def estimate_draw(number: int) -> Draw[None]:
         channels = source.channels(number)
-        # Compute one estimate at a time: estimating is at most half of the work, but takes double memory.
+        # Compute only one estimate at a time: estimates take at most half of the time, but double the memory.
         with estimating:
             draw = estimate(channels)
             if number == 0:
@@ -421,7 +428,7 @@ def all_draws(
         while len(found) < most:
             curves = ensemble_curves(measured, [each.quantities for each in found])
             alike = float(np.median(np.concatenate([each.count for each in curves])))
-            # More draws than the default were requested for narrower bands, so compute all of them.
+            # If more draws than the default were requested, they serve narrower bands: compute all of them.
             if alike < FEWEST_DRAWS:
                 if _chance_of_enough(alike, len(found), most) < _HOPELESS:
                     break
@@ -431,13 +438,12 @@ def all_draws(
             found += pool.map(estimate_draw, range(len(found), stop))
     impacts = float(np.mean([each.impacts for each in found]))
     run = replace(source.run, draws=len(found), impacts=impacts, played_s=found[0].played_s)
-    return DrawSet(
-        run, responses[0], tuple(each.quantities for each in found), tuple(each.endings for each in found)
-    )
+    ensemble = ensemble_curves(measured, [each.quantities for each in found])
+    return DrawSet(run, responses[0], ensemble, tuple(each.endings for each in found))
 
 
 def _chance_of_enough(alike: float, made: int, most: int) -> float:
-    """Return the chance of `FEWEST_DRAWS` alike draws in ``most``, given ``alike`` in the first ``made``."""
+    """Return the chance that `FEWEST_DRAWS` of ``most`` draws are alike, if ``alike`` of ``made`` were."""
     further = scipy.stats.betabinom(most - made, 1 + alike, 1 + made - alike)
     return float(further.sf(FEWEST_DRAWS - alike - 1))
 
@@ -459,7 +465,7 @@ def _random_channels(
         volts = _with_noise(volts.copy(), rig.role, rms_v, recording.sample_rate_hz, rng)
     motion = _simulate_motion(replace(rig, table=table), volts, recording, noise, rng)
     velocity, error_s = motion.m0_velocity, alignment_error_s(recording, BASE, rig.response)
-    if error_s > 0.0:  # the file has too few digits to align its channels exactly
+    if error_s > 0.0:  # times with few digits align the channels inexactly
         by_samples = error_s * rng.uniform(-1.0, 1.0) * recording.sample_rate_hz
         velocity = advance(velocity.astype(np.float64), by_samples).astype(np.float32)
     return SimulatedChannels(
@@ -567,7 +573,7 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, VELOCITY))
-    # The channel's noise would drive the simulation, so only spectral lines far above it are used.
+    # Keep only spectral lines far above the channel's noise, which would otherwise drive the simulation.
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * noise.rms[rig.role] ** 2] = 0.0
     played = np.asarray(np.fft.irfft(spectrum, volts.size))

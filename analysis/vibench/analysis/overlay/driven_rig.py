@@ -1,12 +1,15 @@
-"""Parameters of a recording's rig, and the recorded voltage that drove it."""
+"""Parameters of a recording's rig, its fitted shaker, and the recorded voltage that drove it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import partial
 
 import numpy as np
 from pydantic import ValidationError
+from scipy.optimize import OptimizeResult, least_squares
 
+from vibench.acquisition.plan import StreamedNoise
 from vibench.acquisition.recording import Recording, coupling_cut_hz
 from vibench.acquisition.rig import Rig, amplifier_of, shaker_of
 from vibench.sim import Specimen, base_transmissibility
@@ -14,9 +17,11 @@ from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, DRIVE, sensor_gain
-from ..recordings.response import ResponseChannel
-from ..signals.arrays import Complexes, Reals
+from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response
+from ..frequency_response.results import FrequencyResponse
+from ..recordings.channels import BASE, DRIVE, RecordedChannels, ResponseChannel, coupled_gain, sensor_gain
+from ..signals.arrays import Complexes, Flags, Reals
+from ..tables import plus_minus
 
 AMPLIFIER = "amplifier_voltage"
 """Role of the channel that records the amplifier's output."""
@@ -72,7 +77,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
             raise UnusableData(
                 "the bench in the recording describes no shaker, so the recorded voltage cannot be "
                 "simulated; record with a complete bench configuration, or analyse the recording together "
-                "with weak noise of the same rig, to which a shaker can be fitted"
+                "with a recording of weak noise on the same rig, from which the shaker can be identified"
             )
         shaker = shaker_of(rig)
     base, m0 = (recording.channel(each) for each in (BASE, response))
@@ -130,3 +135,148 @@ def recorded_voltage(recording: Recording, rig: DrivenRig, start: int = 0, stop:
             "cannot be simulated; the measured result remains valid"
         )
     return volts
+
+
+LARGEST_CHI2 = 3.0
+"""Largest reduced chi square of a valid fit; a larger one means collisions or other moving parts."""
+FEWEST_LINES = 30
+_TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
+"""Starting point of the search: parameters of a small electrodynamic shaker."""
+_REACH = np.log(300.0)
+"""Largest natural logarithm of the ratio of a parameter to its typical value."""
+_PRIOR_SD = 1.0
+"""Prior standard deviation of the logarithm of each parameter, for drawing random shakers."""
+_STARTS = 12
+_NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedShaker:
+    """A shaker with the uncertainty of its parameters."""
+
+    shaker: Shaker
+    covariance: Reals
+    """Covariance of the logarithms of the first six parameters, shape (6, 6), widened if chi^2 exceeds 1."""
+    chi2: float
+    """Reduced chi square of the fit."""
+    lines: int
+    source: str
+    """Name of the recording to which the shaker was fitted."""
+
+    @property
+    def relative_sd(self) -> dict[str, float]:
+        """Relative standard deviation of every parameter."""
+        return dict(zip(_NUMBERS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def sentence(self) -> str:
+        """Return a sentence that lists each parameter with plus or minus two standard deviations."""
+        values = ", ".join(
+            f"{name} = {plus_minus(value := getattr(self.shaker, name), 2 * sd * value)}"
+            for name, sd in self.relative_sd.items()
+        )
+        return (
+            f"The shaker was fitted to {self.lines} lines of {self.source} (chi² {self.chi2:.2g} per degree "
+            f"of freedom): {values}"
+        )
+
+    def random_shaker(self, rng: np.random.Generator) -> Shaker:
+        """Return a random shaker within the uncertainty of the parameters."""
+        logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
+        return _shaker(logarithms)
+
+
+def fit_shaker(
+    recording: Recording, analysis: NoiseAnalysis, specimen: Specimen, described: Shaker | None = None
+) -> FittedShaker:
+    """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
+
+    The base's acceleration per voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3),
+    where D(s) = k + d s + (m + M(s)) s^2 and M is the specimen's apparent mass. The search starts from
+    the ``described`` shaker or, if None, from several typical shakers. Raises UnusableData when there are
+    too few lines, or no shaker explains them.
+    """
+    found = _over_voltage(recording, analysis)
+    known = found.is_significant & np.isfinite(found.relative_sd_magnitude) & (found.magnitude > 0)
+    lines = int(np.sum(known))
+    if lines < FEWEST_LINES:
+        raise UnusableData(
+            f"{analysis.facts.name} has {lines} lines at which the base follows the voltage; a fit of the "
+            f"shaker needs {FEWEST_LINES}"
+        )
+    frequency_hz = found.frequency_hz[known]
+    s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
+    measured = found.value[known] / s
+    carried = carried_mass(specimen, frequency_hz)
+    # Real and imaginary part of ln(measured / modelled) have the same scatter.
+    sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
+
+    def misfit(logarithms: Reals) -> Reals:
+        ratio = np.log(acceleration_per_volt(_shaker(logarithms), s, carried) / measured) / sd
+        return np.concatenate([ratio.real, ratio.imag])
+
+    best = _best(misfit, described)
+    degrees = 2 * lines - len(_TYPICAL)
+    chi2 = float(2 * best.cost / degrees)
+    if chi2 > LARGEST_CHI2:
+        raise UnusableData(
+            f"no shaker explains how the voltage moves the base in {analysis.facts.name} (chi² {chi2:.3g} "
+            f"per degree of freedom, at most {LARGEST_CHI2:g}): the amplifier, the table or the specimen "
+            "differs from its description, or masses collide; check the bench file, or choose weaker noise"
+        )
+    # The prior keeps an undetermined parameter (such as a small inductance) from affecting the motion.
+    precision = best.jac.T @ best.jac / max(chi2, 1.0) + np.eye(len(_TYPICAL)) / _PRIOR_SD**2
+    covariance = np.linalg.inv(precision)
+    return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)
+
+
+def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
+    """Search from several starting points, because the data mainly determine products of parameters."""
+    rng = np.random.default_rng(0)
+    typical = np.log(_TYPICAL)
+    bounds = (typical - _REACH, typical + _REACH)
+    starts = [typical, *(typical + rng.uniform(-1.5, 1.5, (_STARTS, typical.size)))]
+    if described is not None:
+        starts = [np.clip(_logarithms(described), bounds[0] + 1e-6, bounds[1] - 1e-6)]
+    return min(
+        (least_squares(misfit, each, bounds=bounds, x_scale="jac") for each in starts),
+        key=lambda each: each.cost,
+    )
+
+
+def _logarithms(shaker: Shaker) -> Reals:
+    return np.log([getattr(shaker, name) for name in _NUMBERS])
+
+
+def _shaker(logarithms: Reals) -> Shaker:
+    return Shaker(*np.exp(logarithms).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class _VoltageAndBase(RecordedChannels):
+    """Channels for noise estimators, with the voltage in place of the base and the base in place of m0."""
+
+    role: str = field(kw_only=True)
+
+    @property
+    def response_delay_s(self) -> float:
+        return 0.0
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        return coupled_gain(self.recording.bench, self.recording.channel(BASE), frequency_hz)
+
+    def read(self, start: int, stop: int) -> Reals:
+        return np.stack([self.recording.read(each, start, stop) for each in (DRIVE, self.role, BASE)])
+
+    def bridge_flags(self, start: int, stop: int) -> Flags:
+        return np.zeros(stop - start, dtype=np.bool_)
+
+
+def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
+    """Return s times base acceleration / voltage, analogous to m0's velocity / base acceleration."""
+    role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
+    channels = _VoltageAndBase(recording, role=role)
+    plan = analysis.excitation
+    if isinstance(plan, StreamedNoise):
+        return streamed_response(channels, plan, analysis.request).frequency_response
+    return repeated_response(channels, plan, analysis.request)[0]

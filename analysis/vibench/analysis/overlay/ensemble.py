@@ -4,15 +4,15 @@ In chaos, a measurement and its simulation (a draw) are two samples from one dis
 the measurement could be another draw.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
 
-from ..signals.arrays import Flags, Integers, Reals
+from ..signals.arrays import PER_NEPER_DB, Flags, Integers, Reals
 from ..tables import Tabular
 
 AGREEMENT = 0.99
@@ -38,7 +38,7 @@ class Quantity:
     value: Reals
     """Values of the quantity; NaN where missing."""
     state: Integers | None = None
-    """Kind of motion at each point (colliding or not), if it varies; only equal kinds are compared."""
+    """Kind of motion at each point (colliding or not), if it varies; only points of one kind are compared."""
 
 
 class Phase(Quantity):
@@ -53,7 +53,7 @@ class EnsembleCurve(Tabular):
     magnitudes (skewness -0.1 for Rayleigh's distribution; logarithms -1.1).
 
     The limit of |z| accounts for the number of frequencies (Sidak 1967), few draws (Student's t), and long
-    tails (each draw compared with the others). 1 % of correct simulations exceed it.
+    tails (each draw is compared with the others). 1 % of correct simulations exceed this limit.
     """
 
     DOCUMENT: ClassVar = (
@@ -120,7 +120,7 @@ class EnsembleCurve(Tabular):
 
     @cached_property
     def limit(self) -> float:
-        """Largest |z| that is compatible with chance among the compared points.
+        """Limit: the largest |z| of all compared points that chance explains.
 
         This is the limit for normal values, or a larger one if the draws have longer tails.
         """
@@ -161,11 +161,11 @@ class EnsembleCurve(Tabular):
     def sentence(self) -> str:
         """Result of the comparison in words."""
         if not self.compared:
-            return f"{self.name}: too few draws to compare (few show the measured kind of motion)"
+            return f"{self.name}: too few draws to compare (few draws show the measured kind of motion)"
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
             agrees = "agrees with" if self.agrees else "differs from"
-            # A value outside the 95 % band may still agree, so state the limit of |z|.
+            # A value outside the 95 % band may still agree, so state the limit for |z|.
             limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             measured, median, lower, upper = map(
                 self._text, (self.measured, self.median, self.lower, self.upper)
@@ -188,7 +188,7 @@ class EnsembleCurve(Tabular):
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = left * self._sd**2
-            # Sum of squares without this draw; less than 1e-9 of the whole is rounding error.
+            # Sum of squares of the other draws; less than 1e-9 of the sum of all draws is a rounding error.
             others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
@@ -228,7 +228,7 @@ class EnsembleCurve(Tabular):
 
 
 class PhaseCurve(EnsembleCurve):
-    """Phases, measured and in every draw [rad]; their angles from the draws' mean direction are compared.
+    """Phases, measured and in every draw [rad]; the angles from the draws' mean direction are compared.
 
     These angles lie within half a turn, so the band may extend beyond pi. Phases that scatter over the whole
     circle do not disagree.
@@ -263,7 +263,7 @@ def _turn(angle_rad: Reals) -> Reals:
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
-    """Return Student's t of one more draw as a normal deviate, limited to a probability of 1e-300."""
+    """Convert Student's t of one more draw to the normal deviate of equal probability (at least 1e-300)."""
     with np.errstate(invalid="ignore", divide="ignore"):
         deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
         tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
@@ -271,11 +271,11 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 
 
 def largest_of_chance(largest: Reals) -> float:
-    """Return the limit that, in 99 % of cases, the largest |z| of another draw does not exceed.
+    """Return the limit that the largest |z| of another draw stays below in 99 % of cases.
 
-    ``largest`` has the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
-    distribution with mean and deviation of these values. Few draws determine both poorly, so a fitted factor
-    widens the limit. Otherwise 2 % of cases with 16 draws, and 5 % with five, would exceed it.
+    ``largest`` contains the largest |z| of each draw (five or more). The limit is a quantile of the Gumbel
+    distribution with the mean and standard deviation of these values. Both are uncertain if draws are few, so
+    a fitted factor widens the limit; otherwise 2 % of cases with 16 draws and 5 % with five would exceed it.
     """
     quantile = (-np.log(-np.log(AGREEMENT)) - np.euler_gamma) * np.sqrt(6) / np.pi
     widened = quantile * (1 + 3.3 / largest.size + 5 / largest.size**2)
@@ -311,15 +311,12 @@ def _comparable(measured: Quantity, drawn: Quantity) -> Reals:
 
 
 def _over_draws(values: Reals, reduce: object) -> Reals:
-    """Apply ``reduce`` over the draws; NaN, without a warning, at points with fewer than two draws."""
+    """Apply ``reduce`` over the draws; return NaN, without a warning, at points with fewer than two draws."""
     some = np.sum(np.isfinite(values), axis=0) > 1
     found = np.full(values.shape[1:], np.nan)
     if some.any():
         found[some] = reduce(values[:, some], axis=0)  # type: ignore[operator]
     return found
-
-
-_PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
@@ -331,7 +328,7 @@ class CurveDifference(Tabular):
     frequency_hz: Reals
     decibel: Reals
     standard_errors: Reals
-    """ln(measured / simulated) divided by the combined standard deviation; infinite if that is zero."""
+    """ln(measured / simulated) divided by the combined standard deviation; infinite if the latter is zero."""
 
     def where(self, kept: Flags) -> "CurveDifference":
         """Return the ratios at the points flagged by ``kept``."""
@@ -339,19 +336,23 @@ class CurveDifference(Tabular):
 
     @property
     def median_abs_db(self) -> float:
-        """Median of the absolute difference."""
-        return float(np.nanmedian(np.abs(self.decibel)))
+        """Median of the absolute difference; like the other numbers, NaN without points to compare."""
+        return _of_known(lambda known: np.median(np.abs(known)), self.decibel)
 
     @property
     def rms_db(self) -> float:
         """Root mean square of the difference."""
-        return float(np.sqrt(np.nanmean(self.decibel**2)))
+        return _of_known(lambda known: np.sqrt(np.mean(known**2)), self.decibel)
 
     @property
     def share_within_two(self) -> float:
         """Fraction of points within two standard errors; 0.95 is expected for scatter alone."""
-        known = self.standard_errors[~np.isnan(self.standard_errors)]
-        return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
+        return _of_known(lambda known: np.mean(np.abs(known) <= 2), self.standard_errors)
+
+
+def _of_known(reduce: Callable[[Reals], Any], values: Reals) -> float:
+    known = values[~np.isnan(values)]
+    return float(reduce(known)) if known.size else np.nan
 
 
 def logarithmic_difference(
@@ -361,16 +362,16 @@ def logarithmic_difference(
     with np.errstate(divide="ignore", invalid="ignore"):
         nepers = np.log(measured[0] / simulated[0])
         spread = np.hypot(measured[1], simulated[1])
-        return CurveDifference(frequency_hz, _PER_NEPER_DB * nepers, np.asarray(nepers / spread))
+        return CurveDifference(frequency_hz, PER_NEPER_DB * nepers, np.asarray(nepers / spread))
 
 
 # Motions that end by chance, described by a rate per second.
 #
-# Transient chaos, and collisions in a sweep, end at a different time in every run. Escapes have a constant
-# rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
+# Transient chaos ends at a different time in every run, and so do collisions in a sweep. Escapes have a
+# constant rate (Tel and Lai, Phys. Rep. 460 (2008), ch. 1); each run gives one sample of the escape time.
 
 _ONE_EDGE_S = 2.0
-"""If the motion ends within this interval [s] in all runs, it ends by a common cause, not by chance."""
+"""If the motion ends within this interval [s] in all runs, its end has a common cause and is not random."""
 
 
 @dataclass(frozen=True)
@@ -438,7 +439,7 @@ def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -
     stops = np.array([each.stop_s for each in runs if each.ended])
     if len(runs) == 1 or not stops.size or np.ptp([each.stop_s for each in runs]) < _ONE_EDGE_S:
         return None
-    # Count from the first end in any run, because before this time perhaps no run could end.
+    # Count from the first end in any run: earlier, it may have been impossible for a run to end.
     from_s = float(stops.min())
     exposure_s = sum(max(each.stop_s - from_s, 0.0) for each in runs)
     if exposure_s <= 0.0:

@@ -1,19 +1,29 @@
-"""Overlay a simulation on a measurement: draws analysed by the same estimator, and their agreement."""
+"""Predicted responses to sines, and overlays of simulations: draws analysed by the same estimator."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from vibench.sim import Accuracy, Specimen
+from vibench.acquisition.plan import Approach, Measurement, base_motion
+from vibench.acquisition.rig import Rig
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Outcome,
+    Response,
+    Specimen,
+    base_transmissibility,
+    steady_response,
+)
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.results import FrequencyResponse
-from ..signals.arrays import Integers, Reals
-from ..signals.envelope import Envelope
-from ..sine.collision_region import Collisions, collisions
+from ..signals.arrays import Envelope, Flags, Integers, Reals, runs_of
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import (
     DwellAnalysis,
@@ -25,7 +35,7 @@ from ..sine.dwell_analysis import (
 )
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweptMotion
-from ..sine.sweep_analysis import SweepAnalysis
+from ..sine.sweep_analysis import Collisions, SweepAnalysis, collisions
 from ..tables import Tabular
 from .draws import DrawSet, SimulatedRun
 from .ensemble import (
@@ -36,11 +46,123 @@ from .ensemble import (
     EscapeRate,
     Phase,
     Quantity,
-    ensemble_curves,
     escape_rate,
     logarithmic_difference,
 )
-from .prediction import ResponsePrediction, paper_amplitude_m, predict
+
+PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
+"""Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
+PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
+"""Resonances of m0 without contact [Hz] (Gong et al. 2025, section 5)."""
+PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
+"""Resonances of m0 with m1 bound to m2 [Hz] (Gong et al. 2025, section 5)."""
+PREDICTION_S = 8.0
+WINDOW_S = 5.0
+"""Total and observed time [s]: 3 s settling (slowest transient falls to 3e-5), 5 s as in the paper."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponsePrediction(Tabular):
+    """Responses of m0 to sines; arrays of shape (points,)."""
+
+    specimen: Specimen
+    frequency_hz: Reals
+    amplitude_m: Reals
+    """Base amplitude A0 at each frequency."""
+    response_i: Reals
+    """Response I; like Response II, NaN if the simulation did not finish."""
+    response_ii: Reals
+    linear: Reals
+    """|x / U| of the linear model, without contact."""
+    impacts: Integers
+    """Number of impacts within the observed time."""
+    accuracy: Accuracy
+    duration_s: float
+    window_s: float
+
+    @property
+    def is_colliding(self) -> Flags:
+        """Flags of points with collisions within the observed time."""
+        return np.asarray(self.impacts > 0)
+
+
+def predict(
+    specimen: Specimen,
+    frequency_hz: Reals,
+    amplitude_m: Reals | float,
+    accuracy: Accuracy = Accuracy.QUICK,
+    *,
+    duration_s: float = PREDICTION_S,
+    approach: Approach = Approach.REST,
+) -> ResponsePrediction:
+    """Simulate a sine at each frequency: in parallel from rest, or in sequence like a sweep.
+
+    Parameters
+    ----------
+    frequency_hz
+        Frequencies of the sines [Hz], ascending, shape (points,).
+    amplitude_m
+        Base amplitude A0, one value for all points or one per point [m].
+    accuracy
+        Quick by default: free flight is exact at every level of accuracy and, in chaos, the scatter of
+        Response I exceeds the error of every level.
+    """
+    amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
+    drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
+    # If a point starts from the previous point, half of the time is for settling after the frequency step.
+    window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
+
+    def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
+        return steady_response(specimen, drive, accuracy, for_s, window_s, state)
+
+    match approach:
+        case Approach.REST:
+            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+                points = list(pool.map(point, drives))
+        case Approach.UP:
+            points = list(_follow_points(point, drives, duration_s))
+        case Approach.DOWN:
+            points = list(_follow_points(point, drives[::-1], duration_s))[::-1]
+    ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
+    return ResponsePrediction(
+        specimen=specimen,
+        frequency_hz=np.asarray(frequency_hz, dtype=np.float64),
+        amplitude_m=amplitudes.copy(),
+        response_i=np.where(ended, [each.response_i for each in points], np.nan),
+        response_ii=np.where(ended, [each.response_ii for each in points], np.nan),
+        linear=np.abs(base_transmissibility(specimen, frequency_hz)[:, 0]),
+        impacts=np.array([each.impacts for each in points], dtype=np.int64),
+        accuracy=accuracy,
+        duration_s=duration_s,
+        window_s=window_s,
+    )
+
+
+def _follow_points(
+    point: Callable[[Harmonic, Reals | None, float], Response],
+    drives: Sequence[Harmonic],
+    duration_s: float,
+) -> Iterator[Response]:
+    """Simulate each point from the final state of the previous one, with continuous drive phase.
+
+    The first point starts from rest and has time to settle.
+    """
+    state, turns = None, 0.0
+    for drive in drives:
+        for_s = duration_s if state is not None else max(duration_s, PREDICTION_S)
+        found = point(replace(drive, phase_rad=2 * np.pi * turns), state, for_s)
+        yield found
+        turns = (turns + drive.frequency_hz * for_s) % 1.0
+        state = found.final_state if found.outcome is Outcome.REACHED_END else None
+
+
+def paper_amplitude_m(amplitude_vpp: float) -> float | None:
+    """Return the A0 of the paper for one of its three voltages; None for other voltages."""
+    for voltage, amplitude in PAPER_AMPLITUDES_M.items():
+        if np.isclose(voltage, amplitude_vpp, rtol=1e-3):
+            return amplitude
+    return None
+
 
 PREDICTION_STEP_HZ = 2.0
 _FINE_STEP_HZ = 0.25
@@ -71,7 +193,7 @@ class AbstractOverlay(Tabular, Generic[R]):
 
     @property
     def agreement(self) -> tuple[str, ...]:
-        """Sentence on the quantities that disagree with the simulation, then one on each quantity."""
+        """Sentence on the quantities that disagree with the simulation, then a sentence on each quantity."""
         outside = [each.name for each in self.ensemble if not each.agrees]
         compared = sum(each.compared > 0 for each in self.ensemble)
         headline = [f"{len(outside)} of {compared} quantities disagree with the twin: {', '.join(outside)}"]
@@ -138,14 +260,12 @@ PHASE = "phase of the response over the base"
 """Names of the compared quantities."""
 
 
-def _difference(
-    drawn: DrawSet[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
-) -> CurveDifference:
-    """Compare the measurement with the median of the draws, or with a single draw and its sd."""
-    (found,) = ensemble_curves([measured], drawn.quantities)
+def _difference(drawn: DrawSet[R], name: str, sd: Reals, simulated: tuple[Reals, Reals]) -> CurveDifference:
+    """Compare a measured quantity with the median of the draws, or with a single draw and its uncertainty."""
+    (found,) = (each for each in drawn.ensemble if each.name == name)
     if drawn.run.draws > 1:
         simulated = found.median, found.relative_sd
-    return logarithmic_difference(measured.frequency_hz, (measured.value, sd), simulated)
+    return logarithmic_difference(found.frequency_hz, (found.measured, sd), simulated)
 
 
 def noise_quantities(found: FrequencyResponse) -> tuple[Quantity, ...]:
@@ -163,15 +283,14 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: DrawSet[NoiseResponse]) -> Noi
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
     specimen = drawn.run.specimen
-    compared = noise_quantities(measured)
     return NoiseOverlay(
         run=drawn.run,
         response=drawn.response,
-        ensemble=ensemble_curves(compared, drawn.quantities),
+        ensemble=drawn.ensemble,
         escape=None,
         difference=_difference(
             drawn,
-            compared[0],
+            TRANSMISSION,
             measured.relative_sd_magnitude,
             (simulated.magnitude, simulated.relative_sd_magnitude),
         ),
@@ -199,14 +318,11 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
     return float(np.sqrt(2) * rms), "a sine of the same rms base displacement"
 
 
-def _sine_difference(
-    drawn: DrawSet[_Sines], compared: Sequence[Quantity], measured: _Sines
-) -> CurveDifference:
-    (quantity,) = (each for each in compared if each.name == RESPONSE_II)
+def _sine_difference(drawn: DrawSet[_Sines], measured: _Sines) -> CurveDifference:
     sd, sd_simulated = (
         np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, drawn.response)
     )
-    return _difference(drawn, quantity, sd, (np.atleast_1d(drawn.response.response_ii), sd_simulated))
+    return _difference(drawn, RESPONSE_II, sd, (np.atleast_1d(drawn.response.response_ii), sd_simulated))
 
 
 def sine_quantities(
@@ -214,7 +330,7 @@ def sine_quantities(
     frequency_hz: Reals,
     state: Integers | None = None,
 ) -> tuple[Quantity, ...]:
-    """Return both responses and the phase of the response over the base."""
+    """Return Response I, Response II and the phase of the response relative to the base."""
     values = (np.atleast_1d(e) for e in (response.response_i, response.response_ii, response.phase_rad))
     kinds = ((Quantity, RESPONSE_I), (Quantity, RESPONSE_II), (Phase, PHASE))
     return tuple(
@@ -229,7 +345,7 @@ _EDGE_S = 1.0
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
     """Return the quantities of a sweep that are compared with draws.
 
-    Points are compared where both sweeps collide or neither does, but not within a second of a region's edge.
+    Points are compared if both sweeps have collisions or neither has, except within 1 s of a region's edge.
     """
     state = found.is_colliding.astype(np.int64)
     reach = max(1, round(_EDGE_S / response.interval_s))
@@ -254,14 +370,13 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: DrawSet[SweptMotion]) -> Sweep
     specimen = drawn.run.specimen
     grid = prediction_grid(specimen, low, high)
     amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
-    compared = sweep_quantities(measured, analysis.collisions)
     return SweepOverlay(
         run=drawn.run,
         response=drawn.response,
-        ensemble=ensemble_curves(compared, drawn.quantities),
+        ensemble=drawn.ensemble,
         escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
         collisions=collisions(drawn.response),
-        difference=_sine_difference(drawn, compared, measured),
+        difference=_sine_difference(drawn, measured),
         prediction=predict(specimen, grid, amplitude_m),
     )
 
@@ -299,8 +414,7 @@ def dwell_overlay(
     """Compare a dwell with the draws; ``endings`` are the measured ends of the motion."""
     towards_hz = bound_frequencies_hz(analysis.facts)
     measured = analysis.response
-    compared = dwell_quantities(measured, towards_hz, endings)
-    *ensemble, spectrum = ensemble_curves(compared, drawn.quantities)
+    *ensemble, spectrum = drawn.ensemble
     return DwellOverlay(
         run=drawn.run,
         response=drawn.response,
@@ -309,7 +423,7 @@ def dwell_overlay(
         escape=escape_rate(endings, drawn.endings),
         displacement=settled_envelope(drawn.response),
         terminal=terminal_levels(drawn.response, towards_hz),
-        difference=_sine_difference(drawn, compared, measured),
+        difference=_sine_difference(drawn, measured),
         prediction=predict(
             drawn.run.specimen,
             np.array([measured.drive.frequency_hz]),
@@ -322,22 +436,85 @@ def dwell_overlay(
 def stepped_overlay(analysis: SteppedSineAnalysis, drawn: DrawSet[SteppedResponse]) -> SteppedSineOverlay:
     """Compare the measured responses of all steps with the draws."""
     measured = analysis.response
-    compared = sine_quantities(measured, measured.frequency_hz)
     return SteppedSineOverlay(
         run=drawn.run,
         response=drawn.response,
-        ensemble=ensemble_curves(compared, drawn.quantities),
+        ensemble=drawn.ensemble,
         escape=None,
-        difference=_sine_difference(drawn, compared, measured),
+        difference=_sine_difference(drawn, measured),
         prediction=predict(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
     )
 
 
 class Simulation(StrEnum):
-    """Input of the simulation of a measurement, or no simulation."""
+    """Simulation to overlay on measurements."""
 
-    UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
-    """Rig and specimen driven by the recorded voltage; for an unknown shaker, the same as UNDER_BASE."""
-    UNDER_BASE = "the specimen under the recorded base motion"
-    """The specimen alone, driven by the recorded base motion: for linear and coherent motion."""
-    LEFT_OUT = "nothing"
+    LEFT_OUT = "left out"
+    UNDER_VOLTAGE = "under the recorded voltage"
+    """Several simulated runs of rig and specimen; also valid for chaotic motion."""
+    UNDER_BASE = "under the recorded base motion"
+    """One simulated run of the specimen alone; for linear and coherent motion."""
+
+
+MOST_POINTS = 60
+"""Maximum number of simulated frequencies; their simulation takes a few seconds."""
+SIMULATED_S = 6.0
+"""Simulated time from rest at each frequency; the transient decays to 0.1 % in half of this time."""
+FOLLOWED_POINTS = 200
+FOLLOWED_S = 2.0
+"""Number of frequency steps that imitate a sweep (small steps cause small transients); time per step [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementPrediction(Tabular):
+    """Responses to sines with the base amplitude of the plan or of the rig's model."""
+
+    measurement: Measurement
+    prediction: ResponsePrediction
+    basis: str
+    """Source of the base amplitude, in words."""
+    approach: Approach
+    """Initial state of each simulated point: rest, or the final state of the previous point."""
+    specimen_name: str
+    """Name of the specimen in the rig's configuration."""
+
+    @property
+    def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:
+        """Return the frequency bands with predicted collisions."""
+        return bands_of(self.prediction.frequency_hz, self.prediction.is_colliding)
+
+    @property
+    def base_text(self) -> str:
+        """Return the base amplitude or its range as text."""
+        bounds = (np.min(self.prediction.amplitude_m), np.max(self.prediction.amplitude_m))
+        return " to ".join(dict.fromkeys(f"{1e6 * each:.3g} µm" for each in bounds))
+
+    @property
+    def model(self) -> str:
+        """Return the name of the model for a legend."""
+        gaps = " and ".join(f"{1e6 * each:g}" for each in dict.fromkeys(self.prediction.specimen.gaps_m))
+        return f"{self.specimen_name}, gap {gaps} µm"
+
+
+def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrediction:
+    """Simulate the specimen of a rig over the excited band of a measurement."""
+    specimen = rig.specimen.specimen()
+    low_hz, high_hz = measurement.excitation.band_hz
+    approach = measurement.excitation.approach
+    match approach:
+        case Approach.REST:
+            grid, each_s = prediction_grid(specimen, low_hz, high_hz), SIMULATED_S
+            grid = grid[:: -(-len(grid) // MOST_POINTS)]
+        case Approach.UP | Approach.DOWN:
+            grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
+    base = base_motion(measurement.excitation, rig, grid)
+    prediction = predict(specimen, grid, base.amplitude_m, duration_s=each_s, approach=approach)
+    return MeasurementPrediction(measurement, prediction, base.basis, approach, rig.specimen.name)
+
+
+def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
+    """Return the bands of points flagged in ``is_inside``; bands end halfway to the next unflagged point."""
+    middles = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
+    lows = np.concatenate([frequency_hz[:1], middles])
+    highs = np.concatenate([middles, frequency_hz[-1:]])
+    return tuple((float(lows[first]), float(highs[stop - 1])) for first, stop in runs_of(is_inside))

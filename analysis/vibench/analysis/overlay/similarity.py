@@ -10,9 +10,9 @@ from ..signals.arrays import Flags, Reals
 from ..tables import Tabular
 
 SIMILARITY_THRESHOLD = 0.1
-"""Largest `Similarity.difference` of similar points (Gong et al. 2025, section 4)."""
+"""Largest `Similarity.difference` at which points count as similar (Gong et al. 2025, section 4)."""
 DRAWS = 2000
-"""Number of bootstrap resamples, with which an interval's limits scatter by about a fortieth of its width."""
+"""Number of bootstrap resamples; with these, an interval's limits scatter by about 1/40 of its width."""
 CONFIDENCE = 0.95
 
 
@@ -49,7 +49,7 @@ class SimilarityCurve:
             raise InvalidRequest("the frequencies of a curve do not ascend; sort them, and remove duplicates")
         if not 0.0 < self.amplitude_m < np.inf:
             raise InvalidRequest(
-                f"a drive amplitude of {self.amplitude_m} m is not allowed; give a positive one"
+                f"a drive amplitude of {self.amplitude_m} m is not allowed; give a positive amplitude"
             )
 
     def at(self, frequency_hz: Reals) -> "SimilarityCurve":
@@ -130,11 +130,11 @@ def similarity(
             "the curves have different frequencies; interpolate one of them with SimilarityCurve.at"
         )
     if not threshold > 0.0:
-        raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")
+        raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive value, such as 0.1")
     base, other = reference.logarithm(logarithm_of), model.logarithm(logarithm_of)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.abs(other - base) / np.abs(base)
-    # Equal curves are similar even if the logarithm of the reference is zero.
+    # Equal values have no difference, even if the logarithm of the reference is zero.
     difference = np.where(other == base, 0.0, ratio)
     known = np.isfinite(base) & np.isfinite(other)
     if not known.any():
@@ -156,7 +156,7 @@ def similarity(
 
 
 def _block_length(flags: Reals) -> int:
-    """Return twice the correlation length of similarity flags, at least the cube root of their number."""
+    """Return twice the correlation length of flags, but at least the cube root of the number of flags."""
     count = flags.size
     usual = int(np.ceil(count ** (1 / 3)))
     centred = flags - flags.mean()

@@ -64,7 +64,7 @@ def lowest_frequency_hz(measurement: Measurement) -> float:
 
 
 def advance(samples: Reals, by_samples: float) -> Reals:
-    """Return the signal advanced by a number of samples (may be fractional), via its spectrum's phase."""
+    """Advance a signal by a whole or fractional number of samples, via the phase of its spectrum."""
     if by_samples == 0.0:
         return samples
     spectrum = np.fft.rfft(samples)
@@ -73,9 +73,9 @@ def advance(samples: Reals, by_samples: float) -> Reals:
 
 
 _PIECE_S = 5.0
-"""Duration that is simulated at once, to limit memory [s]."""
+"""Duration of a piece that is simulated at once [s], to limit memory."""
 _OVERLAP = 48
-"""Extra samples on each side of a piece; each extra sample multiplies a spline's end effect by 0.27."""
+"""Number of extra samples on each side of a piece; each one multiplies the spline's end effect by 0.27."""
 _VX = 3
 _STATE = 6
 
@@ -91,19 +91,19 @@ class SimulatedChannels(RecordedChannels):
     base_acceleration: Samples
     """Acceleration of the simulated or recorded table that drove the specimen, shape (samples,) [m/s2]."""
     has_sensors: bool
-    """Whether the velocity includes delay and gain of the recorded channel; the true velocity does not."""
+    """Whether the velocity includes the recorded channel's delay and gain, unlike the true velocity."""
 
     @property
     def response_delay_s(self) -> float:
         """Lag of the response channel behind the base channel [s]."""
-        # A simulated response without a sensor has no delay, but the recorded base may have one.
+        # A simulated response without a sensor has no delay, but the recorded base may have a delay.
         return super().response_delay_s if self.has_sensors else -self.recording.channel(BASE).delay_s
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
         """Ratio of the response sensor's gain to the base sensor's, without their delays."""
         if self.has_sensors:
             return super().response_gain(frequency_hz)
-        # The recorded base motion includes its sensor's effect, and the simulated response has no sensor.
+        # The base motion recorded by a sensor drove the simulation. The simulated response has no sensor.
         return np.ones(frequency_hz.size, dtype=np.complex128)
 
     def read(self, start: int, stop: int) -> Reals:

@@ -5,7 +5,7 @@ request after the other and sends results in pieces; requests can be cancelled. 
 and computing time of each accuracy.
 
 >>> from vibench.analysis.prediction.progress import SimulationRequest
->>> from vibench.analysis.prediction.accuracy_cost import cost_sentences
+>>> from vibench.analysis.prediction.progress import cost_sentences
 >>> request = SimulationRequest(start_hz=250.0, stop_hz=270.0, step_hz=5.0)
 >>> request.models, request.points
 (('hertz', 'linear'), 10)

@@ -23,13 +23,13 @@ def field_docstring(model: type[BaseModel], name: str) -> str:
 
 @cache
 def _docstrings(module: str) -> Mapping[tuple[str, str], str]:
-    """Read the docstrings of all fields in a module's classes, as soon as one of them is needed.
+    """Read the docstrings of all fields in a module's classes, when the first docstring is needed.
 
     Pydantic's ``use_attribute_docstrings`` reads them when a class is defined: 22 ms at every start.
     """
     try:
         tree = ast.parse(inspect.getsource(sys.modules[module]))
-    except OSError:  # installed without sources, so fields have no explanations
+    except OSError:  # without source files, no field is explained
         return {}
     return {
         (each.name, field.target.id): inspect.cleandoc(text.value.value)

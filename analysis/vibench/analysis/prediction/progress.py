@@ -19,6 +19,7 @@ from vibench.sim import (
     Harmonic,
     MotionKind,
     Observable,
+    PowerLaw,
     Scene,
     StartMemory,
     integrate,
@@ -35,7 +36,7 @@ from vibench.sim.study import (
     frequency_range,
 )
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..comparison import Curve, CurveKind, CurveOrigin
 from ..dynamics import (
     BranchLine,
     ChainRun,
@@ -51,7 +52,7 @@ from ..signals.arrays import Reals, runs_of
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256
-"""Number of drive periods that the picture of a motion shows, and samples per period."""
+"""Number of drive periods in the picture of a motion, and number of samples per period."""
 MOST_CELLS = 200_000
 """Maximum number of map cells in a window; compute larger maps with `vibench map` and open them."""
 
@@ -105,7 +106,7 @@ class MapRequest(SpecimenChoice):
 
 @dataclass(frozen=True, eq=False)
 class MapPicture:
-    """A map as far as it is computed; a cell not yet computed shows the nearest computed cell."""
+    """The map computed so far; each missing cell shows the value of the nearest computed cell."""
 
     frequency_hz: tuple[float, float]
     """Lower and upper edge of the picture [Hz]."""
@@ -144,35 +145,34 @@ class SettledMotion:
     """Amplitude spectrum of x, from whole drive periods."""
 
 
-class PicturingStore(MemoryStore):
-    """Store that keeps a map in memory and sends a picture at most every 0.5 s."""
+class WatchedStore(MemoryStore):
+    """Store that keeps results in memory and passes them on."""
 
-    def __init__(self, plan: Map, tell: Callable[[MapPicture], None]) -> None:
+    def __init__(self, plan: Study | Map, watch: Callable[[Sequence[PointAnswer]], None]) -> None:
         super().__init__(plan)
-        self._map, self._tell = plan, tell
-        self._picture_s = -BETWEEN_PICTURES_S
+        self._watch = watch
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results, and send a picture if the last picture is older than 0.5 s."""
+        """Store results, and pass them on."""
         super().keep(answers)
-        if time.monotonic() - self._picture_s >= BETWEEN_PICTURES_S:
-            self.show()
-
-    def show(self) -> None:
-        """Send a picture of the results so far."""
-        self._tell(picture_of(MapResults(self._map, self.arrays)))
-        self._picture_s = time.monotonic()
+        self._watch(answers)
 
 
 def map_pictures(
     request: MapRequest, tell: Callable[[MapPicture], None], cancelled: Callable[[], bool]
 ) -> None:
-    """Compute a map and send pictures while it grows; the last picture is complete unless cancelled."""
-    plan = request.plan
-    store = PicturingStore(plan, tell)
+    """Compute a map and send a picture at most every 0.5 s; unless cancelled, the last one is complete."""
+    plan, sent_s = request.plan, [-BETWEEN_PICTURES_S]
+
+    def show(_: Sequence[PointAnswer]) -> None:
+        if time.monotonic() - sent_s[-1] >= BETWEEN_PICTURES_S:
+            tell(picture_of(MapResults(plan, store.arrays)))
+            sent_s[-1] = time.monotonic()
+
+    store = WatchedStore(plan, show)
     with executor_of(None, None, map_solver(plan)) as executor:
         compute_map(plan, executor, store, cancelled=cancelled)
-    store.show()
+    tell(picture_of(MapResults(plan, store.arrays)))
 
 
 def picture_of(results: MapResults) -> MapPicture:
@@ -240,7 +240,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
 
 @dataclass(frozen=True)
 class SimulatedPoint:
-    """Result of one model at one frequency; a value is None if it was not requested or not found."""
+    """Result of one model at one frequency; values that were not requested or not found are None."""
 
     model: str
     frequency_hz: float
@@ -286,7 +286,7 @@ PartialResult = (
     | Trouble
 )
 MOST_POINTS = 20_000
-"""Maximum number of points of both models together; more take hours, and a plot cannot resolve them."""
+"""Maximum number of points of both models together; more points take hours and cannot be seen in a plot."""
 
 
 class Exponent(StrEnum):
@@ -318,9 +318,9 @@ class SimulationRequest(SpecimenChoice):
     budget_s: NonNegativeFloat = BUDGET_S
     """Maximum processor time per point to try other initial states if the motion depends on them; 0: none."""
     error: TargetError | None = None
-    """Requested relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
+    """Target relative error at each point, such as 0.01; replaces accuracy, duration and budget."""
     time_s: TargetTime | None = None
-    """Time limit per point, with or without a requested error."""
+    """Time limit per point, with or without a target error."""
     exponent: Exponent = Exponent.LEFT_OUT
     """Whether to compute the largest Lyapunov exponent, which about doubles the computing time."""
     signal_hz: PositiveFloat | None = 260.0
@@ -328,7 +328,7 @@ class SimulationRequest(SpecimenChoice):
 
     @model_validator(mode="after")
     def _is_a_study(self) -> Self:
-        """Refuse requests that would take too long, or that the study refuses (with the study's error)."""
+        """Refuse requests that would take too long; requests that the study refuses raise its error."""
         points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
         if points > MOST_POINTS:
             raise ValueError(
@@ -359,7 +359,7 @@ class SimulationRequest(SpecimenChoice):
             window_s=self.window_s,
             error=self.error,
             time_s=self.time_s,
-            **({} if self.has_target else self._by_hand),
+            **({} if self.has_target else self.model_dump(include={"accuracy", "duration_s", "budget_s"})),
         )
 
     @property
@@ -368,18 +368,9 @@ class SimulationRequest(SpecimenChoice):
         return self.error is not None or self.time_s is not None
 
     @property
-    def _by_hand(self) -> dict[str, object]:
-        return {"accuracy": self.accuracy, "duration_s": self.duration_s, "budget_s": self.budget_s}
-
-    @property
     def points(self) -> int:
         """Number of simulated points, for all models together."""
         return self.study.grid.size
-
-    @property
-    def simulated_s(self) -> float:
-        """Simulated time of all points [s]."""
-        return self.points * self.duration_s
 
 
 MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Share of starts", "Motion")
@@ -529,3 +520,73 @@ class SimulationProgress:
             return similarity(curves[0], curves[1])
         except AnalysisError:
             return None
+
+
+MACHINE = "one core of a 2-core AMD EPYC"
+"""Machine on which speeds and errors were measured; `vibench tradeoff` measures them on your machine."""
+
+
+@dataclass(frozen=True)
+class MeasuredLevel:
+    """Speed (simulated seconds per core second) and error of one accuracy level, for the paper's specimen."""
+
+    free: float
+    """Speed without impacts: Hertz's contact, 260 Hz and 1 um."""
+    periodic: float
+    """Speed with periodic impacts: 130 Hz and 20 um."""
+    chaos: float
+    """Speed in chaos: 260 Hz and 5 um."""
+    power: float
+    """Speed with the contact law power:3, whose force acts at every p: 150 Hz and 10 um."""
+    state_error: float
+    """Error of the state of a periodic motion after 2 s, in units of 100 um and 0.1 m/s."""
+    response_i_error: float
+    """Relative error of Response I of a periodic motion, compared with the level `reference`."""
+
+
+MEASURED = {
+    Accuracy.QUICK: MeasuredLevel(21015.0, 3603.0, 3084.0, 3368.0, 4.9e-10, 2.9e-10),
+    Accuracy.STANDARD: MeasuredLevel(21501.0, 4182.0, 3077.0, 2902.0, 4.9e-10, 2.9e-10),
+    Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
+}
+CHAOS_SCATTER = 0.03
+"""Relative scatter of Response I between different initial states in chaos; equal for all accuracy levels."""
+
+
+def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
+    """Return sentences on error and computing time of a request on ``cores`` idle cores."""
+    if request.has_target:
+        wish = "" if request.error is None else f" to an error of {100.0 * request.error:g} %"
+        limit = "a minute" if request.time_s is None else f"{request.time_s:g} s"
+        return (f"{request.points} points, each{wish} within {limit}, on {cores} idle cores.",)
+    level = MEASURED[request.accuracy]
+    each_s = request.points * request.duration_s / len(request.models)
+    laws = [request.specimen_under(model).contact for model in request.models]
+    powers = [isinstance(law, PowerLaw) for law in laws]
+    shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
+    longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
+    on_top = "; about twice as long with the exponent" if request.exponent is Exponent.COMPUTED else ""
+    if request.budget_s > 0.0:
+        on_top += f"; up to {request.budget_s:g} core seconds more if a motion depends on its initial state"
+    error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
+    shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
+    return (
+        (
+            f"{request.points} points of {request.duration_s:g} s on {cores} idle cores: "
+            f"{shortest} without impacts to {longest} in chaos{on_top}."
+        ),
+        (
+            f"One core second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of "
+            f"periodic impacts, {level.chaos:.0f} s of chaos, {level.power:.0f} s of a power law."
+        ),
+        (
+            f"Error of a periodic state: {level.state_error:.0e}; of Response I, relative to the reference: "
+            f"{error}. In chaos, Response I scatters by {CHAOS_SCATTER:.0%} at every accuracy."
+        ),
+        f"Measured on {MACHINE}.",
+    )
+
+
+def _time(seconds: float) -> str:
+    minute = 60.0
+    return f"{seconds:.2g} s" if seconds < minute else f"{seconds / minute:.2g} min"

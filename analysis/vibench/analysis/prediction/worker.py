@@ -29,6 +29,7 @@ from .progress import (
     SimulatedSignal,
     SimulationRequest,
     Trouble,
+    WatchedStore,
     map_pictures,
     settled_motion,
 )
@@ -38,34 +39,21 @@ SIGNAL_PERIODS = 12
 SAMPLES_PER_PERIOD = 400
 
 
-class _TellingStore(MemoryStore):
-    """Store that keeps results in memory and sends each result once."""
-
-    def __init__(self, study: Study, tell: Tell) -> None:
-        super().__init__(study)
-        self._study = study
-        self._tell = tell
-
-    def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store results, and send them to the window."""
-        super().keep(answers)
-        self._tell(tuple(self._pieces(answers)))
-
-    def _pieces(self, answers: Sequence[PointAnswer]) -> Iterator[PartialResult]:
-        study = self._study
-        for answer in answers:
-            place = study.grid.place(answer.number)
-            model, frequency_hz = study.models[place[0]], study.frequencies_hz[place[-1]]
-            if answer.state is PointState.FAILED:
-                message = bytes(self.arrays[MESSAGE][answer.number]).decode()
-                yield Trouble(f"{model} at {frequency_hz:g} Hz: {message}")
-                continue
-            amplitude_m = study.amplitudes_m[place[-3]]
-            found = prediction_at(
-                self.arrays, answer.number, frequency_hz, amplitude_m, study.accuracy, Start.REST.value
-            )
-            keys = "frequency_hz response_i response_ii impacts lyapunov_per_s memory ensemble"
-            yield SimulatedPoint(model, **columns(found, keys))
+def _pieces(store: MemoryStore, study: Study, answers: Sequence[PointAnswer]) -> Iterator[PartialResult]:
+    """Yield the results of a study's points as pieces for the window."""
+    for answer in answers:
+        place = study.grid.place(answer.number)
+        model, frequency_hz = study.models[place[0]], study.frequencies_hz[place[-1]]
+        if answer.state is PointState.FAILED:
+            message = bytes(store.arrays[MESSAGE][answer.number]).decode()
+            yield Trouble(f"{model} at {frequency_hz:g} Hz: {message}")
+            continue
+        amplitude_m = study.amplitudes_m[place[-3]]
+        found = prediction_at(
+            store.arrays, answer.number, frequency_hz, amplitude_m, study.accuracy, Start.REST.value
+        )
+        keys = "frequency_hz response_i response_ii impacts lyapunov_per_s memory ensemble"
+        yield SimulatedPoint(model, **columns(found, keys))
 
 
 def simulate(
@@ -80,9 +68,10 @@ def simulate(
             return
         tell((simulated_signal(request, model, request.signal_hz or 0.0),))
     study = request.study
+    store = WatchedStore(study, lambda answers: tell(tuple(_pieces(store, study, answers))))
     executor = ThreadExecutor(workers)
     try:
-        run_study(study, executor, _TellingStore(study, tell), cancelled=cancelled)
+        run_study(study, executor, store, cancelled=cancelled)
     finally:
         executor.close()
 

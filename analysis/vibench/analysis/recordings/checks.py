@@ -38,14 +38,14 @@ class Check:
 
 
 _LEAST_SHARE_OF_RANGE = 1e-3
-"""Minimum fraction of the input range that a channel should use, so that the converter resolves it."""
+"""Minimum fraction of the input range that a signal should use, so that the converter resolves it."""
 _FARTHEST = 1000.0
 """Largest plausible ratio of the motions of mass and base, or of base and mass, far from a resonance."""
 _OFTEN_DARK = 0.01
 """Fraction of a recording in vibrometer drop-outs above which a warning is given."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
-"""Largest relative overshoot of the drive over its set level that noise and converter filter explain."""
+"""Largest overshoot of the drive, relative to its set level, that noise and converter filter can cause."""
 _SHORTFALL = 0.15
 """Largest relative shortfall of the drive peak below its set level; also the limit of a bench check."""
 
@@ -142,7 +142,7 @@ def _overloads(facts: RecordingFacts) -> Check:
     what = left_out if is_noise else doubt
     if facts.dropouts and facts.response in facts.overload_s:
         what = (
-            "the vibrometer lost its light for longer than can be bridged, or peaks were cut: check the "
+            "the vibrometer lost its signal for longer than can be bridged, or peaks were cut: check the "
             "velocity at these times, and do not trust Response I"
         )
     return Check("Overloads", Verdict.WARNING, f"near full scale: {', '.join(parts)}; {what}")
@@ -152,8 +152,8 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
     if facts.dropouts:
         times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
         text = (
-            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in total; its motion "
-            "was interpolated then, which misses effects of impacts. Refocus the laser, or apply "
+            f"the vibrometer lost its signal {times}, for {facts.dropout_s:.2g} s in total; the motion was "
+            "interpolated at these times, which misses effects of impacts. Refocus the laser, or apply "
             "reflective tape"
         )
         often = facts.dropout_s > _OFTEN_DARK * facts.duration_s
@@ -170,7 +170,7 @@ def _lost_samples_check(facts: RecordingFacts) -> Check:
 def _drive(facts: RecordingFacts) -> Iterator[Check]:
     setting_v = facts.measurement.excitation.highest_amplitude_vpp / 2
     reached_v = facts.level(DRIVE).peak
-    text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
+    text = f"a peak of {reached_v:.4g} V was recorded for a setting of {2 * setting_v:g} V peak to peak"
     if reached_v < _least_peak_v(facts):
         text += "; the drive was weaker than planned: results refer to the recorded levels"
         yield Check("Drive level", Verdict.WARNING, text)
@@ -191,7 +191,7 @@ def _least_peak_v(facts: RecordingFacts) -> float:
         return 0.0
     try:
         generator = GeneratorConfig.model_validate(facts.bench.get("generator"))
-    except ValidationError:  # a recording that was imported, or written by another version
+    except ValidationError:  # the recording was imported, or is of another version
         return 0.0
     terminal_v = excitation.highest_amplitude_vpp / 2 * generator.terminal_factor()
     missed = cos(pi * min(0.5, excitation.band_hz[1] / facts.sample_rate_hz))
@@ -215,10 +215,10 @@ def _scales(facts: RecordingFacts) -> Iterator[Check]:
     order = {"velocity": 1, "displacement": 2}.get(response.header.quantity, 0)
     low_hz, high_hz = facts.measurement.excitation.band_hz
     low, high = ((2 * pi * hz) ** order * response.span for hz in (low_hz, high_hz))
-    # Without damping, the amplitude at a resonance grows by pi f times that of the base per second.
+    # Without damping, a resonant amplitude grows every second by pi f times the amplitude of the base.
     farthest = max(_FARTHEST, 3 * pi * high_hz * facts.duration_s)
     is_absurd = low > farthest * base.span > 0 or high * _FARTHEST < base.span
-    if is_absurd and response.header.quantity != "force" and _is_acceleration(base.header.role, facts.bench):
+    if is_absurd and response.header.quantity != "force" and is_acceleration(base.header.role, facts.bench):
         text = (
             f"the mass moved about {low / base.span:.2g} times as far as the base; check the scales or "
             f"sensitivities of {facts.response} and {BASE}"
@@ -226,7 +226,7 @@ def _scales(facts: RecordingFacts) -> Iterator[Check]:
         yield Check("Scales", Verdict.WARNING, text)
 
 
-def _is_acceleration(role: str, bench: Mapping[str, Any]) -> bool:
+def is_acceleration(role: str, bench: Mapping[str, Any]) -> bool:
     """Return False if a channel was imported from the drive, or from a file that states another quantity."""
     imported = bench.get("imported", {})
     both = zip(imported.get("mapping", {}).get("channels", ()), imported.get("channels", ()), strict=False)

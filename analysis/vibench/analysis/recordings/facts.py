@@ -1,13 +1,16 @@
-"""Facts of a recording: the measurement, its instruments, and how it ended."""
+"""Facts of a recording: the measurement, its instruments, how it ended, and the level of each channel."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import reduce
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import AwareDatetime, BaseModel, Field, JsonValue, ValidationError
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
+    ChannelHeader,
     Dropout,
     EventKind,
     FeedbackNote,
@@ -21,17 +24,308 @@ from vibench.acquisition.recording import (
 )
 from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
-from ..errors import UnusableData
-from .channel_levels import ChannelLevel, channel_levels
-from .channels import OnRead, ignore_reading
-from .response import (
+from ..errors import NotEnoughData, UnusableData
+from ..signals.arrays import DEFAULT_BINS, Envelope, Integers, Reals, runs_of
+from .channels import (
     ACCELERATION,
+    BASE,
+    DRIVE,
     LOWEST_INTEGRATED_HZ,
     VELOCITY,
+    OnRead,
     ResponseChannel,
+    ignore_reading,
     response_role,
     response_roles,
 )
+
+_BLOCK_S = 2.0
+
+
+@dataclass(frozen=True)
+class ChannelLevel:
+    """Level of one channel over the whole recording."""
+
+    OWN_UNITS: ClassVar = {
+        "envelope": "{0.header.unit}",
+        "rms": "{0.header.unit}",
+        "peak": "{0.header.unit}",
+        "full_scale": "{0.header.unit}",
+        "flat_tops": "{0.header.unit}",
+    }
+
+    header: ChannelHeader
+    envelope: Envelope
+    rms: float
+    """RMS over the whole recording, including ramps and waits [unit of the channel]."""
+    peak: float
+    """Largest magnitude over the whole recording [unit of the channel]."""
+    full_scale: float
+    """Full scale of the converter's input [unit of the channel]."""
+    share_at_full_scale: float
+    """Fraction of the samples at or above 99.9 % of full scale."""
+    flat_tops: tuple[float, ...] = ()
+    """Values at which upper or lower peaks are clipped; empty without clipping [unit of the channel]."""
+    overflows: int = 0
+    """Least number of jumps by the whole span, as when integers overflow; 0 if the jumps are others."""
+
+    @property
+    def share_of_range(self) -> float:
+        """Peak of the channel divided by full scale."""
+        return self.peak / self.full_scale
+
+    @property
+    def span(self) -> float:
+        """Largest minus smallest value of the channel; zero if its signal is constant."""
+        return float(np.nanmax(self.envelope.upper) - np.nanmin(self.envelope.lower))
+
+
+def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tuple[ChannelLevel, ...]:
+    """Return the level of each channel from all samples; raises NotEnoughData when there are none."""
+    if recording.samples == 0:
+        why = f": {recording.reason}" if recording.reason else ""
+        raise NotEnoughData(
+            f"{recording.path.name} contains no samples ({recording.state.value}{why}); "
+            "there is nothing to analyse"
+        )
+    length = max(1, -(-recording.samples // DEFAULT_BINS))
+    block = length * max(1, round(_BLOCK_S * recording.sample_rate_hz / length))
+    offset = np.array([[each.physical_offset] for each in recording.channels])
+    full_scale = np.array([[abs(each.physical_per_volt) * each.range_v] for each in recording.channels])
+    parts = []
+    counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
+    lasting = np.zeros((len(recording.channels), 2), dtype=np.int64)
+    jump = np.zeros(len(recording.channels))
+    for each in recording.blocks(recording.roles, block):
+        parts.append(_extremes(each.values, length))
+        jump = np.fmax(jump, np.fmax.reduce(np.abs(np.diff(each.values)), axis=1, initial=0.0))
+        for row, shares in enumerate((each.values - offset) / full_scale):
+            bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) * ((_COUNTED - 1) / 2))
+            counts[row] += np.bincount(bins.astype(np.int64), minlength=_COUNTED)
+            lasting[row] = np.maximum(lasting[row], _lasting(bins))
+        on_read(each.first_sample + each.values.shape[1], recording.samples)
+    lower, upper, power = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+    if np.isnan(lower).all():
+        raise NotEnoughData(f"all samples of {recording.path.name} were lost; there is nothing to analyse")
+    bins, span = lower.shape[1], np.nanmax(upper, axis=1) - np.nanmin(lower, axis=1)
+    time_s = np.minimum((np.arange(bins) + 0.5) * length, recording.samples) / recording.sample_rate_hz
+    return tuple(
+        ChannelLevel(
+            header=header,
+            envelope=Envelope(time_s, lower[row], upper[row]),
+            rms=float(np.sqrt(np.nansum(power[row]) / counts[row].sum())),
+            peak=float(np.nanmax(np.maximum(np.abs(lower[row]), np.abs(upper[row])))),
+            full_scale=float(full_scale[row, 0]),
+            share_at_full_scale=float(1 - counts[row, _CLIPPED:-_CLIPPED].sum() / counts[row].sum()),
+            flat_tops=tuple(
+                value
+                for side, highest in zip((1, -1), lasting[row], strict=True)
+                if (top := _flat_top(counts[row, ::side], highest, header, full_scale[row, 0])) is not None
+                and not _rests_at(
+                    value := float(
+                        offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0]
+                    ),
+                    lower[row],
+                    upper[row],
+                )
+            ),
+            overflows=_overflows(recording, header.role, np.nanmin(lower[row]), span[row], block)
+            if header.role != DRIVE and jump[row] > _HALF * span[row]
+            else 0,
+        )
+        for row, header in enumerate(recording.channels)
+    )
+
+
+_COUNTED = 2**16 + 1
+"""Number of bins over the input range, used to find flat tops."""
+_CLIPPED = 33
+"""Bins at each end of the range, from 99.9 % of full scale; converters clip just below full scale."""
+_TOPS = (0.1, 0.03, 0.01)
+"""Heights of the top parts of a peak that are examined for clipping, relative to the peak's height."""
+_FLAT = 0.88
+"""Minimum fraction of a clipped top's samples in its upper half; smooth peaks: 0.71, straight peaks: 0.84."""
+_FLAT_VALUE = 0.4
+"""In the upper half of a clipped peak, at least this fraction of the samples has the clipped value."""
+_FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
+_FEWEST_STEPS = 40
+"""Minimum height of a peak [converter steps]: a sine of 16 steps has 0.42 of its samples at two values."""
+_GAP, _GAP_IN_TOP = 0.01, 0.15
+"""Largest range without values in a smooth peak, relative to the peak's height and to the top's height."""
+_AS_FREQUENT = 0.4
+"""Largest number of samples at one value below a clipped peak, relative to the number of clipped samples."""
+
+
+def _lasting(bins: Reals) -> tuple[int, int]:
+    """Return the highest bin that three successive samples reach, in the signal and in its mirror image."""
+    if bins.size < 3:
+        return 0, 0
+    three = bins[:-2], bins[1:-1], bins[2:]
+    return int(reduce(np.minimum, three).max()), int(_COUNTED - 1 - reduce(np.maximum, three).min())
+
+
+def _flat_top(counts: Integers, lasting: int, header: ChannelHeader, full_scale: float) -> int | None:
+    """Return the value at which the upper peaks are clipped; None without clipping, or if this is unclear.
+
+    If the sample clock is locked to the drive, every period has the same few values. The histogram of a
+    smooth peak may then look clipped, but has an empty range above ``lasting``, the highest bin that three
+    successive samples reach.
+    """
+    filled = np.flatnonzero(counts)
+    if filled.size < 2:
+        return None
+    total = np.cumsum(counts)
+    top, middle = int(filled[-1]), int(np.searchsorted(total, total[-1] / 2))
+    height, at_top = top - middle, int(counts[top - 1 :].sum())
+
+    def count_above(value: float) -> int:
+        return int(total[-1] - total[max(0, int(value))])
+
+    if height < _LEAST_HEIGHT * (top - filled[0]) or at_top == total[-1]:
+        return None
+    step = 0.0 if header.volts_per_count is None else header.volts_per_count * abs(header.physical_per_volt)
+    resolution = max(1.0, step / full_scale * _COUNTED / 2)
+    gap = max(0, int(np.diff(filled[filled >= lasting]).max(initial=0)) - resolution)
+    if height > _FEWEST_STEPS * resolution and at_top >= max(
+        _FEWEST_AT_TOP, _FLAT_VALUE * count_above(top - height / 2)
+    ):
+        other = int(counts[middle + 1 : top - 1].max(initial=0))
+        if gap <= _GAP * height or 0 < other <= _AS_FREQUENT * at_top:
+            return top
+    for share in _TOPS:
+        whole = count_above(top - share * height)
+        values = int(np.count_nonzero(counts[int(top - share * height) :]))
+        is_resolved = share * height > _FEWEST_VALUES * resolution and gap <= _GAP_IN_TOP * share * height
+        is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
+        if is_resolved and is_counted and count_above(top - share * height / 2) > _FLAT * whole:
+            return top
+    return None
+
+
+_HALF, _FEWEST_OVERFLOWS = 0.5, 3
+_SMOOTH = 0.6
+"""Power of second differences / power of first differences: at most this if smooth, at least 1.8 in noise."""
+_LEAST_MOTION = 2e-3
+"""Smallest step near overflows, relative to the span; a square wave has smaller steps."""
+_AS_ROUGH, _ROUGHEST = 4.0, 0.15
+"""Power of second differences at overflows, at most, relative to the whole signal; largest rms of the latter,
+relative to the span."""
+_INNER, _OUTER = 0.1, 3
+"""Least fraction of the samples in the inner half of the span (a square wave has none), and least number of
+samples in the outer half for each overflow (a spike has one or two)."""
+
+
+def _overflows(recording: Recording, role: str, low: float, span: float, block: int) -> int:
+    """Return the number of jumps by over half the span if a signal is smooth without them; otherwise 0.
+
+    Integer overflows are jumps by the span, up as often as down. If a noisy signal fills its span, it is
+    enough that it is as smooth at the jumps as elsewhere. Samples of a fast sine are smooth only in the order
+    of the drive's phase.
+    """
+    sums = np.zeros((2, 8))
+    for each in recording.blocks((DRIVE, role) if DRIVE in recording.roles else (role, role), block):
+        values = (each.values[1] - low) / span
+        is_inner = np.abs(values - 0.5) < _HALF / 2
+        for row, order in enumerate((slice(None), np.argsort(_turns(each.values[0]), kind="stable"))):
+            steps = np.nan_to_num(np.diff(values[order]))
+            jumps = np.sign(steps) * (np.abs(steps) > _HALF)
+            steps -= jumps
+            at = np.flatnonzero(jumps[1:-1])
+            near = steps[at + np.arange(3)[:, np.newaxis]]
+            powers = near**2 / 3, np.diff(near, axis=0) ** 2 / 2, steps**2, np.diff(steps) ** 2
+            places = np.count_nonzero(is_inner), np.count_nonzero(~is_inner)
+            sums[row] += (at.size, np.count_nonzero(jumps[at + 1] > 0), *map(np.sum, powers), *places)
+    count, up, near, bends_near, motion, bends, inner, outer = sums.T
+    is_smooth = bends_near < _SMOOTH * near
+    is_smooth &= (bends < _SMOOTH * motion) & (near > _LEAST_MOTION**2 * count)
+    is_even = (count >= _FEWEST_OVERFLOWS) & (np.minimum(up, count - up) >= count / 4)
+    is_alike = bends_near * (inner + outer) < _AS_ROUGH * bends * count
+    is_filled = (inner > _INNER * (inner + outer)) & (outer >= _OUTER * count)
+    is_quiet = bends < _ROUGHEST**2 * (inner + outer)
+    return int(np.max(count * (is_even & (is_smooth | (is_alike & is_filled & is_quiet)))))
+
+
+def _turns(drive: Reals) -> Reals:
+    """Return the phase of a sine at its samples [turns], from 0 to 1; 0 if there are too few samples."""
+    half = drive.size // 2
+    if half == 0:
+        return np.zeros(drive.size)
+    halves = np.nan_to_num(drive[: 2 * half]).reshape(2, half)
+    first, second = np.fft.rfft((halves - np.mean(halves)) * np.hanning(half))
+    line = int(np.argmax(np.abs(first)))
+    advance = float(np.angle(second[line] * np.conj(first[line]))) / (2 * np.pi)
+    return np.arange(drive.size, dtype=np.float64) * (round(line - advance) + advance) / half % 1
+
+
+def _rests_at(value: float, lower: Reals, upper: Reals) -> bool:
+    """Return whether an envelope stays near a value for long, like the envelope of a free body before a hit.
+
+    If a signal has only one value, it counts as rest only at zero: a saturated amplifier is also constant.
+    """
+    is_near = np.maximum(abs(lower - value), abs(upper - value)) < _REST[0] * np.nanmax(
+        upper - np.nanmin(lower)
+    )
+    is_constant = (lower == upper) & (upper != 0)
+    if not np.any(is_constant & ~is_near):
+        is_near &= ~is_constant
+    longest = np.diff(runs_of(is_near), axis=1).max(initial=0)
+    return bool(longest >= _REST[1] * lower.size)
+
+
+_REST = 0.05, 0.02
+"""Largest motion at rest, relative to the signal's span; shortest rest, relative to the recording length."""
+_LEAST_HEIGHT = 0.1
+"""Smallest height of a peak above the median, relative to the span; below, the signal is at rest."""
+
+
+def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
+    """Return the minimum, maximum and sum of squares of each bin, shape (channels, bins)."""
+    starts = np.arange(0, values.shape[1], length)
+    low, high = np.fmin.reduceat(values, starts, axis=1), np.fmax.reduceat(values, starts, axis=1)
+    return low, high, np.add.reduceat(np.where(np.isnan(values), 0.0, values) ** 2, starts, axis=1)
+
+
+_CLIPPED_SHARE = 0.2
+"""Largest fraction of samples at full scale in a usable channel; a sine just up to full scale has 3 %."""
+
+
+def require_moving_channels(
+    levels: Sequence[ChannelLevel], response: str, others: Collection[str] = (DRIVE, BASE)
+) -> None:
+    """Refuse unusable channels; ``response`` is the analysed channel.
+
+    Raises UnusableData with one sentence that names every unusable channel and says what to check.
+    """
+    used = (*others, response)
+    faults = [each for level in levels if level.header.role in used for each in _faults(level)]
+    if faults:
+        raise UnusableData("; ".join(faults))
+
+
+def _faults(level: ChannelLevel) -> Iterator[str]:
+    role = level.header.role
+    if level.span == 0:
+        yield (
+            f"all samples of {role} have the same value, so its sensor or its cable gave no signal; "
+            "check both and measure again"
+        )
+    elif level.overflows:
+        yield (
+            f"{role} jumps at least {level.overflows} times by its whole span, and is smooth without these "
+            "jumps, as if integers had overflowed; export it as floating-point numbers or as wider integers"
+        )
+    elif level.share_at_full_scale > _CLIPPED_SHARE:
+        yield (
+            f"{role} was at its full scale of {level.full_scale:.3g} {level.header.unit} for "
+            f"{100 * level.share_at_full_scale:.0f} % of the time, so its waveform is clipped; "
+            "choose a larger range or a smaller drive and measure again"
+        )
+
+
+def require_usable(recording: Recording, response: str, *others: str) -> None:
+    """Refuse unusable channels of a recording, from all its samples, like `require_moving_channels`."""
+    require_moving_channels(channel_levels(recording), response, others)
+
 
 MOST_BYTES = 1e9
 """Required memory [bytes] up to which a recording is not checked against the size of its file."""
@@ -42,20 +336,20 @@ LARGEST_PACKING = 16.0
 
 
 def require_measured_size(recording: Recording) -> None:
-    """Refuse a small file that declares more samples than fit into memory; raises UnusableData.
+    """Refuse a small file that declares more samples than memory can hold; raises UnusableData.
 
     All other recordings need memory in proportion to the size of their files.
     """
     if recording.samples * BYTES_A_SAMPLE > MOST_BYTES and recording.packing > LARGEST_PACKING:
         raise UnusableData(
             f"{recording.path.name} declares {recording.samples} samples, compressed {recording.packing:.0f} "
-            "times, which data of a converter do not allow. Nothing was read; if the data were computed, "
-            "read them with h5py, or export some seconds (--from, --until)"
+            "times, which is impossible for data of a converter. Nothing was read; if the data were "
+            "computed, read them with h5py, or export some seconds (--from, --until)"
         )
 
 
 def require_checked(recording: Recording) -> None:
-    """Check a recording against its seal if not yet done in this process; raises like `require_intact`."""
+    """Check a recording against its seal, once per process; raises like `require_intact`."""
     if not recording.is_checked:
         require_intact(recording)
 
@@ -68,8 +362,8 @@ def require_intact(recording: Recording) -> SealCheck:
     found = recording.check_seal(SealDepth.WHOLE)
     if found.state is SealState.DAMAGED:
         raise UnusableData(
-            f"{recording.path.name} is damaged ({found.sentence}), so its data cannot be trusted; "
-            "restore it from a copy, or measure again"
+            f"{recording.path.name} is damaged ({found.sentence}), so its data cannot be trusted; restore "
+            "the file from a copy, or measure again"
         )
     return found
 
@@ -150,12 +444,14 @@ def recording_facts(
     if response.endswith(ACCELERATION) and low_hz < LOWEST_INTEGRATED_HZ:
         raise UnusableData(
             f"{recording.path.name}: the plan starts at {low_hz:g} Hz, but {response} can be integrated only "
-            f"from {LOWEST_INTEGRATED_HZ:g} Hz on; measure a velocity or displacement"
+            f"at {LOWEST_INTEGRATED_HZ:g} Hz or more; measure a velocity or displacement"
         )
     _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
-    dropouts = _dropouts(recording, response)
+    dropouts: tuple[Dropout, ...] = ()
+    if response in response_roles(recording):
+        dropouts = ResponseChannel(recording, response).dropouts(0, recording.samples)
     for each in recording.overloads:
         if each.channel == response and any(
             one.first <= each.first_sample and each.last_sample < one.stop for one in dropouts
@@ -189,19 +485,13 @@ def recording_facts(
     )
 
 
-def _dropouts(recording: Recording, response: str) -> tuple[Dropout, ...]:
-    if response not in response_roles(recording):
-        return ()
-    return ResponseChannel(recording, response).dropouts(0, recording.samples)
-
-
 def plan_of(recording: Recording) -> Measurement:
     """Return the plan of a recording; raises UnusableData when this version cannot read it."""
     try:
         return Measurement.model_validate(recording.plan)
     except ValidationError as error:
         first = error.errors()[0]
-        if first["loc"] == ("excitation",) and first["type"] == "value_error":  # its package is missing
+        if first["loc"] == ("excitation",) and first["type"] == "value_error":  # a package is missing
             raise UnusableData(f"{recording.path.name}: {fault_in_words(first)}") from error
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(

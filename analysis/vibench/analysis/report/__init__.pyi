@@ -47,5 +47,6 @@ from ._page import (
 )
 from ._report import (
     check_warnings as check_warnings,
+    draw_cards as draw_cards,
     write_report as write_report,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from vibench.sim.operating_system.this import replace_file
 
-from ..comparison.curve import Curve, curve_difference
+from ..comparison import Curve, curve_difference
 from ..errors import InvalidRequest
 from ..figures.comparison import comparison_figure
 from ..results.campaign_results import CampaignResults, without_copies
@@ -76,7 +76,7 @@ def write_comparison(
 
 def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     if not recordings:
-        raise InvalidRequest("a report without recordings was requested; add one to the comparison")
+        raise InvalidRequest("a report without recordings was requested; add a recording to the comparison")
     kept = [stored_result(each) for each in recordings]
     failures = tuple(failure for _, failed in kept for failure in failed)
     results = without_copies([result for result, _ in kept])

@@ -13,27 +13,28 @@ from vibench.sim import Specimen
 
 from ..chaos.verdict import MotionKind
 from ..dynamics import specimen_difference
-from ..figures.backbone import backbone_figure
-from ..figures.bench_levels import bench_levels_figure
-from ..figures.dwells import dwells_figure
+from ..figures.dwells import dwells_figure, portraits_figure, verdict_text
 from ..figures.ensemble_band import agreement_text
-from ..figures.hysteresis import hysteresis_figure
-from ..figures.noise import distortion_figure, excitation_figure, transmission_levels_figure
-from ..figures.portraits import portraits_figure, verdict_text
-from ..figures.scan import scan_figure
+from ..figures.recording import bench_levels_figure, excitation_figure
 from ..figures.stepped_sine import (
     STEPPED_FREQUENCIES,
     STEPPED_LEVELS,
     TRACKED_RESONANCE,
     SteppedLook,
+    backbone_figure,
     stepped_level_caption,
     stepped_sine_figure,
 )
 from ..figures.style import DrawnFigure
-from ..figures.sweep import regions_text, sweep_figure, sweep_orders_figure
-from ..figures.transmission import transmission_figure
+from ..figures.sweep import hysteresis_figure, regions_text, sweep_figure, sweep_orders_figure
+from ..figures.transmission import (
+    distortion_figure,
+    scan_figure,
+    transmission_figure,
+    transmission_levels_figure,
+)
 from ..frequency_response.scan import scans_of
-from ..kinds.analysis_kind import (
+from ..kinds import (
     AnyResult,
     DwellResult,
     NoiseResult,
@@ -42,8 +43,7 @@ from ..kinds.analysis_kind import (
     SweepResult,
 )
 from ..overlay.draws import CLOCK_TOLERANCE
-from ..overlay.overlay import AbstractOverlay
-from ..overlay.prediction import PREDICTION_S, WINDOW_S
+from ..overlay.overlay import PREDICTION_S, WINDOW_S, AbstractOverlay
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import known_specimen
 from ..results.campaign_results import CampaignResults, budgets_of
@@ -55,9 +55,12 @@ from ._result_tables import collision_table, dwell_table, edge_text, line_table,
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
     """Yield sentences on the resonances and the simulated transmission."""
-    peaks = [f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances]
-    plural = "s" * (len(peaks) > 1)
-    where = f"resonance{plural} at {', '.join(peaks)} Hz" if peaks else "no significant resonance"
+    response = result.analysis.response
+    peaks = [f"{each.frequency_hz:.1f}" for each in response.resonances]
+    where = f"resonance{'s' * (len(peaks) > 1)} at {', '.join(peaks)} Hz"
+    if not peaks:
+        apart_hz = np.median(np.diff(response.frequency_response.frequency_hz))
+        where = f"no significant resonance; lines are {apart_hz:.2g} Hz apart, narrower modes may be missed"
     yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
     yield from feedback_sentences(result.analysis.facts.feedback)
     if result.overlay is not None:
@@ -93,7 +96,7 @@ def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
 
 
 def dwell_findings(result: DwellResult) -> Iterator[str]:
-    """Yield sentences on both responses, measured and simulated, and the kind of motion."""
+    """Yield sentences on Responses I and II, measured and simulated, and on the kind of motion."""
     found, plan = result.analysis.response, result.analysis.excitation
     verdict = result.analysis.motion.verdict
     text = (
@@ -134,7 +137,7 @@ def limits(results: CampaignResults) -> Iterator[str]:
         if not differences:
             yield (
                 "The overlaid simulation uses the same model: agreement shows that the processing from "
-                "generator to figure is correct, not that the model is."
+                "generator to figure is correct, but not that the model is correct."
             )
     yield from differences
     runs = [each.overlay.run for each in results.results if each.overlay is not None]
@@ -147,25 +150,25 @@ def limits(results: CampaignResults) -> Iterator[str]:
             gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
             yield (
                 f"The simulation assumes damping of {damping} and a gap of {gaps} µm. The paper does not "
-                "state the damping; with other values, collision regions differ."
+                "state the damping; with other values, the collision regions would differ."
             )
         lows_hz = [each.base_band_hz[0] for each in runs if each.base_band_hz is not None]
         if lows_hz:
             yield (
                 f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "
-                "the lowest drive frequency). Simulations driven by it lack slower motion of the base, and "
-                "their impacts do not move the base."
+                "the lowest drive frequency). Simulations driven by this motion omit slower motion of the "
+                "base, and their impacts do not move the base."
             )
         if any(each.driven.by_voltage for each in runs):
             yield (
-                "Draws from the recorded voltage differ in initial state, noise of the channels, clock of "
-                f"the converter ({1e6 * CLOCK_TOLERANCE:.0f} ppm) and the parameters of a fitted shaker, "
+                "The draws from the recorded voltage differ in initial state, noise of the channels, clock "
+                f"of the converter ({1e6 * CLOCK_TOLERANCE:.0f} ppm) and the parameters of a fitted shaker, "
                 "within their uncertainty. Calibrations and the parameters of the specimen are taken as "
                 "exact. Of 100 agreeing quantities, one exceeds the limit of |z| by chance."
             )
         yield (
             f"Responses to sines are simulated from rest for {PREDICTION_S:g} s and evaluated over the last "
-            f"{WINDOW_S:g} s. Where two motions are stable, a sweep or noise may show the other motion."
+            f"{WINDOW_S:g} s. Where two motions are stable, a sweep or noise may show another motion."
         )
     if results.dwells or results.sweeps:
         yield (
@@ -175,7 +178,7 @@ def limits(results: CampaignResults) -> Iterator[str]:
     if results.noise:
         yield (
             "With collisions, the transmission from noise is the best linear approximation at that level, "
-            "not a property of the specimen. Bounds contain its scatter over realisations (95 % per line)."
+            "not a property of the specimen. Bounds include the scatter over realisations (95 % per line)."
         )
 
 
@@ -237,12 +240,7 @@ def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
 
 
 def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
-    for up, down in _opposite_sweeps(sweeps):
-        yield hysteresis_figure(up.analysis, down.analysis)
-
-
-def _opposite_sweeps(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
-    """Pair each upward sweep with the first downward sweep of the same level and an overlapping band."""
+    """Draw each upward sweep with the first downward sweep of the same level and an overlapping band."""
     for up in sweeps:
         plan = up.analysis.excitation
         for down in sweeps:
@@ -250,7 +248,7 @@ def _opposite_sweeps(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResul
             is_back = plan.start_hz < plan.stop_hz and other.start_hz > other.stop_hz
             overlaps = other.stop_hz < plan.stop_hz and other.start_hz > plan.start_hz
             if is_back and overlaps and plan.amplitude_vpp == other.amplitude_vpp:
-                yield up, down
+                yield hysteresis_figure(up.analysis, down.analysis)
                 break
 
 
@@ -291,7 +289,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
 STEPPED: Drawing[Any, Any] = Drawing(
     _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
 )
-"""Presentation of stepped recordings; other packages may replace parts for their kinds of excitation."""
+"""Presentation of stepped recordings; other packages may replace parts of it for their kind of excitation."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(

@@ -1,8 +1,7 @@
 """Figures without a recording, and the common style for your own figures."""
 
-from ..figures.branches import branches_figure, draw_line
 from ..figures.chain import chain_figure
-from ..figures.maps import map_figure
+from ..figures.maps import branches_figure, draw_line, map_figure
 from ..figures.predictions import contact_forces_figure, curve_figure, exponent_spectrum_figure
 from ..figures.style import (
     COLLIDING,

@@ -56,7 +56,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Card:
-    """Content for one recording or group of claims: the card, and the row in the overview table."""
+    """Card of one recording or of one group of claims, and its row in the overview table."""
 
     name: str
     result: str
@@ -114,7 +114,8 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
     environment = Environment(
         loader=PackageLoader("vibench.analysis.report", "."),
         autoescape=True,
-        finalize=_escape,
+        # Escape control characters in names and texts; Markup from the template stays unchanged.
+        finalize=lambda content: printable(content) if type(content) is str else content,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -138,11 +139,6 @@ def _figures(page: Page) -> Iterator[DrawnFigure]:
     yield from page.further.figures
     for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):
         yield from fold.figures
-
-
-def _escape(content: object) -> object:
-    """Escape control characters in names and texts; Markup from the template stays unchanged."""
-    return printable(content) if type(content) is str else content
 
 
 def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _EmbeddedFigure:

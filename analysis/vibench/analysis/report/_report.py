@@ -1,10 +1,12 @@
 """The report of a campaign, or of one recording, as one self-contained HTML file."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timedelta
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,22 +14,21 @@ import numpy as np
 from vibench.sim import Parameter
 from vibench.sim.maps import MapResults
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin
-from ..dynamics import BranchDiagram, RecordedLevel, specimen_difference
+from ..comparison import CurveKind, CurveOrigin
+from ..dynamics import BranchDiagram, RecordedLevel, recorded_level, specimen_difference
 from ..errors import NotEnoughData
-from ..figures.branches import branches_figure
+from ..figures.dwells import verdict_text
 from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
-from ..figures.maps import map_figure
-from ..figures.portraits import verdict_text
-from ..figures.style import DrawnFigure
+from ..figures.maps import branches_figure, map_figure
+from ..figures.style import SCREEN, DrawnFigure
 from ..hidden_motion import HiddenMotion
-from ..kinds.analyses import ANALYSES
-from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult
+from ..kinds import ANALYSES, AnyResult, DwellResult, NoiseResult
 from ..recordings.checks import Verdict
 from ..recordings.facts import RecordingFacts, known_specimen
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
-from ..results.compared_recording import drive_level
-from ..sine.stepped_response import lost_levels, tracked_resonances
+from ..sine.stepped_response import SteppedResponse, lost_levels, tracked_resonances
+from ..sine.sweep import SweepResponse
+from ..tables import ImageKind
 from ._drawings import DRAWINGS, figures_together, limits, recording_figures, result_sentence
 from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
 from ._result_tables import nearest_resonance, uncertainty_table
@@ -67,7 +68,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
-    """Yield sentences on the resonances at the weakest noise, and on their changes at the strongest noise."""
+    """Yield sentences on the resonances at the weakest noise, and on how they change up to the strongest."""
     if not noise:
         return
     weak, strong = noise[0], noise[-1]
@@ -83,7 +84,7 @@ def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
     kept = [each.frequency_hz for each in after if each.frequency_hz not in new]
     if len(gone) == len(before) > 1:
         others = "a new one appears" if len(new) == 1 else f"{_number(len(new))} new ones appear"
-        yield f"At {_level(strong)} they disappear, and {others} at {_list_hz(new)} Hz."
+        yield f"At {_level(strong)} these resonances disappear, and {others} at {_list_hz(new)} Hz."
         return
     parts = [
         f"{_list_hz(some)} Hz {one if len(some) == 1 else several}"
@@ -102,7 +103,7 @@ def _resonances(result: NoiseResult) -> str:
     if not found:
         return f"At {_level(result)} there is no significant resonance."
     verb = "is" if len(found) == 1 else "are"
-    return f"At {_level(result)} there {verb} {_count(len(found), 'resonance')}, {_list_hz(found)} Hz."
+    return f"At {_level(result)} there {verb} {_count(len(found), 'resonance')}, at {_list_hz(found)} Hz."
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
@@ -128,13 +129,8 @@ def _agreement(verdicts: Sequence[Agreement]) -> str:
             Agreement.NO: f"The simulation disagrees with {which}.",
             Agreement.OPEN: "Agreement with a simulation was not determined.",
         }[verdicts[0]]
-    counts = [
-        (text, sum(each is one for each in verdicts))
-        for text, one in zip(
-            ("agrees with", "disagrees with", "was not compared with"), Agreement, strict=True
-        )
-    ]
-    parts = [f"{text} {_number(count)}" for text, count in counts if count]
+    texts = zip(("agrees with", "disagrees with", "was not compared with"), Agreement, strict=True)
+    parts = [f"{text} {_number(count)}" for text, each in texts if (count := verdicts.count(each))]
     return f"Of {_count(len(verdicts), 'recording')}, the simulation {_join(parts)}."
 
 
@@ -179,20 +175,17 @@ def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[
 
 
 def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[RecordedLevel]:
-    """Return level, responses and specimen of each stepped sine and sweep."""
-    return [
-        RecordedLevel(facts.name, level, tuple(_curves(each, *kinds)), known_specimen(facts.bench))
-        for each in results.in_order
-        for facts in (each.analysis.facts,)
-        if len(level := drive_level(each)) > 1
-    ]
-
-
-def _curves(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
-    measured = ANALYSES[result.kind].curves(
-        result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
-    )
-    return (curve for curve in measured if not kinds or curve.response in kinds)
+    """Return level, responses and specimen of each stepped sine and sweep over a range of frequencies."""
+    levels = []
+    for each in results.in_order:
+        facts, found = each.analysis.facts, each.analysis.response
+        if isinstance(found, SweepResponse | SteppedResponse):
+            with suppress(NotEnoughData):
+                level = recorded_level(found.frequency_hz, found.drive_amplitude_m)
+                measured = ANALYSES[each.kind].curves(facts.name, CurveOrigin.MEASURED, found)
+                shown = [curve for curve in measured if not kinds or curve.response in kinds]
+                levels.append(RecordedLevel(facts.name, level, shown, known_specimen(facts.bench)))
+    return levels
 
 
 def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
@@ -200,14 +193,14 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
     levels = _recorded_levels(results)
     for number, diagram in enumerate(diagrams, start=1):
         if diagram.request.resonance_band_hz is not None:
-            yield replace(_backbones(results, diagram), name=f"branches_{number}")
-            continue
-        if diagram.request.along is not Parameter.FREQUENCY or not levels:
-            yield replace(branches_figure(diagram), name=f"branches_{number}")
-            continue
-        drawn = branches_figure(diagram, [curve for level in levels for curve in level.measured])
-        sentences = " ".join(_level_sentence(diagram, each) for each in levels)
-        yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {sentences}")
+            drawn = _backbones(results, diagram)
+        elif diagram.request.along is not Parameter.FREQUENCY:
+            drawn = branches_figure(diagram)
+        else:
+            drawn = branches_figure(diagram, [curve for level in levels for curve in level.measured])
+            sentences = (_level_sentence(diagram, each) for each in levels)
+            drawn = replace(drawn, caption=" ".join((drawn.caption, *sentences)))
+        yield replace(drawn, name=f"branches_{number}")
 
 
 def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
@@ -227,14 +220,14 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest Floquet multipliers at a level without resonance, or that none exist."""
+    """State the model's largest Floquet multipliers at a level without resonance, or that there are none."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
         sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
-    text = f"At {level_m_per_s2:g} m/s² the control did not lock on a periodic motion;"
+    text = f"At {level_m_per_s2:g} m/s² the control did not lock onto a periodic motion;"
     if not sizes:
-        return f"{text} the branches contain none at this level."
+        return f"{text} the branches contain no periodic motion at this level."
     multipliers = ", ".join(f"{each:.3g}" for each in sizes)
     return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
 
@@ -249,7 +242,7 @@ def _level_sentence(diagram: BranchDiagram, level: RecordedLevel) -> str:
     ]
     name, difference = level.name, level.difference(request.chosen_specimen)
     if not ratios:
-        text = f"The drive of {name} was outside of the frequencies of the branches."
+        text = f"The drive of {name} was outside the frequency range of the branches."
     else:
         low, high = np.min(ratios), np.max(ratios)
         text = f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
@@ -304,7 +297,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Return one text with result and age of the last bench check, and its findings that are not ok."""
+    """Return a text with result and age of the last bench check, and with all findings that are not ok."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -314,7 +307,7 @@ def bench_check_text(facts: RecordingFacts) -> str:
         for each in check["findings"]
         if each["verdict"] != "ok"
     ]
-    head = f"{check['verdict']}, {before / timedelta(hours=1):.1f} h before"
+    head = f"{check['verdict']}, {before / timedelta(hours=1):.1f} h before this recording"
     return ": ".join([head, "; ".join(odd)]) if odd else head
 
 
@@ -378,6 +371,7 @@ def write_report(
     diagrams: Sequence[BranchDiagram] = (),
     hidden: Sequence[HiddenMotion] = (),
     maps: Sequence[MapResults] = (),
+    drawn: Mapping[AnyResult, Card] = MappingProxyType({}),
 ) -> Path:
     """Write one HTML file with all figures; replace an older report of the same name.
 
@@ -397,16 +391,13 @@ def write_report(
         Estimated hidden motions of these recordings.
     maps
         Maps, drawn with the levels of stepped sines and sweeps.
+    drawn
+        Cards of some results from `draw_cards`; only the remaining figures are drawn now.
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
-    failed = {each.name.removesuffix(".part").removesuffix(".h5"): each for each in results.failures}
-    cards = [_card(each, failed) for each in results.in_order]
-    together = [
-        *figures_together(results),
-        *draw_branches(results, diagrams),
-        *draw_maps(results, maps),
-    ]
+    cards = [drawn.get(each) or _card(each, results) for each in results.in_order]
+    together = [*figures_together(results), *draw_branches(results, diagrams), *draw_maps(results, maps)]
     together += [draw(each) for each in hidden for draw in (hidden_motion_figure, hidden_impacts_figure)]
     first = together.pop(0) if len(cards) > 1 and together else next((each.figure for each in cards), None)
     page = Page(
@@ -444,18 +435,26 @@ def _about(results: CampaignResults) -> str:
     return f"Report of {count} recording{'' if count == 1 else 's'}.{where if origins else ''}"
 
 
-def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
+def draw_cards(results: CampaignResults) -> dict[AnyResult, Card]:
+    """Return the card of each result for `write_report`, with images already drawn."""
+    return {each: _card(each, results, SCREEN) for each in results.results}
+
+
+def _card(result: AnyResult, results: CampaignResults, kinds: Sequence[ImageKind] = ()) -> Card:
+    failed = {each.name.removesuffix(".part").removesuffix(".h5"): each for each in results.failures}
     facts, drawing = result.analysis.facts, DRAWINGS[result.kind]
     figure, *more = drawing.figures(result)
+    settings = recording_figures(result)
+    for each, kind in product((figure, *more, *settings), kinds):
+        getattr(each, kind.value)
     agreement, look_at = agreement_of(result, failed.get(facts.name))
     warned = [each for each in result.analysis.checks if each.verdict is Verdict.WARNING]
     checks = tuple((each.verdict.value, each.what, each.text) for each in result.analysis.checks)
-    looks = [each for each in (look_at, ", ".join(each.what.lower() for each in warned)) if each]
     return Card(
         name=facts.name,
         result=result_sentence(result),
         agreement=agreement,
-        look_at="; ".join(looks),
+        look_at="; ".join(filter(None, (look_at, ", ".join(each.what.lower() for each in warned)))),
         numbers=tuple(islice(drawing.numbers(result), _MOST_NUMBERS)),
         warnings=tuple(f"{each.what}: {each.text}" for each in warned),
         figure=figure,
@@ -468,7 +467,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
             Fold(
                 "Checks, settings and levels",
                 tables=(ReportTable("Checks", (), checks), measured_table(facts)),
-                figures=recording_figures(result),
+                figures=settings,
             ),
         ),
     )
@@ -496,7 +495,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}{known}"
     compared, every = sum(each.compared > 0 for each in overlay.ensemble), len(overlay.ensemble)
     if not compared:
-        return Agreement.OPEN, "too few draws have the same kind of motion as measured"
+        return Agreement.OPEN, "too few draws have the same kind of motion as the measurement"
     return Agreement.YES, "" if compared == every else f"{compared} of {every} quantities were compared"
 
 
@@ -519,7 +518,7 @@ def check_warnings(results: CampaignResults, checks: frozenset[str] | None = Non
 
 
 def _benches(results: CampaignResults) -> Iterator[Fold]:
-    """Yield one fold per bench with the names of its recordings, so that each bench is described once."""
+    """Yield one folded section per bench, with the names of its recordings; each bench is described once."""
     groups: dict[tuple[ReportTable, ...], list[str]] = {}
     for facts in results.facts:
         bench_tables = (bench_table(facts), channel_table(facts), version_table(facts))

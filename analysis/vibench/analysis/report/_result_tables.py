@@ -4,14 +4,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..figures.portraits import verdict_text
+from ..figures.dwells import verdict_text
 from ..frequency_response.modal_fit import Resonance
-from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, SweepResult
-from ..overlay.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
-from ..overlay.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
+from ..kinds import AnyResult, DwellResult, NoiseResult, SweepResult
+from ..overlay.overlay import (
+    PAPER_RESONANCES_HZ,
+    PAPER_TERMINAL_RESONANCES_HZ,
+    RESPONSE_I,
+    RESPONSE_II,
+    DwellOverlay,
+)
 from ..recordings.facts import specimen_of
 from ..results.campaign_results import budgets_of
-from ..sine.collision_region import Edge
+from ..sine.sweep_analysis import Edge
 from ..tables import plus_minus
 from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
@@ -39,9 +44,9 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
             "paper [Hz]",
         ),
         tuple(row for each in noise for row in _resonance_rows(each)),
-        "± is two standard deviations, from the scatter of lines only. Simulated: one draw from the recorded"
-        " voltage or base motion, same estimator. Model: undamped natural frequency, without contact "
-        "or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
+        "± is two standard deviations, from the scatter of lines only. Simulated: one draw from the recorded "
+        "voltage or base motion, with the same estimator. Model: undamped natural frequency, without "
+        "contact or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
     )
 
 
@@ -113,7 +118,7 @@ def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
         tuple(row for each in sweeps for row in _collision_rows(each)),
         "Bounds are the nearest interval clearly without collisions and the first or last interval clearly "
-        "with collisions. The end is random, and differs between runs. "
+        "with collisions. The end of the collisions is random, and differs between runs. "
         "The motion that a sweep follows depends on its direction and on its first frequency.",
     )
 
@@ -139,12 +144,12 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 
 def edge_text(edge: Edge, instead: str) -> str:
-    """Return the text ``instead`` if it is not empty, otherwise an edge with its bounds as text."""
+    """Return the text ``instead`` unless it is empty; otherwise return an edge with its bounds as text."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 
 def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
-    """Return a table of both responses of every dwell, measured and simulated."""
+    """Return a table of Responses I and II of every dwell, measured and simulated."""
     return ReportTable(
         "Dwells: responses over the last seconds",
         (
@@ -204,7 +209,7 @@ def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, s
 
 
 def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
-    """Return a band's median level in all draws [dB]; for one run or a low level, the first draw's level."""
+    """Return a band's median level over all draws [dB]; for one run or a low level, use the first draw."""
     found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
     if found is None or not found.compared:
         levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]
@@ -234,7 +239,7 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
             simulated = ABSENT if each.overlay is None else _simulated_band(each.overlay, band.towards_hz)
             rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
     return ReportTable(
-        "Dwells: lines of the displacement, and its bands at the terminal resonances",
+        "Dwells: spectral lines of the displacement, and bands at the terminal resonances",
         ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
         tuple(rows),
         "Lines below two standard deviations are left out. Chaos fills bands, not lines: the level of a band "

@@ -1,4 +1,4 @@
-"""Analyse all recordings of a campaign; report those that fail, and continue with the others."""
+"""Analyse one recording or all recordings of a campaign; report those that fail, and continue."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -7,36 +7,113 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
+from pydantic import ValidationError
+
 from vibench.acquisition import RecordingError, open_recording
-from vibench.acquisition.recording import Recording, copy_sentence, first_copies
+from vibench.acquisition.recording import Recording, UntilNote, copy_sentence, first_copies
+from vibench.acquisition.rig import Rig
 from vibench.sim import Specimen
-from vibench.sim.background import Observer, Progress, ignore_progress
+from vibench.sim.background import Observer, Progress, ignore_progress, stage
 
 from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
-from ..frequency_response.request import FrequencyResponseRequest
-from ..kinds.analyses import ANALYSES, family_of
-from ..kinds.analysis_kind import AnyResult, DwellResult, Json, NoiseResult, Result, SweepResult
-from ..kinds.noise import NOISE_FAMILY
-from ..overlay.draws import DRAWS, DrawSource, all_draws, base_source, voltage_source
-from ..overlay.driven_rig import described_shaker
+from ..frequency_response.results import FrequencyResponseRequest
+from ..kinds import (
+    ANALYSES,
+    NOISE_FAMILY,
+    AnyResult,
+    DwellResult,
+    Json,
+    NoiseResult,
+    Result,
+    SweepResult,
+    family_of,
+)
+from ..overlay.draws import DRAWS, all_draws, base_source, voltage_source
+from ..overlay.driven_rig import FittedShaker, described_shaker, fit_shaker
 from ..overlay.overlay import AbstractOverlay, Simulation
-from ..overlay.shaker_fit import FittedShaker, fit_shaker
+from ..recordings.channels import RecordedChannels, force_roles, response_role, response_roles, scanned_role
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
-from ..recordings.facts import RecordingFacts, specimen_of
-from ..recordings.response import force_roles, response_role, response_roles, scanned_role
+from ..recordings.facts import RecordingFacts, recording_facts, require_moving_channels, specimen_of
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import plain
 from ..uncertainty.budget import Budget
-from .measurement_analysis import analyse
+from ..uncertainty.expected import expected_recorded_s
+
+CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
+"""Errors that calculations raise if the parts of a well-formed recording contradict each other."""
+
+
+def analyse(
+    recording: Recording | Path | str,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    observer: Observer = ignore_progress,
+    response: str | None = None,
+) -> AbstractAnalysis[Any, Any]:
+    """Analyse a complete or incomplete recording by the kind of excitation in its plan.
+
+    Raises AnalysisError, with one sentence that names the file, when nothing in it can be analysed.
+
+    Parameters
+    ----------
+    recording
+        An open recording, or its path. An interrupted or growing recording is analysed up to the samples that
+        it contains when it is opened.
+    request
+        Estimator and resolution for noise; other excitations ignore it.
+    observer
+        Receives the progress.
+    response
+        Channel to analyse, such as ``"m2_velocity"``; by default the channel that measures m0, or in a scan
+        the mass that the vibrometer measured.
+    """
+    if isinstance(recording, Path | str):
+        with open_recording(Path(recording)) as opened:
+            return analyse(opened, request, observer, response)
+    name, response = recording.path.name, response or scanned_role(recording)
+    facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"), response)
+    try:
+        channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"), response)
+        require_moving_channels(facts.channels, facts.response)
+        plan = facts.measurement.excitation
+        if channels.is_force and ANALYSES[plan.kind].family != NOISE_FAMILY:
+            raise UnusableData(
+                f"{facts.response} has results only for noise (the apparent mass); analyse a motion, "
+                "or measure noise"
+            )
+        found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
+        found = replace(found, checks=(*found.checks, *_until_checks(facts)))
+    except AnalysisError as error:
+        ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
+        raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
+    except CONTRADICTIONS as error:
+        raise UnusableData(
+            f"{recording.path.name} cannot be analysed: its samples and tables contradict its plan "
+            f"({type(error).__name__}: {error}); read the samples with h5py"
+        ) from error
+    return found
+
+
+def _until_checks(facts: RecordingFacts) -> Iterator[Check]:
+    """Compare the recorded time of a measurement that sets `until` with the predicted time."""
+    notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
+    if not notes:
+        return
+    time_s = sum(each.recorded_s or 0.0 for each in notes)
+    try:
+        expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
+    except ValidationError:  # the recording was imported, or is of another version
+        expected_s = None
+    forecast = "no time was predicted" if expected_s is None else f"{expected_s:.3g} s were predicted"
+    last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
+    reached = sum(each.is_reached for each in notes)
+    text = f"{last}{reached} of {len(notes)} parts reached their targets, {time_s:.4g} s in total; {forecast}"
+    yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
+
 
 Stage = Callable[[str], None]
 """Callback that receives a short description of the current step."""
-
-
-def ignore_stage(stage: str) -> None:
-    """Do nothing; the default callback."""
 
 
 def overlay(
@@ -47,7 +124,7 @@ def overlay(
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     shaker: FittedShaker | None = None,
     draws: int = DRAWS,
-    stage: Stage = ignore_stage,
+    stage: Stage = lambda _step: None,
 ) -> AbstractOverlay[Any]:
     """Return the comparison of a measurement with a simulation of the same test.
 
@@ -61,7 +138,7 @@ def overlay(
         Specimen to simulate; by default the specimen of the recording's bench configuration.
     simulation
         Drive of the simulation: the recorded voltage (rig and specimen) or the recorded base motion (specimen
-        alone). An unknown shaker is fitted to weak noise; if that fails, the base motion is used.
+        alone). An unknown shaker is fitted to weak noise; if the fit fails, the base motion is used.
         ``run.driven`` and ``run.why`` of the result name the choice and its reason.
     shaker
         Result of `fit_shaker` for another recording; used if the bench configuration describes no shaker.
@@ -71,34 +148,24 @@ def overlay(
         Receives a description of each step.
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
-    stage(f"simulating {simulation.value}")
-    source = _source(recording, analysis, model, simulation, shaker, draws)
-    row = ANALYSES[analysis.excitation.kind]
-    found = all_draws(source, row.draws(analysis), row.compared(analysis))
-    stage("comparing with the simulation")
-    model_overlay: AbstractOverlay[Any] = row.lay(analysis, found)
-    return model_overlay
-
-
-def _source(
-    recording: Recording,
-    analysis: AbstractAnalysis[Any, Any],
-    model: Specimen,
-    simulation: Simulation,
-    shaker: FittedShaker | None,
-    draws: int,
-) -> DrawSource:
-    measurement, why = analysis.facts.measurement, ""
+    driven = "the specimen" if simulation is Simulation.UNDER_BASE else "rig and specimen"
+    stage(f"simulating {driven} {simulation.value}")
+    source, why = None, ""
     if simulation is Simulation.UNDER_VOLTAGE:
         try:
             if described_shaker(recording) is not None:
                 shaker = None
             elif shaker is None and isinstance(analysis, NoiseAnalysis):
                 shaker = fit_shaker(recording, analysis, model)
-            return voltage_source(recording, model, shaker, draws)
+            source = voltage_source(recording, model, shaker, draws)
         except UnusableData as error:
             why = str(error)
-    return base_source(recording, measurement, model, why)
+    source = source or base_source(recording, analysis.facts.measurement, model, why)
+    row = ANALYSES[analysis.excitation.kind]
+    found = all_draws(source, row.draws(analysis), row.compared(analysis))
+    stage("comparing with the simulation")
+    model_overlay: AbstractOverlay[Any] = row.lay(analysis, found)
+    return model_overlay
 
 
 class FailedStep(StrEnum):
@@ -141,7 +208,7 @@ class CampaignResults:
 
     @property
     def in_order(self) -> tuple[AnyResult, ...]:
-        """Results sorted by kind; within a kind from weak to strong, or in the order given."""
+        """Results sorted by kind; within one kind, from weak to strong or in the order given."""
         families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
 
         def place(each: AnyResult) -> tuple[float, ...]:
@@ -245,14 +312,14 @@ def without_copies(results: Sequence[AnyResult]) -> tuple[AnyResult, ...]:
 
 
 def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
-    """Return the channels other than m0's, each with the recordings that contain this channel.
+    """Return every channel except those of m0, with the recordings that contain this channel.
 
     A force channel is included only for noise recordings, where it gives the apparent mass. Unreadable
     recordings are left out; their analysis reports the reason.
     """
     found: dict[str, tuple[Path, ...]] = {}
     for path in paths:
-        # A plan with values of wrong types also counts as unreadable.
+        # A recording whose plan has values of wrong types also counts as unreadable.
         with suppress(RecordingError, AttributeError, TypeError), open_recording(path) as recording:
             first = response_role(recording)
             is_noise = family_of(recording.plan) == NOISE_FAMILY
@@ -263,7 +330,7 @@ def other_responses(paths: Sequence[Path]) -> dict[str, tuple[Path, ...]]:
 
 
 def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
-    """Fit a shaker to the weakest suitable noise if any recording needs one; else return None."""
+    """Fit a shaker to the weakest suitable noise if any recording needs a shaker; otherwise return None."""
     unknown: list[tuple[float, Path]] = []
     needed = False
     for path in paths:
@@ -275,7 +342,7 @@ def _fit_common_shaker(paths: Sequence[Path], specimen: Specimen | None) -> Fitt
                 if family_of(recording.plan) == NOISE_FAMILY:
                     unknown.append((float(recording.plan["excitation"]["amplitude_vpp"]), path))
         except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
-            continue  # the analysis of this file reports the reason
+            continue  # analysing this file will report the reason
     for _, path in sorted(unknown) if needed and len(paths) > 1 else ():
         try:
             with open_recording(path) as recording:
@@ -381,7 +448,7 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:
-    """Yield one sentence for each main number, with its uncertainty and the uncertainty's contributions."""
+    """Yield one sentence for each main number, with its uncertainty and the contributions to it."""
     for each in results.in_order:
         for budget in budgets_of(each):
             yield f"{each.analysis.facts.name}: {budget.sentence}."

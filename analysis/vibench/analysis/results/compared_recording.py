@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,11 @@ import numpy as np
 from vibench.acquisition import open_recording
 from vibench.sim import SpecimenTable
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin, sorted_curve
-from ..comparison.recording_curves import predicted_curves
+from ..comparison import Curve, CurveKind, CurveOrigin, predicted_curves, sorted_curve
 from ..dynamics import RecordedLevel, recorded_level
 from ..errors import NotEnoughData, UnusableData
-from ..frequency_response.request import FrequencyResponseRequest
-from ..kinds.analyses import ANALYSES, family_of
-from ..kinds.analysis_kind import AnyResult
+from ..frequency_response.results import FrequencyResponseRequest
+from ..kinds import ANALYSES, AnyResult, family_of
 from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.checks import Verdict
 from ..recordings.facts import described_specimen, known_specimen
@@ -90,11 +89,11 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
     Raises NotEnoughData when the recording is of another kind, or has a single frequency.
     """
-    result, _ = stored_result(compared)
-    found = drive_level(result)
-    if not found:
-        raise NotEnoughData(_NO_LEVEL.format(compared.path.name))
-    return found
+    found = stored_result(compared)[0].analysis.response
+    if isinstance(found, SweepResponse | SteppedResponse):
+        with suppress(NotEnoughData):
+            return recorded_level(found.frequency_hz, found.drive_amplitude_m)
+    raise NotEnoughData(_NO_LEVEL.format(compared.path.name))
 
 
 def recorded_response(path: Path, kinds: Collection[CurveKind] = (CurveKind.RESPONSE_I,)) -> RecordedLevel:
@@ -103,7 +102,7 @@ def recorded_response(path: Path, kinds: Collection[CurveKind] = (CurveKind.RESP
     Raises NotEnoughData when the recording is of another kind, or has a single frequency; RecordingError when
     the file is not a recording.
     """
-    with open_recording(path) as recording:  # raise the error before a long analysis
+    with open_recording(path) as recording:  # raises errors before the long analysis
         is_at_one_frequency = "frequency_hz" in (recording.plan.get("excitation") or {})
         if is_at_one_frequency or family_of(recording.plan) in {"noise", "dwell"}:
             raise NotEnoughData(_NO_LEVEL.format(path.name))
@@ -119,18 +118,6 @@ def recorded_specimen(path: Path) -> SpecimenTable | None:
     """Return the specimen described in a recording; None if it describes none."""
     with open_recording(path) as recording:
         return described_specimen(recording.bench) if recording.bench.get("specimen") else None
-
-
-def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Return a result's base amplitude at each frequency; empty for other kinds or a single frequency."""
-    match result.analysis.response:
-        case (SweepResponse() | SteppedResponse()) as found:
-            try:
-                return recorded_level(found.frequency_hz, found.drive_amplitude_m)
-            except NotEnoughData:
-                return ()
-        case _:
-            return ()
 
 
 def _of_draws(curve: Curve, overlay: AbstractOverlay[Any]) -> Curve:

@@ -19,14 +19,11 @@ from vibench.acquisition.recording import Recording, SegmentLabel, open_recordin
 
 from ..errors import AnalysisError
 from ..frequency_response.noise_response import DEFAULT_REQUEST
-from ..kinds.analyses import ANALYSES
-from ..kinds.analysis_kind import AnyResult, Result
-from ..recordings.channels import RecordedChannels, Stretch
+from ..kinds import ANALYSES, AnyResult, Result
+from ..recordings.channels import RecordedChannels, Stretch, scanned_role
 from ..recordings.facts import RecordingFacts, plan_of, recording_facts
-from ..recordings.response import scanned_role
 from ..uncertainty.budget import COVERAGE, RESULT_PATTERNS, Budget, Cause
-from .campaign_results import budgets_of
-from .measurement_analysis import CONTRADICTIONS
+from .campaign_results import CONTRADICTIONS, budgets_of
 
 PATIENCE_S = 20.0
 """Maximum waiting time until the file contains the requested samples [s]."""
@@ -35,7 +32,7 @@ _PAUSE_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class _ChannelsSoFar(RecordedChannels):
-    """Channels of a recording up to a time: complete realisations, or one stretch cut at that time."""
+    """Channels of a recording up to a given time: complete realisations, or one stretch cut at this time."""
 
     stretch: int = 1
     samples_so_far: int = 0
@@ -57,7 +54,7 @@ class _ChannelsSoFar(RecordedChannels):
 
 
 def bounds_of(result: AnyResult) -> dict[str, float | None]:
-    """Return the largest relative 95 % random bound of each result for which a plan can wait.
+    """For each result for which a plan can wait, return the largest relative 95 % random bound.
 
     An undetermined bound is None; results that were not found are left out.
     """
@@ -105,7 +102,7 @@ def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
             return recording
         recording.close()
         if time.monotonic() > give_up_s:
-            raise RecordingError(f"the file did not receive {recorded_s:g} s of this part in time")
+            raise RecordingError(f"{recorded_s:g} s of this part were not written to the file in time")
         time.sleep(_PAUSE_S)
 
 

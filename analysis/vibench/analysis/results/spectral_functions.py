@@ -1,7 +1,7 @@
 """Frequency response, coherence and spectral densities of a recording, to export as functions."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,19 +13,17 @@ from vibench.acquisition.rig import Role
 from ..errors import NotEnoughData
 from ..exchange import Excerpt, FunctionAxis, FunctionType, UniversalFunction, export_scan
 from ..frequency_response.noise_response import NoiseAnalysis
-from ..frequency_response.request import FrequencyResponseRequest
+from ..frequency_response.results import FrequencyResponseRequest
 from ..frequency_response.scan import scans_of
-from ..kinds.analyses import family_of
-from ..kinds.noise import NOISE_FAMILY
+from ..kinds import NOISE_FAMILY, family_of
 from ..recordings.facts import require_checked
-from ..signals.arrays import Reals
+from ..signals.averaging import hop_samples
 from ..signals.quantity import Quantity
-from ..signals.window import hop_samples
-from ..spectra.spectra import DensitySums
-from .measurement_analysis import analyse
+from ..spectra import DensitySums
+from .campaign_results import analyse
 
 _RESOLUTION_HZ = 1.0
-"""Line spacing [Hz] of a density from the longest segments, of 1 s, with Hann window and 50 % overlap."""
+"""Line spacing [Hz] of a density from the longest segments (1 s), with Hann window and 50 % overlap."""
 _OVERLAP = 0.5
 _FEWEST_SAMPLES = 2
 _AROUND = frozenset({SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN})
@@ -55,7 +53,7 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> I
     if family_of(excerpt.recording.plan) == NOISE_FAMILY:
         analysis: NoiseAnalysis = analyse(excerpt.recording, request)  # type: ignore[assignment]
         yield from _responses(analysis)
-    yield from (_density(played, channel) for channel in excerpt.channels)
+    yield from (_density(*played, channel) for channel in excerpt.channels)
 
 
 def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: Path) -> Iterator[Path]:
@@ -91,22 +89,18 @@ def scan_files(paths: Sequence[Path], request: FrequencyResponseRequest, path: P
             node: (each.x_m, each.y_m, each.z_m) for node, each in zip(scan.nodes, scan.points, strict=True)
         }
         lines_hz = scan.analyses[0].response.frequency_response.frequency_hz
-        functions = [
-            (each.facts, _on_lines(_responses(each, node)[0], lines_hz))
-            for node, each in zip(scan.nodes, scan.analyses, strict=True)
-        ]
+        functions = []
+        for node, each in zip(scan.nodes, scan.analyses, strict=True):
+            response = _responses(each, node)[0]
+            # Clock drift shifts the lines of later points, so interpolate to the lines of the first point.
+            values = np.asarray(np.interp(lines_hz, response.frequency_hz, response.values), np.complex128)
+            functions.append((each.facts, replace(response, frequency_hz=lines_hz, values=values)))
         yield export_scan(nodes, functions, path.with_name(f"{path.stem}{ending}{path.suffix}"))
 
 
 def _is_scanned_noise(path: Path) -> bool:
     with open_recording(path) as recording:
         return bool(recording.plan.get("point")) and family_of(recording.plan) == NOISE_FAMILY
-
-
-def _on_lines(function: UniversalFunction, lines_hz: Reals) -> UniversalFunction:
-    """Return a function at the lines of the scan's first point; clock drift shifts lines of later points."""
-    values = np.asarray(np.interp(lines_hz, function.frequency_hz, function.values), dtype=np.complex128)
-    return replace(function, frequency_hz=lines_hz, values=values)
 
 
 def _responses(analysis: NoiseAnalysis, node: int | None = None) -> tuple[UniversalFunction, ...]:
@@ -134,26 +128,11 @@ def _axis(role: Role, body: str, quantity: Quantity) -> FunctionAxis:
     return FunctionAxis(role.value, f"{body} {quantity.value}", quantity.value, _UNITS[quantity])
 
 
-@dataclass(frozen=True, eq=False)
-class _PlayedParts:
-    """The parts of an excerpt over which densities are averaged."""
+def _played_parts(excerpt: Excerpt) -> tuple[tuple[Excerpt, ...], int, str]:
+    """Return the parts with excitation, the number of samples per segment, and a description.
 
-    stretches: tuple[Excerpt, ...]
-    """Parts of the excerpt with excitation; each part is at least one segment long."""
-    labels: tuple[str, ...]
-    segment: int
-    """Number of samples per segment."""
-
-    @property
-    def note(self) -> str:
-        """Description of the averaged parts, for the exported function."""
-        first, *_ = self.stretches
-        seconds = sum(each.samples for each in self.stretches) / first.recording.sample_rate_hz
-        return f"over {seconds:.6g} s of {' and '.join(self.labels)}"
-
-
-def _played_parts(excerpt: Excerpt) -> _PlayedParts:
-    """Return the parts with excitation; a recording without labelled parts counts as one part."""
+    Each part is at least one segment long. A recording without labelled parts counts as one part.
+    """
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     parts = [(each.label, each.start, each.stop) for each in recording.segments if each.label not in _AROUND]
@@ -170,18 +149,22 @@ def _played_parts(excerpt: Excerpt) -> _PlayedParts:
             f"but {max(chosen_s, 0.0):.3g} s were chosen; choose a longer excerpt"
         )
     stretches = tuple(replace(excerpt, start=start, stop=stop) for _, start, stop in used)
-    return _PlayedParts(stretches, tuple(dict.fromkeys(label for label, _, _ in used)), segment)
+    seconds = sum(each.samples for each in stretches) / rate
+    labels = dict.fromkeys(label for label, _, _ in used)
+    return stretches, segment, f"over {seconds:.6g} s of {' and '.join(labels)}"
 
 
-def _density(played: _PlayedParts, channel: ChannelHeader) -> UniversalFunction:
-    first, *_ = played.stretches
-    hop = hop_samples(played.segment, _OVERLAP)
-    sums = DensitySums(first.recording.sample_rate_hz, segment_samples=played.segment, overlap=_OVERLAP)
-    for each in played.stretches:
+def _density(
+    stretches: tuple[Excerpt, ...], segment: int, note: str, channel: ChannelHeader
+) -> UniversalFunction:
+    hop = hop_samples(segment, _OVERLAP)
+    rate = stretches[0].recording.sample_rate_hz
+    sums = DensitySums(rate, segment_samples=segment, overlap=_OVERLAP)
+    for each in stretches:
         for values in each.channel_blocks(channel.role):
             valid = np.isfinite(values)
             sums.add(np.where(valid, values, 0.0), valid)
-        # Segments do not extend from one stretch into the next.
+        # Insert invalid samples, so that no segment contains samples of two stretches.
         between = hop - each.samples % hop
         sums.add(np.zeros(between), np.zeros(between, dtype=np.bool_))
     found = sums.density()
@@ -191,5 +174,5 @@ def _density(played: _PlayedParts, channel: ChannelHeader) -> UniversalFunction:
         found.density,
         FunctionAxis(channel.role, channel.role, channel.quantity, f"({channel.unit})2/Hz"),
         FunctionAxis(),
-        f"Hann window, {found.n_eff:.4g} averages {played.note}",
+        f"Hann window, {found.n_eff:.4g} averages {note}",
     )

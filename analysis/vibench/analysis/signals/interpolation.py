@@ -14,21 +14,21 @@ from .arrays import Reals
 REACH = 32
 """Number of samples on each side used for one interpolated value."""
 TRUSTED_BAND = 0.4
-"""Fraction of the sample rate up to which the interpolation is exact to about 1e-9."""
+"""Fraction of the sample rate up to which the interpolation is accurate to about 1e-9."""
 
 _KAISER_BETA = 19.9
 """Parameter of the Kaiser window for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
 _PHASES = 512
-"""Number of tabulated fractions of a sample interval; cubic interpolation between them errs by 1e-10."""
+"""Number of tabulated fractions of a sample interval; cubic interpolation in this table errs by 1e-10."""
 
 
 def _weights_of_phases() -> Reals:
-    """Return the windowed sinc at every tap, for fractions from one phase below 0 to one phase above 1."""
+    """Return the windowed sinc at every tap, for fractions from one step below 0 to one step above 1."""
     fraction = np.arange(-1, _PHASES + 2, dtype=np.float64) / _PHASES
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
     window = np.where(np.abs(distance) <= REACH, i0(_KAISER_BETA * shape) / i0(_KAISER_BETA), 0.0)
-    # Set values at samples exactly, because the computed sine of a multiple of pi is not exactly zero.
+    # The computed sine of a multiple of pi is not exactly zero, so set the values at samples exactly.
     sinc = np.where(distance == np.rint(distance), distance == 0.0, np.sinc(distance))
     return np.asarray(sinc * window)
 
@@ -84,7 +84,8 @@ def sizes_with_maxima(samples: Reals) -> Reals:
     top = REACH + np.flatnonzero(
         (middle >= size[REACH - 1 : -REACH - 1]) & (middle >= size[REACH + 1 : size.size - REACH + 1])
     )
-    at, _ = _vertices(size[top - 1], size[top], size[top + 1])
+    # With less than four samples per period, neighbours of a maximum may have the opposite sign.
+    at, _ = _vertices(*(np.sign(samples[top]) * samples[top + each] for each in (-1, 0, 1)))
     near = np.concatenate([top + at + each for each in (-_CLOSE, 0.0, _CLOSE)])
     _, largest = _vertices(*np.abs(interpolate(samples, near)).reshape(3, -1))
     size[top] = np.maximum(size[top], largest)
@@ -92,7 +93,7 @@ def sizes_with_maxima(samples: Reals) -> Reals:
 
 
 def _vertices(before: Reals, middle: Reals, after: Reals) -> tuple[Reals, Reals]:
-    """Return position (0 is the middle point) and value of the maxima of parabolas through three points."""
+    """Return the maxima of parabolas through three points: positions (0 is the middle point) and values."""
     slope, bend = (after - before) / 2, before + after - 2 * middle
     at = np.clip(-slope / np.minimum(bend, -np.finfo(np.float64).tiny), -1.0, 1.0)
     return at, middle + at * slope / 2
@@ -116,13 +117,13 @@ class Decimator:
         self._half = (taps.size - 1) // 2
         # The engine sums eight products at a time; padding gets zero weight.
         self._taps = np.concatenate([np.zeros(-taps.size % _TOGETHER), taps])
-        # Half of the filter needs later samples; samples before the first are zero.
+        # Half of the filter's taps need later samples. Before the first sample, assume zeros.
         self._pending = np.zeros((channels, self._taps.size - 1 - self._half if factor > 1 else 0))
         self._received = 0
         self._given = 0
 
     def add(self, block: Reals) -> Reals:
-        """Add samples, shape (channels, n), and return the completed output samples, shape (channels, m)."""
+        """Add samples (channels, n); return the output samples that are now complete, shape (channels, m)."""
         self._received += block.shape[1]
         if self._factor == 1:
             return block
@@ -143,7 +144,7 @@ class Decimator:
             self._pending = data
             return data[:, :0]
         engine, result = native_engine(), np.empty((data.shape[0], count))
-        # The first output sample coincides with the first input sample.
+        # The first output sample has the time of the first input sample.
         first = {"ratio": self._factor, "origin": -self._factor}
         for means, samples in zip(data, result, strict=True):
             fields = {"table": self._taps, "reach": self._taps.size, "means": means, "samples": samples}

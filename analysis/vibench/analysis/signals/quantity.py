@@ -49,11 +49,11 @@ class ConvertedSignal:
 
 
 _TRANSITION = 0.5
-"""Width of a band edge, as a fraction of its frequency; narrower edges ring longer."""
+"""Width of a band edge, as a fraction of the edge frequency; narrower edges ring longer."""
 _EDGE_PERIODS = 6
 """Periods of the lower band edge after which its ringing is below 1e-3 of the disturbance."""
 _ROW_SAMPLES = 1024
-"""Number of samples of a steady line per computed exponential; a product costs a tenth of an exponential."""
+"""Number of samples of a steady line per computed exponential; a product takes a tenth of its time."""
 hann = lru_cache(maxsize=4)(np.hanning)
 """Hann window of a given length, shared by all lines and all draws; do not change its values."""
 
@@ -131,7 +131,7 @@ class SteadyLine:
     def samples(self, factor: complex = 1.0) -> Reals:
         """Return the samples of the sine, with its phasor multiplied by ``factor``; shape (count,)."""
         rows = factor * self.rows
-        # A product of real matrices takes a quarter of the time of a complex one.
+        # A product of real matrices takes a quarter of the time that a product of complex matrices takes.
         whole = np.stack([rows.real, -rows.imag], axis=1) @ np.stack([self.columns.real, self.columns.imag])
         return np.asarray(whole.ravel()[: self.count])
 

@@ -1,5 +1,6 @@
 """Results of a dwell at one frequency: Responses I and II, spectrum, lines and noise."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -8,35 +9,39 @@ import numpy as np
 from vibench.acquisition.plan import CHECK_QUIET_S
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos.period import STEADY
-from ..chaos.verdict import LARGEST_NOISE, SMALL
+from ..chaos.verdict import LARGEST_NOISE, SMALL, STEADY
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..recordings.channels import Channels, far_from
+from ..recordings.channels import RecordedChannels, far_from
 from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.confidence import standard_uncertainty
+from ..signals.averaging import standard_uncertainty
 from ..signals.interpolation import sizes_with_maxima
 from ..signals.quantity import ConvertedSignal, Quantity, converted_signal, disturbed_samples
-from ..spectra.spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
+from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Tabular
-from ..tones.order_tracking import (
+from ..tones import (
     ALL_ORDERS,
+    HIGHEST_ORDER,
+    DriveLevel,
     TrackedOrders,
     cycles_needed,
+    drive_level,
+    largest_peak,
+    noise_lift,
     order_label,
     order_turns,
+    steady_phase,
     track_signals,
 )
-from ..tones.sine_fit import DriveLevel, drive_level, largest_peak, noise_lift, steady_phase
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
 """Largest ratio of residual motion to vibrometer noise at which the residual counts as noise."""
 _SILENT = 3.0
-"""Largest residual that counts as noise, relative to noise in a silence (shorter than a ring-down)."""
+"""Largest residual that counts as noise, relative to the noise in a silence shorter than a ring-down."""
 OVERHEARD = 20.0
 """Largest ratio of the residual to the noise in the silence at which the residual may be noise.
 
-By chance, a mode excited by noise is this weak in one of 400 short silences. A silence also lacks the noise
+By chance, a mode excited by noise is this weak in one of 400 short silences. A silence also contains no noise
 of the generator.
 """
 BETWEEN = "residual of the motion between its spectral lines"
@@ -59,8 +64,8 @@ class Background:
         return bool(np.isfinite(self.rms_m))
 
 
-def silence_before(channels: Channels) -> Reals:
-    """Return drive, base and response in the silence of the bench check; empty if lost or not recorded."""
+def silence_before(channels: RecordedChannels) -> Reals:
+    """Return all channels in the silence of the bench check; empty if samples were lost or not recorded."""
     for stretch in channels.stretches(SegmentLabel.CHECK):
         stop = stretch.start + round(CHECK_QUIET_S * channels.sample_rate_hz)
         heard = channels.read(stretch.start, min(stop, stretch.stop))
@@ -114,8 +119,8 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
     return Background(
         np.nan,
         np.nan,
-        f"{100 * rest.rms_m / motion_m:.2g} % of the motion does not repeat, which may be noise or motion: "
-        "no silence was recorded before the test to tell them apart; measure with the bench check",
+        f"{100 * rest.rms_m / motion_m:.2g} % of the motion does not repeat. Noise and motion cannot be "
+        "distinguished, because no silence was recorded before the test; measure with the bench check",
     )
 
 
@@ -129,13 +134,13 @@ _LEAST_CYCLES = 4.0
 """Minimum number of drive cycles in a block, so that its Hann window excludes other orders."""
 _FEWEST_BLOCKS = 4
 _SLOW = 0.5
-"""Largest correlation of neighbouring random blocks; ten random blocks exceed it in 1 % of records."""
+"""Largest correlation of neighbouring random blocks; 1 % of records of ten random blocks exceed it."""
 _ONCE = 0.5
-"""If more than this fraction of the variance is at one cycle per record, the change may still continue."""
+"""If more than this fraction of the variance has one cycle per record, the response may still be changing."""
 _TREND, _CLEAR_TREND = 2.0, 8.0
-"""Ratios of a trend's square to its variance: random below the first value, slow change above the second.
+"""Squared trend / its variance: below the first value it is random, above the second it is a slow change.
 
-By chance, records exceed them in 14 % and in 0.4 % of cases.
+By chance, 14 % of records exceed the first value, and 0.4 % exceed the second.
 """
 _BEYOND = 3.0
 """Minimum ratio of the remaining decay to the observed scatter."""
@@ -160,7 +165,7 @@ def slow_change(parts: Complexes | Reals) -> float:
     power = float(np.sum(np.abs(off) ** 2))
     if count < _FEWEST_BLOCKS or power == 0.0:
         return 0.0
-    # With few parts, neighbouring parts of a linear trend are less correlated.
+    # The fewer the parts, the less correlated are neighbouring parts of a linear trend.
     limit = _SLOW * (1 - 3 / count) / (1 - 3 / _BLOCKS_OF_WINDOW)
     is_slow = float(np.sum(np.real(off[1:] * np.conj(off[:-1])))) > min(limit, _SLOW) * power
     place = (2 * np.arange(count) + 1) / count - 1
@@ -179,7 +184,7 @@ def slow_change(parts: Complexes | Reals) -> float:
 
 
 def _remaining_decay(off: Complexes | Reals, slope: complex, place: Reals) -> float:
-    """Return the largest likely distance of the mean of ``off`` from the end of its exponential decay.
+    """Return the largest likely distance of the mean of ``off`` from the limit of its exponential decay.
 
     For exp(-h x), -1 < x < 1, the ratio of quadratic to linear Legendre coefficient is r = (5/3) i2(h) /
     i1(h), at most h / 3. The ratio of the mean to the linear coefficient is 0.2 r + 1 / h.
@@ -210,12 +215,10 @@ def demodulate(samples: Reals, cycles_per_sample: float, window_samples: int) ->
     )
 
 
-_LOWEST_ORDER = 0.1
+LOWEST_ORDER = 0.1
 """High-pass frequency for displacement, relative to the drive frequency; above drift and hum."""
 _BAND_ABOVE = 0.33
 """Low-pass frequency for displacement, relative to the sample rate."""
-_HIGHEST_ORDER = 0.45
-"""Frequency of the highest order relative to the sample rate; aliases above it look like lower orders."""
 _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Band, relative to the sample rate, that contains only vibrometer noise, above modes and impacts."""
@@ -236,7 +239,7 @@ class Line:
     frequency_hz: float
     amplitude_m: float
     sd_amplitude_m: float
-    """Uncertainty: scatter over tenths of the window for orders, noise floor of the spectrum for peaks."""
+    """Uncertainty: for orders, scatter over tenths of the window; for peaks, noise floor of the spectrum."""
     decibel: float
     """Level of the line relative to the spectral line at the drive frequency."""
 
@@ -300,7 +303,7 @@ class DwellResponse(Tabular):
     def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
         """Return a copy that counts the non-repeating part as noise, for motions not known to be irregular.
 
-        If the motion is not known to repeat either, the part counts as noise only if it is at most
+        If the motion is not known to repeat either, this part counts as noise only if it is at most
         `OVERHEARD` times the known noise.
         """
         heard_m = self.noise_displacement_m
@@ -354,17 +357,22 @@ def dwell_response(
         Whether each sample of the response bridges a drop-out; empty if there is none.
     """
     window = _window(
-        response.size, disturbed_samples(sample_rate_hz, _LOWEST_ORDER * near_hz), sample_rate_hz, window_s
+        response.size, disturbed_samples(sample_rate_hz, LOWEST_ORDER * near_hz), sample_rate_hz, window_s
     )
     level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
-    highest = _HIGHEST_ORDER * sample_rate_hz / level.frequency_hz
+    if level.frequency_hz > _BAND_ABOVE * sample_rate_hz:
+        raise UnusableData(
+            f"{sample_rate_hz:.6g} samples/s are too few for a sine at {level.frequency_hz:.6g} Hz; at least "
+            f"{1 / _BAND_ABOVE:.2g} samples per period are needed: record with a higher sample rate"
+        )
+    highest = HIGHEST_ORDER * sample_rate_hz / level.frequency_hz
     orders = tuple(order for order in orders if order <= highest)
     displacement = converted_signal(
         response,
         sample_rate_hz,
         given=Quantity.VELOCITY,
         wanted=Quantity.DISPLACEMENT,
-        low_hz=_LOWEST_ORDER * near_hz,
+        low_hz=LOWEST_ORDER * near_hz,
         high_hz=_BAND_ABOVE * sample_rate_hz,
         lines_hz=[order * level.frequency_hz for order in orders],
     )
@@ -374,7 +382,7 @@ def dwell_response(
     whole, base_whole, repeating = track_signals(
         (response[window], base[window], motion), phase, interval_samples=motion.size, orders=orders
     )
-    # Fit in tenths of the window, or in fewer parts of a short one: their scatter includes all changes.
+    # Fit tenths of the window; in a short window, fewer parts. The scatter of the parts includes all changes.
     cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
     blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
     parts, base_parts = track_signals(
@@ -397,7 +405,7 @@ def dwell_response(
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
     repeated = sizes_with_maxima(repeated)
     rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
-    # If all of the non-repeating part is noise, the motion is the repeating part.
+    # If the non-repeating part is only noise, the motion equals the repeating part.
     moved = repeated if noise.source == BETWEEN else motion
     lift = noise_lift(moved, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
@@ -405,7 +413,7 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        # Outside the window the signal may be a copy; interpolation would be wrong where the copy joins.
+        # Do not interpolate beyond the window: the signal there may be a copy that does not join smoothly.
         response_i=float(np.max(sizes_with_maxima(motion)[is_clear])) / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,
@@ -425,8 +433,7 @@ def dwell_response(
         displacement=displacement,
         is_clear=is_clear,
         spectrum=spectrum,
-        lines=_order_lines(whole, parts, level.frequency_hz)
-        + _peak_lines(spectrum, towards_hz, abs(whole.order(1.0)[0]) / omega),
+        lines=tuple(_lines(whole, parts, level.frequency_hz, spectrum, towards_hz)),
     )
 
 
@@ -446,7 +453,7 @@ def _window(samples: int, edge: int, sample_rate_hz: float, window_s: float) -> 
 
 def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
     """Return flags of samples more than one period of the high-pass away from bridged drop-outs."""
-    return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
+    return far_from(bridged, round(sample_rate_hz / (LOWEST_ORDER * near_hz)))
 
 
 def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
@@ -456,8 +463,8 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
     if np.mean(clear) < LEAST_CLEAR:
         raise UnusableData(
-            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the window is without "
-            f"drop-outs, but {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
+            f"the vibrometer lost its signal too often: {100 * np.mean(clear):.0f} % of the window is "
+            f"without drop-outs, but {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear
 
@@ -465,7 +472,7 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
 def _slow_changes(
     base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
 ) -> tuple[float, float]:
-    """Return the relative uncertainties due to slow change of the base, and of response over base."""
+    """Return the relative uncertainties due to slow change of the base, and of the ratio response / base."""
     settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
     rate = displacement.sample_rate_hz
     moved, shook = (
@@ -481,34 +488,30 @@ def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float
     quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)
     level = float(np.sqrt(np.median(density.density[quiet])))
     low, high = displacement.low_hz, displacement.high_hz
-    # White velocity noise integrated once: density ~ 1/f^2, with rms frequency sqrt(low high).
+    # Integrated white velocity noise has a density ~ 1/f^2 and the rms frequency sqrt(low high).
     rms_m = level / (2 * np.pi) * np.sqrt(1 / low - 1 / high)
     return level, Background(float(rms_m), float(np.sqrt(low * high)), "velocity channel")
 
 
-def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) -> tuple[Line, ...]:
+def _lines(
+    whole: TrackedOrders,
+    parts: TrackedOrders,
+    drive_hz: float,
+    spectrum: AmplitudeSpectrum,
+    towards_hz: tuple[float, ...],
+) -> Iterator[Line]:
+    """Yield the lines at the orders of the drive, and the largest peak near each of some frequencies."""
     reference = abs(whole.order(1.0)[0])
-    lines = []
     for index, order in enumerate(whole.orders):
         omega = 2 * np.pi * drive_hz * order
         size = float(whole.amplitude[index, 0])
         spread = standard_uncertainty(parts.value[index])
         level = _decibel(size / order, reference)
-        lines.append(Line(order_label(order), drive_hz * order, size / omega, spread / omega, level))
-    return tuple(lines)
-
-
-def _peak_lines(
-    spectrum: AmplitudeSpectrum, towards_hz: tuple[float, ...], reference_m: float
-) -> tuple[Line, ...]:
-    lines = []
+        yield Line(order_label(order), drive_hz * order, size / omega, spread / omega, level)
     for target in towards_hz:
-        peak = largest_peak(spectrum, 0.9 * target, 1.1 * target)
-        if peak is not None:
-            label = f"peak towards {target:g} Hz"
-            level = _decibel(peak.amplitude, reference_m)
-            lines.append(Line(label, peak.frequency_hz, peak.amplitude, peak.floor, level))
-    return tuple(lines)
+        if (peak := largest_peak(spectrum, 0.9 * target, 1.1 * target)) is not None:
+            level = _decibel(peak.amplitude, reference / (2 * np.pi * drive_hz))
+            yield Line(f"peak towards {target:g} Hz", peak.frequency_hz, peak.amplitude, peak.floor, level)
 
 
 def _decibel(amplitude: float, reference: float) -> float:

@@ -9,25 +9,29 @@ import numpy as np
 from vibench.acquisition.plan import Dwell, HeldDwell
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos.period import LONGEST_PERIOD, Points, shortest_period
-from ..chaos.verdict import MotionKind, MotionVerdict, begin_of_last_motion, motion_verdict
+from ..chaos.verdict import (
+    LONGEST_PERIOD,
+    MotionKind,
+    MotionVerdict,
+    Points,
+    begin_of_last_motion,
+    motion_verdict,
+    shortest_period,
+)
 from ..errors import InvalidRequest, NotEnoughData
-from ..recordings.channels import Channels, only_stretch, read_whole
-from ..recordings.checks import AbstractAnalysis
+from ..recordings.channels import RecordedChannels, only_stretch, read_whole
+from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, specimen_of
-from ..signals.arrays import Flags, Reals
-from ..signals.envelope import Envelope, envelope
+from ..signals.arrays import Envelope, Flags, Reals, envelope
 from ..signals.interpolation import REACH, interpolate
 from ..signals.quantity import Quantity, converted_signal
-from ..spectra.spectra import spectral_density
+from ..spectra import spectral_density
 from ..tables import Tabular
-from ..tones.sine_fit import fit_sine
-from .dwell import DwellResponse, clear_of_dropouts, dwell_response, silence_before
+from ..tones import fit_sine, largest_peak
+from .dwell import LOWEST_ORDER, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
-# Repetition of the motion of a dwell: Poincaré points and their verdict.
+# Whether the motion of a dwell repeats: Poincaré points, and the verdict from these points.
 
-_LOWEST_ORDER = 0.1
-"""High-pass frequency for both signals, relative to the drive frequency."""
 BAND_ABOVE = 0.25
 """Low-pass frequency relative to the sample rate; the filter ends within the band of the interpolation."""
 
@@ -36,7 +40,7 @@ _CLEAR_MOTION = 0.8
 """Minimum fraction of a dwell without drop-outs for the verdict that its motion does not repeat."""
 
 BURST = 15.0
-"""Only a burst has a maximum that deviates from the median by more than this many median deviations."""
+"""A maximum that deviates from the median by more than this many median deviations is a burst."""
 _LEAST_RISE = 0.01
 """Smallest relative rise of |x| above its usual maximum that counts as a burst."""
 
@@ -91,7 +95,7 @@ def stroboscope(
         response,
         sample_rate_hz,
         given=Quantity.VELOCITY,
-        low_hz=_LOWEST_ORDER * near_hz,
+        low_hz=LOWEST_ORDER * near_hz,
         high_hz=BAND_ABOVE * sample_rate_hz,
         lines_hz=[sine.frequency_hz],
     )
@@ -131,7 +135,7 @@ class DwellMotion(Tabular):
     verdict: MotionVerdict
 
 
-def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
+def dwell_motion(channels: RecordedChannels, response: DwellResponse) -> DwellMotion:
     """Return the Poincaré points of a dwell and the verdict on its motion.
 
     Raises UnusableData when samples were lost inside the dwell.
@@ -142,7 +146,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     bridged = channels.bridge_flags(stretch.start, stretch.stop)
     is_clear = clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz)
     clear = np.mean(is_clear)
-    # The few points of a short burst look like noise, and its maximum may lie outside the window.
+    # A short burst has few points, which look like noise, and its maximum may lie outside the window.
     rise = _largest_rise(response, is_clear, verdict.evidence.periods)
     if verdict.kind is MotionKind.PERIODIC and rise > _LEAST_RISE:
         why = f"a burst raises |x| {100 * rise:.2g} % above its usual maximum; find the cause and dwell again"
@@ -158,7 +162,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
 
 
 def _largest_rise(response: DwellResponse, is_clear: Flags, periods: int) -> float:
-    """Return the relative rise of |x| above the median of its maxima; 0 if scatter explains it."""
+    """Return the relative rise of |x| above the median of its maxima; 0 if scatter explains the rise."""
     motion = response.displacement
     size = np.where(is_clear, np.abs(motion.samples), 0.0)[motion.edge_samples : -motion.edge_samples]
     block = round(LONGEST_PERIOD * motion.sample_rate_hz / response.drive.frequency_hz)
@@ -193,7 +197,7 @@ def irregular_motion(section: Section, response: DwellResponse, rate_hz: float) 
     return IrregularMotion(start_s, stop_s, repeats)
 
 
-def dwell_section(channels: Channels, response: DwellResponse) -> Section:
+def dwell_section(channels: RecordedChannels, response: DwellResponse) -> Section:
     """Return the Poincaré points of a whole dwell."""
     drive, _, velocity = read_whole(channels, only_stretch(channels, SegmentLabel.DWELL))
     return stroboscope(
@@ -206,7 +210,7 @@ def dwell_section(channels: Channels, response: DwellResponse) -> Section:
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:
-    """Return the Poincaré points and their noise, each relative to the size of the orbit."""
+    """Return the Poincaré points and their noise, both relative to the size of the orbit."""
     sizes = np.array(
         [
             np.sqrt(2 * np.mean(section.orbit_displacement_m**2)),
@@ -275,9 +279,12 @@ DwellPlan = Dwell | HeldDwell
 WINDOW_S = 5.0
 """Analysed window as in the paper: the last 5 s of a dwell."""
 _DWELL_EDGE_PERIODS = 121
-"""Drive periods that integration disturbs, at both ends together."""
+"""Number of drive periods that integration disturbs, sum of both ends."""
 _SHORTEST_WINDOW_PERIODS = 50
 _TIME_BINS = 1200
+_LEAST_TURNS, _LEFT_OUT, _ABOVE_DRIFT = 10, 0.03, 30.0
+"""Minima for reporting a line as left out: periods within the window, and ratios of the line's amplitude to
+the largest displacement and to the noise floor, which rises towards 0 Hz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,7 +310,7 @@ def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
 
 
 def measured_dwell(
-    channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...], longest_s: float = WINDOW_S
+    channels: RecordedChannels, dwell: DwellPlan, towards_hz: tuple[float, ...], longest_s: float = WINDOW_S
 ) -> DwellResponse:
     """Analyse the last ``longest_s`` of a dwell, or all of a shorter dwell."""
     stretch = only_stretch(channels, SegmentLabel.DWELL)
@@ -330,6 +337,20 @@ def measured_dwell(
     )
 
 
+def slow_line_check(found: DwellResponse) -> tuple[Check, ...]:
+    """Warn of a line below the band of the displacement, such as a subharmonic of high order."""
+    low_hz, first_hz = found.displacement.low_hz, _LEAST_TURNS / found.window_s
+    peak = largest_peak(found.spectrum, first_hz, low_hz) if first_hz < 0.5 * low_hz else None
+    least_m = _LEFT_OUT * found.response_i * found.drive.amplitude_m
+    if peak is None or peak.amplitude < max(least_m, _ABOVE_DRIFT * peak.floor):
+        return ()
+    text = (
+        f"motion at {peak.frequency_hz:.2g} Hz, with an amplitude of {peak.amplitude:.3g} m, is left out of "
+        f"Response I and of the verdict, which include frequencies above {low_hz:g} Hz"
+    )
+    return (Check("Slow motion", Verdict.WARNING, text),)
+
+
 def settled_envelope(response: DwellResponse) -> Envelope:
     """Return the envelope of x over the dwell, for plots."""
     motion = response.displacement
@@ -340,7 +361,7 @@ def settled_envelope(response: DwellResponse) -> Envelope:
 _HIGHEST_ORDER = 2.4
 """Upper end of a shown spectrum relative to the drive frequency."""
 COLUMN_HZ = 1.0
-"""Width of a column [Hz] in which only the largest spectral line is drawn, as a figure has no more pixels."""
+"""Width of a column [Hz]; only its largest spectral line is drawn, because a figure has no more pixels."""
 
 
 def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Flags, Reals
+from ..signals.arrays import PER_NEPER_DB, Flags, Reals
 from ..tables import Tabular
 from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
@@ -24,10 +24,9 @@ _TRANSITION = 3
 """Number of intervals within the jump itself, which belong to neither side."""
 _DEGREE, _EXPLAINED = 4, 0.06
 """Degree of the polynomial fitted to 1/response squared at a resonance, and its largest residual relative to
-the step. A jump leaves 0.13 or more; 400 resonances left at most 0.03."""
+the step. A jump leaves a residual of 0.13 or more; 400 resonances left at most 0.03."""
 _LARGER = 2.0
 """Minimum ratio of a jump to the largest step near it in the response of the linear specimen."""
-_PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def jumps(
 ) -> tuple[Jump, ...]:
     """Return the jumps of a response over time.
 
-    At each interval, straight lines are fitted to the logarithm of the response before and after. A jump is a
+    Before and after each interval, a straight line is fitted to the logarithm of the response. A jump is a
     local maximum of the difference between both lines, of at least 1.5 dB and 8 standard errors. Resonances
     of a linear specimen, which are steep and ring in a fast sweep, are excluded. The position of a jump
     maximises the likelihood; its bounds come from the likelihood ratio.
@@ -86,7 +85,7 @@ def jumps(
     allowed = np.ones(time_s.shape, dtype=np.bool_) if smooth is None else smooth
     logarithm = _logarithm(response)
     size, error = _steps(logarithm)
-    clear = (np.abs(size) * _PER_NEPER_DB >= _SMALLEST_DB) & (np.abs(size) >= _CLEAR * error)
+    clear = (np.abs(size) * PER_NEPER_DB >= _SMALLEST_DB) & (np.abs(size) >= _CLEAR * error)
     explained = np.zeros_like(size) if linear is None else _steps(_logarithm(linear))[0]
     found = []
     for place in _peaks(np.where(clear, np.abs(size), 0.0)):
@@ -107,23 +106,21 @@ def _logarithm(response: Reals) -> Reals:
 
 
 def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
-    """Return each interval's step, from the line fitted before it to the line after it, with its error."""
+    """Return the step at each interval, from the line fitted before to the line fitted after, with errors."""
     count = logarithm.size
     size, error = np.zeros(count), np.full(count, np.inf)
     ahead = np.arange(_SIDE) + _TRANSITION / 2
-    # Weights that give the value at zero of a line through (ahead, y), and their variance.
+    # Weights with which a line fitted to (ahead, y) gives the value at zero, and the value's variance.
     basis = np.column_stack((np.ones(_SIDE), ahead))
     solver = np.linalg.pinv(basis)
     variance = float(np.linalg.inv(basis.T @ basis)[0, 0])
-    for place in range(_SIDE + _TRANSITION, count - _SIDE - _TRANSITION):
-        after = logarithm[place + _TRANSITION // 2 : place + _TRANSITION // 2 + _SIDE]
-        stop = place - _TRANSITION // 2
-        before = logarithm[stop - _SIDE : stop][::-1]
-        lines = solver @ np.column_stack((after, before))
-        left = np.column_stack((after, before)) - basis @ lines
-        scatter = np.sum(left**2, axis=0) / (_SIDE - 2)
-        size[place] = lines[0, 0] - lines[0, 1]
-        error[place] = np.sqrt(variance * scatter.sum()) + np.finfo(np.float64).eps
+    places = np.arange(_SIDE + _TRANSITION, count - _SIDE - _TRANSITION)
+    away = _TRANSITION // 2 + np.arange(_SIDE)
+    sides = np.stack((logarithm[places[:, None] + away], logarithm[places[:, None] - 1 - away]))
+    lines = sides @ solver.T
+    scatter = np.sum((sides - lines @ basis.T) ** 2, axis=-1) / (_SIDE - 2)
+    size[places] = lines[0, :, 0] - lines[1, :, 0]
+    error[places] = np.sqrt(variance * scatter.sum(axis=0)) + np.finfo(np.float64).eps
     return size, error
 
 
@@ -164,7 +161,7 @@ def _likely(logarithm: Reals) -> tuple[int, int, int]:
 def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, logarithm: Reals) -> Jump:
     best = places[1]
     between = [0.5 * float(frequency_hz[each - 1] + frequency_hz[each]) for each in places]
-    # The jump lies within half an interval before or after the boundary between two intervals.
+    # The jump lies at a boundary between two intervals, within half an interval on either side.
     half = 0.5 * abs(float(frequency_hz[best] - frequency_hz[best - 1]))
     size, error = _steps(logarithm[max(0, best - 2 * _SIDE) : best + 2 * _SIDE])
     at = best - max(0, best - 2 * _SIDE)
@@ -182,10 +179,10 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
 
 
 JUMP_FACTOR = 2.0
-"""Minimum ratio of Response II between two levels for a jump; for a linear specimen the ratio is 1."""
+"""Minimum ratio of Response II at two levels that counts as a jump; for a linear specimen the ratio is 1."""
 
 _UNSTEADY = 0.05
-"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as such."""
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +218,7 @@ def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
 
 
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
-    """Return the bounds of the difference between the level of the jump up and that of the jump down [V].
+    """Return the bounds of the difference: level of the jump up minus level of the jump down [V].
 
     Returns None unless there are jumps in both directions.
     """
@@ -248,14 +245,14 @@ class SteppedLevelAnalysis(SteppedSineAnalysis):
 
     @property
     def hysteresis_vpp(self) -> tuple[float, float] | None:
-        """Bounds of the difference between the level of the jump up and that of the jump down [V]."""
+        """Bounds of the difference: level of the jump up minus level of the jump down [V]."""
         return hysteresis_vpp(self.jumps)
 
 
 _POINTS = 1000
 _APART_DB = 1.5
 _SMOOTHED_POINTS = 21
-"""Number of averaged points, so that the scatter of chaos does not count as hysteresis."""
+"""Number of points that are averaged, so that the scatter of chaos does not count as hysteresis."""
 _PER_BEL_DB = 20.0
 
 
@@ -299,16 +296,12 @@ def hysteresis(
     if low >= high:
         raise InvalidRequest("the two sweeps have no frequency in common; compare sweeps of the same range")
     frequency_hz = np.linspace(low, high, _POINTS)
-    curves = [_response_near(each, frequency_hz) for each in (up, down)]
+    orders = ((each, np.argsort(each.frequency_hz)) for each in (up, down))
+    curves = [np.interp(frequency_hz, one.frequency_hz[to], one.response_ii[to]) for one, to in orders]
     apart_db = _PER_BEL_DB * np.log10(curves[0] / curves[1])
     together = uniform_filter1d(apart_db, _SMOOTHED_POINTS, mode="nearest")
     differs = np.asarray(np.abs(together) > _APART_DB)
     return Hysteresis(frequency_hz, curves[0], curves[1], differs, _pairs(up_jumps, down_jumps))
-
-
-def _response_near(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
-    order = np.argsort(sweep.frequency_hz)
-    return np.asarray(np.interp(frequency_hz, sweep.frequency_hz[order], sweep.response_ii[order]))
 
 
 def _pairs(up: tuple[Jump, ...], down: tuple[Jump, ...]) -> tuple[tuple[Jump, Jump], ...]:

@@ -31,16 +31,16 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import NotEnoughData
-from ..recordings.channels import Channels, Stretch
+from ..recordings.channels import RecordedChannels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
 from ..signals.quantity import steady_line
 from ..tables import Tabular, columns, plus_minus
-from ..tones.sine_fit import fit_sine
+from ..tones import fit_sine
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
-"""Plans that are recorded in steps of frequency or level."""
+"""Plans whose recordings have steps of frequency or level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end."""
 _OF_A_STEP = (
@@ -82,7 +82,10 @@ class SteppedResponse(Tabular):
 
 
 def stepped_response(
-    channels: Channels, plan: Steps, label: SegmentLabel, setting_vpp: Callable[[Steps, Stretch], float]
+    channels: RecordedChannels,
+    plan: Steps,
+    label: SegmentLabel,
+    setting_vpp: Callable[[Steps, Stretch], float],
 ) -> SteppedResponse:
     """Analyse every complete step as a dwell.
 
@@ -111,7 +114,7 @@ def stepped_response(
     )
 
 
-def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:
+def _step(channels: RecordedChannels, stretch: Stretch, plan: Steps) -> DwellResponse | None:
     data = channels.read(stretch.start, stretch.stop)
     if np.isnan(data).any():
         return None
@@ -120,10 +123,10 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
     line = steady_line(data[-1], fit_sine(data[0], rate, near_hz).frequency_hz / rate, edge).samples()
     inside = line[edge:-edge]
-    # Remove sensor drift: it would jump where the record is continued, and integration amplifies jumps.
+    # Remove sensor drift: where the record is continued, drift means a jump, which integration amplifies.
     data[-1] = scipy.signal.detrend(data[-1] - inside) + inside
     # Samples outside the step have another frequency or level, and would affect the integration. Replace
-    # them: continue the sine exactly, and the rest by copies.
+    # these samples: continue the sine exactly, and the remaining signal by copies.
     places = _continuation_samples(data, rate / near_hz, edge)
     drive, base, response = data[:, places]
     response += line - inside[places]
@@ -165,16 +168,16 @@ def _repeats_after(motion: Reals, period_samples: float) -> int:
     return int(shifts[np.argmin(apart)]) if apart else motion.size
 
 
-def settled_check(response: SteppedResponse) -> Check:
-    """Warn of steps whose response still changed during the record."""
-    changing_hz = response.frequency_hz[np.isnan(response.slow_change)]
+def settled_check(what: str, frequency_hz: Reals, slow_change: Reals) -> Check:
+    """Warn of steps or of a dwell if the base level or the response still changed during the record."""
+    changing_hz = frequency_hz[np.isnan(slow_change)]
     if not changing_hz.size:
-        return Check("Steps settled", Verdict.PASSED, "no response drifted during its step")
+        return Check(what, Verdict.PASSED, "neither base level nor response drifted")
     text = (
-        f"{changing_hz.size} of {response.frequency_hz.size} responses still changed during their steps, "
-        f"first at {changing_hz[0]:.6g} Hz, so they have no bounds; increase the settling time"
+        f"base level or response still changed during {changing_hz.size} of {frequency_hz.size} records, "
+        f"first at {changing_hz[0]:.6g} Hz, so these responses have no bounds; increase the settling time"
     )
-    return Check("Steps settled", Verdict.WARNING, text)
+    return Check(what, Verdict.WARNING, text)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,19 +192,10 @@ class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
 # Sentences on the findings of feedback: jumps, irregular motions, resonances, missed levels.
 
 
-@dataclass(frozen=True)
-class NotedJump:
-    """A jump of a stepped sine between two settled frequencies."""
-
-    direction: str
-    low_hz: float
-    high_hz: float
-
-
-def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Return the jumps whose two frequencies are as close together as requested."""
+def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[tuple[float, float, str], ...]:
+    """Return both bounds [Hz] and the direction of each jump that was located as precisely as requested."""
     return tuple(
-        NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
+        (min(each.before_hz, each.after_hz), max(each.before_hz, each.after_hz), each.direction)
         for each in notes
         if isinstance(each, JumpNote) and each.how is JumpSearchEnd.LOCALISED
     )
@@ -211,7 +205,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     """Yield sentences on the findings of feedback; none without feedback."""
     jumps = noted_jumps(notes)
     if jumps:
-        text = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
+        text = ", ".join(f"{low_hz:.5g} and {high_hz:.5g} Hz ({way})" for low_hz, high_hz, way in jumps)
         yield f"Jumps between {text}."
     yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
     yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
@@ -219,7 +213,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
 
 
 def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
-    """Yield sentences on the kinds of recorded motions (except period one) and on missed levels."""
+    """Yield sentences on the kinds of recorded motions (except period one) and on levels not reached."""
     count = Counter((each.motion, each.period) for each in steps)
     kinds = [
         f"period {period}: {count[Steadiness.PERIODIC, period]}"
@@ -230,7 +224,7 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
     for motion, word in ((Steadiness.APERIODIC, "no period"), (Steadiness.UNSETTLED, "not settled")):
         kinds += [f"{word}: {motions[motion]}"] * bool(motions[motion])
     if kinds:
-        yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
+        yield f"{len(steps)} recorded motions, by kind: {', '.join(kinds)}."
     outside = sum(each.level is Hold.OUTSIDE for each in steps)
     if outside:
         yield f"The base level was out of tolerance in {outside} of {len(steps)} recorded motions."
@@ -263,8 +257,8 @@ def _resonance(note: ResonanceNote) -> str:
     if note.frequency_hz is None or note.frequency_u_hz is None:
         after = f"after {note.periods} periods " if note.periods else ""
         return (
-            f"No {of} at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° "
-            f"at {note.at_hz:.5g} Hz, the level {note.held.value}, the motion {note.motion.value}."
+            f"No {of} at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° at "
+            f"{note.at_hz:.5g} Hz, the level was {note.held.value}, and the motion was {note.motion.value}."
         )
     took = f", {note.periods} periods" if note.periods else ""
     hertz = plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)
@@ -308,32 +302,23 @@ class TrackedResonance:
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
     """Return the resonances that were found, sorted by base level from the weakest."""
-    return tuple(sorted(_tracked_levels(notes), key=lambda each: each.base_m_per_s2))
+    keys = (
+        "number=level base_m_per_s2 frequency_hz u_frequency_hz=frequency_u_hz harmonic subharmonic mode_hz "
+        "u_mode_hz=mode_u_hz damping_ratio"
+    )
+    found = []
+    for each in notes:
+        if isinstance(each, ResonanceNote) and None not in {each.frequency_hz, each.frequency_u_hz}:
+            fundamental_m = each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2
+            amplitude_m = each.harmonic_m or fundamental_m
+            found.append(TrackedResonance(**columns(each, keys), amplitude_m=amplitude_m))
+    return tuple(sorted(found, key=lambda each: each.base_m_per_s2))
 
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
     """Return the requested levels [m/s²] at which no resonance was found."""
     lost = (each for each in notes if isinstance(each, ResonanceNote) and each.frequency_hz is None)
     return tuple(sorted(each.asked_m_per_s2 for each in lost))
-
-
-def _tracked_levels(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
-    for each in notes:
-        if not isinstance(each, ResonanceNote) or each.frequency_hz is None or each.frequency_u_hz is None:
-            continue
-        yield TrackedResonance(
-            number=each.level,
-            base_m_per_s2=each.base_m_per_s2,
-            frequency_hz=each.frequency_hz,
-            u_frequency_hz=each.frequency_u_hz,
-            amplitude_m=each.harmonic_m
-            or each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
-            harmonic=each.harmonic,
-            subharmonic=each.subharmonic,
-            mode_hz=each.mode_hz,
-            u_mode_hz=each.mode_u_hz,
-            damping_ratio=each.damping_ratio,
-        )
 
 
 def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:

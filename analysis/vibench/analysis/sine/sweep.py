@@ -18,19 +18,19 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.interpolation import Decimator, decimation_factor
 from ..signals.quantity import Quantity, converted_signal, disturbed_samples
 from ..tables import Tabular
-from ..tones.order_tracking import (
+from ..tones import (
     ALL_ORDERS,
     ORDERS,
     TrackedOrders,
     cycles_needed,
+    noise_lift,
     track_orders,
     track_signals,
 )
-from ..tones.sine_fit import noise_lift
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
-"""Margin beside the drive's band, relative to the band's end; the filter falls in the margin's outer half."""
+"""Margin beside the drive's band, relative to the band's end; the filter edge is its outer half."""
 _EDGE_CYCLES = 8
 """Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
 _LEAST_CYCLES = 10
@@ -115,16 +115,14 @@ _LINEAR_ABOVE = 5.5
 _STEADY_POINTS = 10_001
 _PEAK_POINTS = 401
 _SAME_LARGEST = 0.03
-"""Largest relative difference at which the largest Response II agrees with the linear simulation."""
+"""Largest relative difference from the linear simulation at which the largest Response II agrees with it."""
 _LINES = 1 << 15
 """Largest number of frequencies at which linear motion is computed in one batch."""
 _BRIDGE_PERIODS = 3.0
 """Periods of the lower band edge in which an error from bridging decays from 3 to 0.02 times the motion."""
 _ROOM = 1.1
-"""Factor on the length of the longer intervals, because the first may start slightly below the band."""
+"""Factor on the length of the longer intervals; the first of them may start slightly below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
-_NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
-"""Sixth difference, which removes the smooth motion and has unit gain for white noise."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,7 @@ class SweptMotion(Tabular):
     """Orders 2 and 3 relative to order 1, without contact; modes may ring at twice the drive frequency."""
     steady_over_swept: float
     """Largest Response II without contact: value for steady sines divided by value in this sweep. NaN if the
-    measured Response II differs from the latter, for example while the specimen still rings."""
+    measured Response II differs from that in this sweep, for example while the specimen still rings."""
     interval_s: float
 
     def largest(self, response: Reals) -> int:
@@ -265,7 +263,7 @@ class SweepSums:
 
     @property
     def neighbour_samples(self) -> int:
-        """Number of samples before and after the sweep that its displacement needs, in whole intervals."""
+        """Number of samples that the displacement needs before and after the sweep, in whole intervals."""
         disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
         return self._factor * self._interval * ceil(disturbed / self._interval)
 
@@ -296,11 +294,10 @@ class SweepSums:
         data = np.concatenate((self._carry, np.stack((block[_RESPONSE], seen))), axis=1)
         count = data.shape[1] // full
         whole, seen = data[:, : count * full].reshape(2, count, full)
-        noise = np.zeros((count, full - _NOISE_DIFFERENCE.size + 1))
-        for tap, weight in enumerate(_NOISE_DIFFERENCE):
-            noise += weight * whole[:, tap : tap + noise.shape[1]]
+        # The sixth difference removes the smooth motion and multiplies the rms of white noise by sqrt(924).
+        noise = np.diff(whole, 6, axis=1)
         self._extremes.append(
-            np.stack((seen.max(axis=1), seen.min(axis=1), np.sqrt(np.mean(noise**2, axis=1))))
+            np.stack((seen.max(axis=1), seen.min(axis=1), np.sqrt(np.mean(noise**2, axis=1) / 924)))
         )
         self._carry = data[:, count * full :].copy()
 
@@ -330,7 +327,7 @@ class SweepSums:
         )
 
     def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
-        """Return the quantities that simulated records (draws) need; see `response`."""
+        """Return the quantities that are needed from simulated records (draws); see `response`."""
         return self._evaluate(delay_s, linear)[0]
 
     @property
@@ -369,7 +366,7 @@ class SweepSums:
         residual = impacts = linear_ii = np.full(upper.size, np.nan)
         steady_over_swept = np.nan
         if linear is not None:
-            # Excite the linear specimen by order 1 only: accelerometer noise would also excite its modes.
+            # Excite the linear specimen by order 1 only: accelerometer noise would excite modes too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
             place = np.arange(data.shape[1])
             at_middles = base.order(1.0)
@@ -440,7 +437,7 @@ class SweepSums:
 
     def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
         """Return the velocity [m/s] without contact due to the recorded acceleration of the base [m/s2]."""
-        # Pad with zeros, so that ringing after the end does not wrap around to the start.
+        # Pad with zeros: otherwise ringing after the end would wrap around to the start.
         padded = fft.next_fast_len(2 * base.size, real=True)
         frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
         low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz
@@ -465,7 +462,7 @@ class SweepSums:
 
 
 def _largest_steady(linear: Transmission, low_hz: float, high_hz: float) -> float:
-    """Return the largest magnitude of a transmission between two frequencies, including narrow modes."""
+    """Return the largest magnitude of a transmission between two frequencies; narrow modes are not missed."""
     hz, step_hz = np.linspace(low_hz, high_hz, _STEADY_POINTS, retstep=True)
     steady = np.abs(linear(hz))
     rising = np.diff(steady) > 0

@@ -26,9 +26,8 @@ from vibench.acquisition.plan import (
     WhiteNoise,
     base_motion,
     measuring_s,
-    preview_measurement,
+    preview_signal,
 )
-from vibench.acquisition.recording import UntilNote
 from vibench.acquisition.rig import BaseQuantity, Rig, RigModel, Role, amplifier_of, shaker_of, specimen_of
 from vibench.sim import base_transmissibility, fault_in_words
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
@@ -37,15 +36,21 @@ from ..errors import AnalysisError, InvalidRequest
 from ..frequency_response.resonance import resonances
 from ..frequency_response.results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II
-from ..recordings.checks import Check, Verdict
-from ..recordings.facts import RecordingFacts
 from ..signals.arrays import Reals
+from ..signals.averaging import Window
 from ..signals.quantity import Quantity
-from ..signals.window import Window
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Tabular
-from .budget import COVERAGE, RESULT_PATTERNS, WIDENING, Cause, ChannelSd, Contribution, stated_uncertainties
-from .quantities import of_one_draw
+from .budget import (
+    COVERAGE,
+    RESULT_PATTERNS,
+    WIDENING,
+    Cause,
+    ChannelSd,
+    Contribution,
+    of_one_draw,
+    stated_uncertainties,
+)
 
 STEADY = 1e-4
 """Relative scatter up to which a simulated motion counts as repeating."""
@@ -54,7 +59,7 @@ _EDGE_PERIODS = 80
 """Drive periods at each end of a window that integration disturbs."""
 _FINEST_STEP_HZ = 51_200.0
 _SURELY_OTHER = 5.0
-"""Difference between runs [standard errors] above which they count as different motions."""
+"""Difference between runs [standard errors] above which their motions count as different."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ class SimulatedDwell:
     sd_second: float
     """Relative standard deviation of Response II; 0 if nothing collides."""
     has_several_motions: bool
-    """Whether some runs collide and others do not, or the runs differ by more than chance."""
+    """Whether only some of the runs have collisions, or the runs differ by more than chance."""
 
 
 def simulated_dwell(
@@ -75,7 +80,7 @@ def simulated_dwell(
     """Simulate amplifier, table and specimen with the plan's voltage, and analyse them like a recording.
 
     Some runs start more gently than the generator's ramp, others more abruptly. If all reach the same motion,
-    so should the measurement. None if a simulation fails, or the window is too short.
+    the measurement should reach it too. None if a simulation fails, or the window is too short.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
     phase = 2 * np.pi * (np.arange(per_period) + 0.5) / per_period
@@ -113,8 +118,8 @@ def simulated_dwell(
 
 
 def _scatter(found: DwellResponse) -> tuple[float, float]:
-    """Return the relative scatter of both Responses, as for a recording."""
-    # A small part that does not repeat counts as noise.
+    """Return the relative scatter of Responses I and II, determined as for a recording."""
+    # If the part of the motion that does not repeat is small, this part counts as noise.
     like_noise = float(np.nan_to_num(found.noise_error_i)) / found.response_i
     chance = of_one_draw(found).relative or 0.0
     return float(np.hypot(like_noise, chance)), found.sd_response_ii / found.response_ii
@@ -155,7 +160,7 @@ class ExpectedResult(Tabular):
     """Relative standard uncertainty due to noise or chance after `time_s`; None if not stated."""
     cause: Cause
     lasting: float
-    """Relative standard uncertainty that time does not reduce: calibrations, alignment, clock."""
+    """Relative standard uncertainty that a longer time does not reduce: calibrations, alignment, clock."""
     not_stated: tuple[Cause, ...]
 
     def after(self, time_s: float) -> float | None:
@@ -234,7 +239,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[ExpectedRe
 
 
 MOST_STEPS = 6
-"""Maximum number of parts whose end is predicted; other parts are assumed to last as long on average."""
+"""Maximum number of parts whose end is predicted; all other parts are assumed to last as long on average."""
 
 
 def recorded_s(measurement: Measurement) -> float:
@@ -274,7 +279,7 @@ def _in_all(
 
 
 def _stretches(measurement: Measurement, rig: Rig) -> Iterator[tuple[float | None, float, float]]:
-    """Yield durations [s] of some parts: needed for all targets, up to the first check, and planned."""
+    """Yield three durations [s] of some parts: needed for all targets, up to the first check, and planned."""
     until, excitation = measurement.until, measurement.excitation
     if until is None:
         return
@@ -305,7 +310,7 @@ def needed_s(expected: tuple[ExpectedResult, ...], until: Until) -> float | None
         for each in found:
             if each.scatter is None:
                 return None
-            # For a maximum, `scatter` is 0; `lasting` is its uncertainty, which does not fall with time.
+            # For a maximum, `scatter` is 0, and `lasting` is the uncertainty, which does not fall with time.
             share = COVERAGE * WIDENING * (each.scatter or each.lasting) / wish
             fixed = float(np.inf) if share > 1.0 else 0.0
             needs.append(each.time_s * share**2 if each.scatter else fixed)
@@ -316,23 +321,6 @@ def end_s(need_s: float, first_s: float, longest_s: float) -> float:
     """Return the time of the first check at or after ``need_s``, at most ``longest_s`` [s]."""
     looks = np.ceil(np.log(min(max(need_s, first_s), longest_s) / first_s) / np.log(LOOK_FACTOR) - 1e-6)
     return float(min(first_s * LOOK_FACTOR ** max(0.0, looks), longest_s))
-
-
-def until_checks(facts: RecordingFacts) -> Iterator[Check]:
-    """Compare the recorded time of a measurement that sets `until` with the predicted time."""
-    notes = [each for each in facts.feedback if isinstance(each, UntilNote)]
-    if not notes:
-        return
-    time_s = sum(each.recorded_s or 0.0 for each in notes)
-    try:
-        expected_s = expected_recorded_s(facts.measurement, Rig.model_validate(facts.bench))
-    except ValidationError:  # a recording that was imported, or written by another version
-        expected_s = None
-    forecast = "no time was predicted" if expected_s is None else f"{expected_s:.3g} s were predicted"
-    last = f"{notes[-1].sentence}; " if len(notes) == 1 else ""
-    reached = sum(each.is_reached for each in notes)
-    text = f"{last}{reached} of {len(notes)} parts reached their targets, {time_s:.4g} s in total; {forecast}"
-    yield Check("Recorded until known", Verdict.PASSED if reached == len(notes) else Verdict.WARNING, text)
 
 
 def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
@@ -369,8 +357,8 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: ChannelSd) -> Iterator
     excitation, specimen = measurement.excitation, specimen_of(rig)
     time_s = recorded_s(measurement)
     low_hz, high_hz = excitation.band_hz
-    rms_v = preview_measurement(measurement, rig).rms_v * rig.generator.terminal_factor()
-    # Without contact, p is Gaussian over many cycles; check whether it would reach a stop.
+    rms_v = preview_signal(excitation, rig)[0].rms_v * rig.generator.terminal_factor()
+    # Without contact, p would be Gaussian over many cycles; check whether this p would reach a stop.
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
     p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
     rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
@@ -384,7 +372,7 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: ChannelSd) -> Iterator
     if lines is not None:
         try:
             found = resonances(lines, low_hz=low_hz, high_hz=high_hz)
-        except InvalidRequest:  # the band has too few lines for a fit
+        except InvalidRequest:  # too few lines in the band for a fit
             return
         modes = [
             (
@@ -471,19 +459,14 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: ChannelSd, at_hz: float
     lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
     missing = _missing(stated.response, stated.base, stated.timing(1))
     for name, scatter in ((RESPONSE_I, chance.sd_largest), (RESPONSE_II, chance.sd_second)):
-        if chance.has_several_motions:
-            yield ExpectedResult(name, window_s, None, Cause.CHANCE, lasting, missing)
-        elif scatter > STEADY and name == RESPONSE_I:
-            # The largest value scatters from window to window, however long the recording is.
-            yield ExpectedResult(
-                name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing
-            )
-        elif scatter > STEADY:
-            yield ExpectedResult(name, window_s, scatter, Cause.CHANCE, lasting, missing)
-        else:
+        error, cause, rest = None if chance.has_several_motions else scatter, Cause.CHANCE, lasting
+        if error is not None and scatter <= STEADY:
             # Noise of generator and amplifier moves the masses, and the rig does not state this noise.
-            error = None if name == RESPONSE_I else by_noise
-            yield ExpectedResult(name, window_s, error, Cause.NOISE, lasting, missing)
+            error, cause = None if name == RESPONSE_I else by_noise, Cause.NOISE
+        elif error is not None and name == RESPONSE_I:
+            # The largest value scatters from window to window, however long the recording is.
+            error, rest = 0.0, float(np.hypot(scatter, lasting))
+        yield ExpectedResult(name, window_s, error, cause, rest, missing)
 
 
 @dataclass(frozen=True)
@@ -496,7 +479,7 @@ class TimeShare:
     needed_s: float | None
     """Predicted recording time until the targets are reached [s]; None without targets or a prediction."""
     allotted_s: float
-    """Longest recording time after the available time has been distributed [s]."""
+    """Longest recording time of the measurement after the available time has been distributed [s]."""
 
     @property
     def sentence(self) -> str:
@@ -518,8 +501,8 @@ def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
     mine = [each for each in campaign.measurements if needs[each.name] is not None]
     if not mine:
         raise ConfigurationError(
-            f"{campaign.name} has no measurement with 'until' whose time can be predicted, so there is "
-            "nothing to distribute. Nothing was played; add 'until' to a measurement, or leave --within out"
+            f"in {campaign.name}, no measurement with 'until' has a predictable duration, so the time of "
+            "--within cannot be divided. Nothing was played; add 'until' to a measurement, or omit --within"
         )
     places = campaign.places
     variable_s = sum(places * each.repeats * _cost(each) * recorded_s(each) for each in mine)
@@ -530,7 +513,7 @@ def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
         most = (
             f"in this time, bounds would be {sqrt(needed_s / left_s):.2g} times as wide as requested"
             if left_s > 0
-            else "ramps, settling and measurements without targets take longer"
+            else "ramps, settling and measurements without targets alone take longer"
         )
         raise ConfigurationError(
             f"{available_s:g} s are too short for the targets of {campaign.name}, which need about "
@@ -549,7 +532,7 @@ def fit_to(campaign: Campaign, rig: Rig, available_s: float) -> tuple[Campaign, 
 
 
 def _cost(measurement: Measurement) -> float:
-    """Return the ratio of rig time to recorded time; each realisation of noise adds ramps and a wait."""
+    """Return rig time / recorded time; each realisation of noise needs ramps and a wait in addition."""
     has_many = measurement.excitation.stretches > 1
     return measuring_s(measurement) / recorded_s(measurement) if has_many else 1.0
 
@@ -568,6 +551,6 @@ def _with_duration(measurement: Measurement, time_s: float) -> Measurement:
         return Measurement.model_validate(document)
     except ValidationError as error:
         raise ConfigurationError(
-            f"{measurement.name} would be recorded for {time_s:.4g} s, which its kind does not allow "
-            f"({fault_in_words(error.errors()[0])}). Nothing was played; give less time or wider bounds"
+            f"{measurement.name} would be recorded for {time_s:.4g} s, which its kind of excitation does not "
+            f"allow ({fault_in_words(error.errors()[0])}). Nothing was played; give less time or wider bounds"
         ) from error

@@ -1,21 +1,33 @@
-"""Curve for comparisons: ratio of m0's motion to the base motion, over frequency.
+"""Compare measurements and predictions as curves over frequency.
 
-All measured and predicted responses are ratios of displacements and share one axis. Names distinguish them,
-because the transmission of a specimen with impacts is not equal to its Response I.
+A curve is the ratio of m0's displacement to the base displacement over frequency [Hz], with its relative
+standard deviation. It shows a measured, simulated or predicted transmission, Response I or Response II. The
+package also finds peaks, values at markers, and differences of curves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Annotated, Self
 
 import numpy as np
 import scipy
+from pydantic import Field, PositiveFloat, model_validator
 
-from ..errors import NotEnoughData
-from ..live import column_starts, envelope
-from ..overlay.ensemble import CurveDifference, logarithmic_difference
-from ..signals.arrays import Reals
-from ..tables import Tabular
+from vibench.sim import FrozenModel
+
+from .errors import NotEnoughData
+from .frequency_response.noise_response import NoiseResponse
+from .frequency_response.results import Estimator, FrequencyResponseRequest
+from .live import column_starts, envelope
+from .overlay.ensemble import CurveDifference, logarithmic_difference
+from .overlay.overlay import ResponsePrediction, Simulation
+from .signals.arrays import PER_NEPER_DB, Reals
+from .signals.averaging import DEFAULT_CONFIDENCE, Window
+from .sine.dwell import DwellResponse
+from .sine.stepped_response import SteppedResponse
+from .sine.sweep import SweptMotion
+from .tables import Tabular
 
 
 class CurveOrigin(StrEnum):
@@ -25,11 +37,13 @@ class CurveOrigin(StrEnum):
     SIMULATED = "simulated"
     """Simulation driven by the recorded voltage or base motion, analysed with the same estimator."""
     PREDICTED = "predicted"
-    """Predicted response of the specimen driven by sines."""
+    """Predicted response of the specimen when driven by sines."""
     STABLE = "stable branches"
     """Stable periodic motions on branches; there may be several at one frequency."""
     UNSTABLE = "unstable branches"
     """Unstable periodic motions on branches; there may be several at one frequency."""
+    UNDECIDED = "branches of undecided stability"
+    """Periodic motions whose largest Floquet multiplier has the magnitude 1 within its error."""
 
 
 class CurveKind(StrEnum):
@@ -66,16 +80,16 @@ class Curve(Tabular):
     @property
     def is_single_valued(self) -> bool:
         """Whether each frequency has one value; branches may have several."""
-        return self.origin not in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE)
+        return self.origin not in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE, CurveOrigin.UNDECIDED)
 
     @property
     def lower(self) -> Reals:
-        """Lower bound, two standard deviations below ln(magnitude), but at least a tenth of the magnitude."""
+        """Lower bound: ln(magnitude) less two standard deviations, but at least a tenth of the magnitude."""
         return np.asarray(self.magnitude * np.exp(-self._reach))
 
     @property
     def upper(self) -> Reals:
-        """Upper bound, two standard deviations above ln(magnitude), but at most ten times the magnitude."""
+        """Upper bound: ln(magnitude) plus two standard deviations, but at most ten times the magnitude."""
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
@@ -107,7 +121,7 @@ class Curve(Tabular):
 
 
 def sorted_curve(curve: Curve) -> Curve:
-    """Return the curve sorted by frequency, without duplicates, for downward sweeps and repeated points."""
+    """Return the curve sorted by frequency, without duplicates: sweeps may go down, and points may repeat."""
     frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
         curve,
@@ -125,45 +139,40 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     for each in (curve, reference):
         if not each.is_single_valued:
             raise NotEnoughData(
-                f"{each.name} has several values at one frequency, so its difference is not defined; "
+                f"{each.name} has several values at one frequency, so a difference is not defined; "
                 "compare curves of recordings or predictions"
             )
-    low = max(curve.frequency_hz[0], reference.frequency_hz[0])
-    high = min(curve.frequency_hz[-1], reference.frequency_hz[-1])
-    shared = (curve.frequency_hz >= low) & (curve.frequency_hz <= high) & np.isfinite(curve.magnitude)
+    other = reference.at(curve.frequency_hz)
+    shared = np.isfinite(curve.magnitude) & np.isfinite(other.magnitude)
     if not shared.any():
         raise NotEnoughData(
             f"{curve.name} and {reference.name} have no frequency in common; compare curves that overlap"
         )
-    place = curve.frequency_hz[shared]
-    other = reference.at(place)
     return logarithmic_difference(
-        place,
-        (curve.magnitude[shared], np.nan_to_num(curve.relative_sd[shared])),
-        (other.magnitude, np.nan_to_num(other.relative_sd)),
+        curve.frequency_hz[shared],
+        *((each.magnitude[shared], np.nan_to_num(each.relative_sd[shared])) for each in (curve, other)),
     )
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Values of one curve at the frequency markers."""
+    """Values of one curve at the markers' frequencies."""
 
     name: str
     magnitudes: tuple[float, ...]
     """Value of the curve at each marker; NaN outside the frequency range of the curve."""
     decibel: float
-    """Ratio of the value at the last marker to the value at the first [dB]; NaN if either is missing."""
+    """Ratio of the value at the last marker to that at the first marker [dB]; NaN if either is missing."""
 
 
 def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
     """Return the values of every curve at the frequencies of the markers [Hz]."""
-    return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
-
-
-def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
-    values = curve.at(frequency_hz).magnitude
-    ratio = float(20 * np.log10(values[-1] / values[0])) if values.size else float("nan")
-    return Reading(curve.name, tuple(float(value) for value in values), ratio)
+    at_hz, found = np.asarray(frequencies_hz, dtype=np.float64), []
+    for curve in curves:
+        values = curve.at(at_hz).magnitude
+        ratio = float(20 * np.log10(values[-1] / values[0])) if values.size else float("nan")
+        found.append(Reading(curve.name, tuple(values.tolist()), ratio))
+    return tuple(found)
 
 
 _LEAST_RISE_DB = 3.0
@@ -171,13 +180,12 @@ _LEAST_RISE_DB = 3.0
 _LEAST_RISE_SD = 8.0
 """Minimum height of a peak [standard deviations]; a thousand points of noise span 6.5 standard deviations."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Pairs (n, distance [half widths]): a mode has at most n peaks within this distance, its own included."""
+"""Pairs (n, distance [half widths]): a mode has at most n peaks, including its own, within this distance."""
 _CROWD_RISE = 0.3
 """Minimum height of a peak that is counted for `_CROWDS`, relative to the minimum height of a mode's peak."""
 _USUAL_HALF_WIDTH = 0.01
 """Relative half width assumed for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
-_PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
@@ -216,7 +224,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
     if height.size < 3 or not curve.is_single_valued:
         return ()
     spread = np.nan_to_num(curve.relative_sd[known])
-    least = _LEAST_RISE_DB / _PER_NEPER_DB
+    least = _LEAST_RISE_DB / PER_NEPER_DB
     places, found = scipy.signal.find_peaks(height, prominence=_CROWD_RISE * least)
     rise = found["prominences"] / np.maximum(least, _LEAST_RISE_SD * spread[places])
     others_hz = frequency_hz[places[rise > _CROWD_RISE]]
@@ -227,7 +235,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
             break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
-        # The counted peaks include the peak itself.
+        # The count includes the peak itself.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
     return tuple(sorted(peaks, key=lambda each: each.frequency_hz))
@@ -236,7 +244,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
 def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
     """Return a peak, and the larger of its two half widths [Hz]."""
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
-    # Divided differences are used for speed: a chaotic curve has thousands of peaks.
+    # Use divided differences, which are fast: a chaotic curve has thousands of peaks.
     (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
     bend, top = (right - left) / (before + after), y[1]
     slope = (left * after + right * before) / (before + after)
@@ -269,3 +277,103 @@ def _ends_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> tu
         ends.append(frequency_hz[here] + share * (frequency_hz[here + step] - frequency_hz[here]))
     low_hz, high_hz = sorted(map(float, ends))
     return low_hz, high_hz
+
+
+SAME_HZ = 0.01
+"""Largest difference between two frequencies that count as equal [Hz]."""
+
+
+def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
+    """Yield the curves of predicted Responses I and II."""
+    low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
+    level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
+    note = f"sines of A0 = {level}, {found.accuracy.value} accuracy"
+    unknown = np.full(found.frequency_hz.shape, np.nan)
+    values = (found.response_i, found.response_ii, unknown)
+    yield from _responses(name, CurveOrigin.PREDICTED, found.frequency_hz, values, note)
+
+
+def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:
+    """Yield the curve of an estimated transmission, with the standard deviation of the curve."""
+    found = response.frequency_response
+    how = found.settings
+    note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
+    yield Curve(
+        name,
+        origin,
+        CurveKind.TRANSMISSIBILITY,
+        found.frequency_hz,
+        found.magnitude,
+        found.relative_sd_magnitude,
+        note,
+    )
+
+
+def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator[Curve]:
+    """Yield the curves of Responses I and II of a sweep."""
+    note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
+    yield from _responses(
+        name, origin, found.frequency_hz, (found.response_i, found.response_ii, found.sd_response_ii), note
+    )
+
+
+def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
+    """Yield separate curves for upward and downward steps, whose responses differ between the jumps."""
+    if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
+        return  # several levels at one frequency are not a curve over frequency
+    directions = np.array(found.direction)
+    for direction in dict.fromkeys(found.direction):
+        at = directions == direction
+        values = (found.response_i[at], found.response_ii[at], found.sd_response_ii[at])
+        yield from _responses(
+            f"{name} {direction}", origin, found.frequency_hz[at], values, f"steps {direction}"
+        )
+
+
+def dwell_traces(name: str, origin: CurveOrigin, found: DwellResponse) -> Iterator[Curve]:
+    """Yield Responses I and II of a dwell as curves of one point."""
+    values = np.array([[found.response_i], [found.response_ii], [found.sd_response_ii]])
+    note = f"window of {found.window_s:.3g} s, A0 = {1e6 * found.drive.amplitude_m:.3g} µm"
+    yield from _responses(name, origin, np.array([found.drive.frequency_hz]), values, note)
+
+
+def _responses(
+    name: str, origin: CurveOrigin, frequency_hz: Reals, values: Iterable[Reals], note: str
+) -> Iterator[Curve]:
+    first, second, sd_second = values
+    unknown = np.full(frequency_hz.shape, np.nan)
+    yield Curve(name, origin, CurveKind.RESPONSE_I, frequency_hz, first, unknown, note)
+    yield Curve(name, origin, CurveKind.RESPONSE_II, frequency_hz, second, sd_second / second, note)
+
+
+class AnalysisOptions(FrozenModel):
+    """Options of an analysis; the options from estimator to confidence apply to noise only."""
+
+    model: Simulation = Simulation.LEFT_OUT
+    """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
+    alone driven by the recorded base motion. A simulation takes seconds to minutes per recording."""
+    estimator: Estimator = Estimator.DRIVE
+    """Estimator: noise on the base biases 'h1', noise on the response biases 'h2', neither biases 'drive'."""
+    noise_ratio: float | None = Field(default=None, ge=0.0)
+    """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
+    window: Window = Window.HANN
+    """Window of the segments of streamed noise."""
+    resolution_hz: PositiveFloat | None = None
+    """Resolution for streamed noise; automatic by default. Give either resolution or averages."""
+    averages: Annotated[float, Field(gt=1.0)] | None = None
+    """Number of independent averages of streamed noise; automatic by default."""
+    overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
+    """Overlap of neighbouring segments, as a fraction of their length."""
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
+    """Probability that the bounds at a spectral line contain the true value."""
+
+    @model_validator(mode="after")
+    def _is_allowed(self) -> Self:
+        """Refuse invalid combinations of options: building the noise request raises an error for them."""
+        self.request  # noqa: B018 - making it is the check
+        return self
+
+    @property
+    def request(self) -> FrequencyResponseRequest:
+        """Noise analysis requested by these options."""
+        return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))

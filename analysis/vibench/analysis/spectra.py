@@ -1,4 +1,8 @@
-"""Spectral densities with confidence bounds, amplitude spectra and spectrograms."""
+"""Spectra of long signals: densities with confidence bounds, amplitude spectra, spectrograms.
+
+Records arrive block by block, and memory does not grow with them. Segments that touch lost samples are left
+out and counted. An amplitude spectrum shows the amplitude of a sine.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -8,12 +12,19 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
-from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.confidence import DEFAULT_CONFIDENCE, chi_square_bounds
-from ..signals.quantity import Quantity, derivative_factor
-from ..signals.window import Window, effective_averages, hop_samples, taper, window_by_name
-from ..tables import Tabular
+from .errors import InvalidRequest, NotEnoughData, UnusableData
+from .signals.arrays import Complexes, Flags, Reals
+from .signals.averaging import (
+    DEFAULT_CONFIDENCE,
+    Window,
+    by_name,
+    chi_square_bounds,
+    effective_averages,
+    hop_samples,
+    taper,
+)
+from .signals.quantity import Quantity, derivative_factor
+from .tables import Tabular
 
 _BATCH_SAMPLES = 1 << 19
 """Number of samples of all channels that are transformed at once: 4 MB, so that a batch fits the cache."""
@@ -64,7 +75,7 @@ class SegmentSpectra:
     ) -> None:
         if segment_samples < 2:
             raise InvalidRequest(f"a segment of {segment_samples} samples has no spectrum; use at least 2")
-        self._window = window_by_name(window)
+        self._window = by_name(Window, window)
         self._overlap = overlap
         self._hop = hop_samples(segment_samples, overlap)
         self._taper = taper(self._window, segment_samples)
@@ -86,9 +97,7 @@ class SegmentSpectra:
         marks = np.ones(block.shape[1], dtype=np.bool_) if valid is None else valid
         data = np.concatenate((self._carry, block), axis=1) if self._carry.shape[1] else block
         marks = np.concatenate((self._carry_valid, marks))
-        count = (
-            (data.shape[1] - self._taper.size) // self._hop + 1 if data.shape[1] >= self._taper.size else 0
-        )
+        count = max(0, (data.shape[1] - self._taper.size) // self._hop + 1)
         if count:
             invalid = np.concatenate(([0], np.cumsum(~marks)))
             starts = np.arange(count) * self._hop
@@ -99,19 +108,15 @@ class SegmentSpectra:
             usable = starts[used]
             for first in range(0, usable.size, size):
                 batch = segments[:, usable[first : first + size]] * self._taper
-                self._sum_products(np.asarray(fft.rfft(batch, axis=-1, overwrite_x=True)))
+                spectra = np.asarray(fft.rfft(batch, axis=-1, overwrite_x=True))
+                # Add conj(X_i) X_j for i <= j; `averages` fills in the other half.
+                for i, each in enumerate(spectra):
+                    power = np.einsum("kf,kf->f", each.real, each.real)
+                    self._sums[i, i] += power + np.einsum("kf,kf->f", each.imag, each.imag)
+                    others = spectra[i + 1 :]
+                    self._sums[i, i + 1 :] += np.einsum("kf,jkf->jf", np.conj(each), others)
         self._carry = data[:, count * self._hop :].copy()
         self._carry_valid = marks[count * self._hop :]
-
-    def _sum_products(self, spectra: Complexes) -> None:
-        """Add conj(X_i) X_j for i <= j; `averages` fills in the other half."""
-        for i, first in enumerate(spectra):
-            self._sums[i, i] += np.einsum("kf,kf->f", first.real, first.real)
-            self._sums[i, i] += np.einsum("kf,kf->f", first.imag, first.imag)
-            if i + 1 < len(spectra):
-                conjugate = np.conj(first)
-                for j in range(i + 1, len(spectra)):
-                    self._sums[i, j] += np.einsum("kf,kf->f", conjugate, spectra[j])
 
     def averages(self) -> SpectralAverages:
         """Return the averages over everything added so far.
@@ -144,7 +149,7 @@ class SegmentSpectra:
 
 
 def pieces(signals: tuple[Reals, ...], valid: Flags | None) -> Iterator[tuple[Reals, Flags | None]]:
-    """Yield long signals in short blocks, so that the whole record is never copied."""
+    """Yield long signals in short blocks; the whole record is never copied."""
     length = signals[0].size
     if any(signal.shape != (length,) for signal in signals) or (
         valid is not None and valid.shape != (length,)
@@ -290,7 +295,7 @@ def amplitude_spectrum(
     count = samples.size
     if count < 2:
         raise InvalidRequest(f"a spectrum of {count} samples was requested; it needs at least 2")
-    chosen = window_by_name(window)
+    chosen = by_name(Window, window)
     values = taper(chosen, count)
     spectrum = fft.rfft((samples - np.mean(samples)) * values)
     scale = np.full(spectrum.size, 2 / np.sum(values))
@@ -336,7 +341,7 @@ class Spectrogram(Tabular):
 
 
 class SpectrogramSums:
-    """Spectrogram of a signal that arrives in blocks; memory contains only one segment and the result.
+    """Spectrogram of a signal that arrives in blocks; only one segment and the result are in memory.
 
     Parameters
     ----------
